@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from trunkline.recordings.trials.recording import Planned
+from trunkline.recordings.trials.recording import PlannedTrial
 from trunkline.recordings.trials.splits import IDENTIFY, VALIDATE
 
 Tilt = Annotated[float, Field(ge=0, le=180)]
@@ -125,13 +125,13 @@ class Experiments:
         return replace(self, tilt_repeats=1, **lists)
 
 
-def tilt_trials(experiments: Experiments, load: float = 0.0) -> list[Planned]:
+def tilt_trials(experiments: Experiments, load: float = 0.0) -> list[PlannedTrial]:
     """All tilts, once a repeat; every repeat leaves out another tilt, so that each is validated in turn.
 
     Trials with a load, kg, are all to be identified from: they are few.
     """
     return [
-        Planned(
+        PlannedTrial(
             name=f"tilt_{tilt:03.0f}_{chr(ord('a') + repeat)}{_grams(load)}",
             experiment="static_tilt",
             split=IDENTIFY if load else _split(repeat, index, experiments),
@@ -143,11 +143,11 @@ def tilt_trials(experiments: Experiments, load: float = 0.0) -> list[Planned]:
     ]
 
 
-def release_trials(experiments: Experiments, load: float = 0.0) -> list[Planned]:
+def release_trials(experiments: Experiments, load: float = 0.0) -> list[PlannedTrial]:
     """One a direction. load: kg, as in `tilt_trials`."""
     last = experiments.validate_every - 1
     return [
-        Planned(
+        PlannedTrial(
             name=f"release_{azimuth:03.0f}{_grams(load)}",
             experiment="release",
             split=IDENTIFY if load else _split(last, index, experiments),
@@ -158,10 +158,10 @@ def release_trials(experiments: Experiments, load: float = 0.0) -> list[Planned]
     ]
 
 
-def curl_trials(experiments: Experiments) -> list[Planned]:
+def curl_trials(experiments: Experiments) -> list[PlannedTrial]:
     """All levels, once a group of tendons; every group leaves out other levels, so that all are identified from."""
     return [
-        Planned(
+        PlannedTrial(
             name=f"curl_{'_'.join(map(str, group))}_{level:03.0f}",
             experiment="curl",
             split=_split(row, index, experiments),
@@ -172,19 +172,19 @@ def curl_trials(experiments: Experiments) -> list[Planned]:
     ]
 
 
-def loaded_trials(experiments: Experiments) -> list[Planned]:
+def loaded_trials(experiments: Experiments) -> list[PlannedTrial]:
     """Those with a mass at the tip."""
     plans = [(experiments.with_lists(loaded), loaded.load) for loaded in experiments.loads]
     return [trial for plan, load in plans for trial in (*tilt_trials(plan, load), *release_trials(plan, load))]
 
 
-def pull_trials(experiments: Experiments) -> list[Planned]:
+def pull_trials(experiments: Experiments) -> list[PlannedTrial]:
     """One a pull: its name tells each tendon's mm, `x` if it is loose and `m` for minus, and from where it came."""
     trials = []
     for index, pull in enumerate(experiments.pulls):
         levels = ["x" if level is None else f"{level:.0f}".replace("-", "m") for level in pull.levels]
         trials.append(
-            Planned(
+            PlannedTrial(
                 name=f"pull_{'_'.join(levels)}_{'back' if pull.from_beyond else 'to'}",
                 experiment="static_pull",
                 split=_split(0, index, experiments),
@@ -194,19 +194,19 @@ def pull_trials(experiments: Experiments) -> list[Planned]:
     return trials
 
 
-def motion_trials(experiments: Experiments) -> list[Planned]:
+def motion_trials(experiments: Experiments) -> list[PlannedTrial]:
     """One a motion: its name tells its highest frequency (tenths of Hz), amplitude and offset (mm)."""
     trials = []
     for index, motion in enumerate(experiments.motions):
         numbers = (10 * max(motion.frequencies), motion.amplitude, motion.offset)
         words = "_".join(f"{number:.0f}".replace("-", "m") for number in numbers)
         split = _split(0, index, experiments)
-        trials.append(Planned(name=f"motion_{words}", experiment="motion", split=split, level=None))
+        trials.append(PlannedTrial(name=f"motion_{words}", experiment="motion", split=split, level=None))
     return trials
 
 
 # name of the experiment to (the setting that plans it, the trials that it plans)
-PLANS: dict[str, tuple[str, Callable[[Experiments], list[Planned]]]] = {
+PLANS: dict[str, tuple[str, Callable[[Experiments], list[PlannedTrial]]]] = {
     "static_tilt": ("tilts", tilt_trials),
     "release": ("release_directions", release_trials),
     "curl": ("curl_levels", curl_trials),

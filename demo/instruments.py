@@ -9,7 +9,7 @@ from pydantic import Field
 from scipy.spatial.transform import Rotation
 
 from demo.truth import Truth
-from trunkline.recordings.trials.recording import Planned
+from trunkline.recordings.trials.recording import PlannedTrial
 
 BASE = "base"
 
@@ -54,7 +54,7 @@ class InstrumentSettings:
 
 
 @dataclass(kw_only=True)
-class Measurement(Planned):
+class Measurement(PlannedTrial):
     """A trial as the instruments saw it: F frames of B bodies, the base first; K tendons.
 
     frames (F,): frame numbers. stamps, logged (F,): ns, by the cameras' and by the recorder's clock.

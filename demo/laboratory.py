@@ -15,7 +15,7 @@ from demo.plants.bench import COMMAND_RATE, LOOSE, SAMPLE_RATE, Bench, Plant, Pl
 from demo.truth import Truth
 from trunkline.frames import STANDARD_GRAVITY, wxyz_from_rotation
 from trunkline.model.arm.mjcf import unit_name
-from trunkline.recordings.trials.recording import Planned
+from trunkline.recordings.trials.recording import PlannedTrial
 from trunkline.recordings.trials.splits import TEST
 
 
@@ -127,7 +127,7 @@ class Laboratory:
             commands[index] = (sides @ np.stack([np.cos(azimuths), np.sin(azimuths)]) + motion.offset) / 1000
         return self._driven("motions", trials, commands, begin=rest)
 
-    def _loose(self, trials: list[Planned], duration: float) -> np.ndarray:
+    def _loose(self, trials: list[PlannedTrial], duration: float) -> np.ndarray:
         """Commands (n, T, K) that leave all cables loose for `duration` s."""
         return np.full((len(trials), round(duration * COMMAND_RATE), self.plant.tendons), -LOOSE)
 
@@ -164,7 +164,7 @@ class Laboratory:
             truths.append(truth)
         return truths
 
-    def _truth(self, trial: Planned, mount: Rotation, motion: PlantMotion, index: int, begin: float) -> Truth:
+    def _truth(self, trial: PlannedTrial, mount: Rotation, motion: PlantMotion, index: int, begin: float) -> Truth:
         """The trial of this index, under a mount turned by `mount` (world ← base)."""
         positions, rotations = motion.positions[index], motion.rotations[index]
         local = Rotation.from_matrix(rotations.reshape(-1, 3, 3))

@@ -13,7 +13,7 @@ from demo.plants.choice import Choice, distinct, expect, plant_of
 from demo.recorder import write_log, write_session
 from trunkline.compute.progress import progress
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
-from trunkline.recordings.trials.recording import Planned
+from trunkline.recordings.trials.recording import PlannedTrial
 from trunkline.recordings.trials.splits import IDENTIFY, VALIDATE
 from trunkline.settings import settings
 
@@ -45,7 +45,7 @@ class Config(Choice):
         expect(distinct(loaded), "experiments.loads", _repeated(loaded), "a log of its own for each trial")
 
 
-def _check_trials(key: str, trials: list[Planned], tested: list[Planned], experiments: Experiments) -> None:
+def _check_trials(key: str, trials: list[PlannedTrial], tested: list[PlannedTrial], experiments: Experiments) -> None:
     names = [trial.name for trial in trials + tested]
     expect(distinct(names), key, _repeated(names), "a log of its own for each trial (names hold whole numbers)")
     splits = {trial.split for trial in trials}

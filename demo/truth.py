@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trunkline.recordings.trials.recording import Recording
+from trunkline.recordings.trials.recording import TrialRecording
 
 
 @dataclass(kw_only=True)
-class Truth(Recording):
+class Truth(TrialRecording):
     """One trial of T instants, S segments, K tendons and Tc commands. The world is z-up, in metres.
 
     time: (T,) s, uniform at 480 Hz or more, from 0.

@@ -7,7 +7,7 @@ import numpy as np
 from trunkline.compute.progress import progress
 from trunkline.pipeline.stage import output_folder, run_stage, write_metrics
 from trunkline.recordings.filtering.effect import summary
-from trunkline.recordings.filtering.filter import Filter, filter_take
+from trunkline.recordings.filtering.filter import Filter, filter_raw_trial
 from trunkline.recordings.trials.raw_trial import read_takes
 from trunkline.recordings.trials.splits import SPLITS
 from trunkline.recordings.trials.trial import write_trials
@@ -25,7 +25,7 @@ def main(config: Filter) -> None:
     trials, effects = [], []
     with progress(len(takes), "filter", "trials") as bar:
         for take in takes:
-            trial, effect = filter_take(take, config)
+            trial, effect = filter_raw_trial(take, config)
             trials.append(trial)
             effects.append(effect)
             bar.update(1, trial=take.name)

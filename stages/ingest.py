@@ -8,12 +8,18 @@ from pathlib import Path
 from trunkline.compute.progress import progress
 from trunkline.errors import InputError
 from trunkline.pipeline.stage import output_folder, run_stage, write_json, write_metrics
-from trunkline.recordings.cleaning.checks import Limits
-from trunkline.recordings.cleaning.loading import take_in
+from trunkline.recordings.cleaning.checks import TrialLimits
+from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.cleaning.quality import by_sentence, clock_facts, judge, remarks, report, summary
-from trunkline.recordings.cleaning.same_arm import gather_each
-from trunkline.recordings.cleaning.sanity_checks import Plausible
-from trunkline.recordings.cleaning.session_checks import Gathered, Refusal, gather, require_enough, together
+from trunkline.recordings.cleaning.same_arm import check_each_session
+from trunkline.recordings.cleaning.sanity_checks import SanityLimits
+from trunkline.recordings.cleaning.session_checks import (
+    CheckedSession,
+    Refusal,
+    check_session,
+    require_enough,
+    together,
+)
 from trunkline.recordings.session.session import OneFolder, Session, SomeSessions, session_folders
 from trunkline.recordings.trials.raw_trial import write_takes
 from trunkline.report.figures.data import quality_figure
@@ -29,14 +35,14 @@ class Config:
 
     session: OneFolder
     refused_trials: Refusal
-    limits: Limits
-    plausible: Plausible
+    limits: TrialLimits
+    plausible: SanityLimits
     only: SomeSessions = field(default_factory=list)
 
 
 def main(config: Config) -> None:
     folders = session_folders(RAW / config.session, config.only)
-    sessions = gather_each(folders, partial(gathered_of, config=config), config.plausible.distance)
+    sessions = check_each_session(folders, partial(gathered_of, config=config), config.plausible.distance)
     gathered = together(list(sessions.values()))
     qualities = [judge(take, sessions) for take, sessions in zip(gathered.takes, gathered.findings, strict=True)]
     for take, finding in zip(gathered.takes, gathered.findings, strict=True):
@@ -57,16 +63,16 @@ def main(config: Config) -> None:
         print(f"ingest: warning: {line}", file=sys.stderr)
 
 
-def gathered_of(folder: Path, session: Session, config: Config) -> Gathered:
+def gathered_of(folder: Path, session: Session, config: Config) -> CheckedSession:
     """The takes of one session, whose clock and vertical are its own."""
     with progress(len(session.trials), "ingest", "trials") as bar:
         taken = []
-        for trial, take, findings in take_in(folder, session, config.limits):
+        for trial, take, findings in load_raw_trials(folder, session, config.limits):
             if isinstance(take, InputError) and config.refused_trials == "stop":
                 raise take
             taken.append((trial, take, findings))
             bar.update(1, trial=trial.name)
-    gathered = gather(taken, session, config.plausible, config.refused_trials, f"{folder}")
+    gathered = check_session(taken, session, config.plausible, config.refused_trials, f"{folder}")
     require_enough(gathered, session.trials)
     return gathered
 

@@ -30,7 +30,7 @@ from trunkline.identification.fit.settings import IdentificationSettings
 from trunkline.identification.fit.surrogate import surrogate
 from trunkline.identification.parameters.parameters import PARAMETERS
 from trunkline.identification.simulate.experiment import prepare
-from trunkline.model.arm.joints import Branch, Joints
+from trunkline.model.arm.joints import Joints, MaxwellElement
 from trunkline.pipeline.config import load_config
 from trunkline.recordings.trials.trial import Trial
 from upkeep.results import recorded
@@ -76,7 +76,7 @@ STAGES = {
         {
             "stiffness": 2.0, "damping": 0.07, "relaxation": 0.3, "relaxation_time": 0.2, "relaxation_2": 0.15,
             "relaxation_time_2": 0.03,
-        }, releases, joints=Joints([Branch(0.3, 0.5), Branch(0.1, 0.03)]),
+        }, releases, joints=Joints([MaxwellElement(0.3, 0.5), MaxwellElement(0.1, 0.03)]),
     ),
     "control": Searched(
         {"kp": 600.0, "kv": 25.0, "time_constant": 0.05, "dead_time": 0.02, "force_range": 1.6}, driven,

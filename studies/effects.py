@@ -35,8 +35,8 @@ from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.settings import IdentificationSettings
 from trunkline.identification.simulate.experiment import own_starts
 from trunkline.identification.uncertainty.cross_validation import errors_left_out
-from trunkline.model.arm.guide_holes import Holes
-from trunkline.model.arm.joints import Branch, Joints, Slider
+from trunkline.model.arm.guide_holes import GuideHoles
+from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.identify import CAD_MODEL, TRIALS, read_reported
 from trunkline.recordings.trials.splits import VALIDATE
@@ -56,7 +56,7 @@ class Effect:
     parameters: dict[str, Bounds]
     joints: Joints = field(default_factory=Joints)
     dead_time: float = 0.0
-    holes: Holes = field(default_factory=Holes)
+    holes: GuideHoles = field(default_factory=GuideHoles)
     lag: float = 0.0
 
 
@@ -76,22 +76,22 @@ EFFECTS: dict[str, Effect] = {
     ),
     "branch": Effect(
         "Maxwell branch", "identify_damping",
-        ranges(*SHARES, "relaxation") | ranges(*TIMES, "relaxation_time"), Joints([Branch(0.3, 0.5)]),
+        ranges(*SHARES, "relaxation") | ranges(*TIMES, "relaxation_time"), Joints([MaxwellElement(0.3, 0.5)]),
     ),
     "branch_2": Effect(
         "second Maxwell branch", "identify_damping",
-        ranges(*SHARES, "relaxation_2") | ranges(*TIMES, "relaxation_time_2"), Joints([Branch(0.2, 2.0)]),
+        ranges(*SHARES, "relaxation_2") | ranges(*TIMES, "relaxation_time_2"), Joints([MaxwellElement(0.2, 2.0)]),
     ),
     "slider": Effect(
         "Jenkins element", "identify_damping",
-        ranges(*SHARES, "hysteresis") | ranges(5e-4, 0.3, "yield_bend"), Joints(sliders=[Slider(0.2, 0.02)]),
+        ranges(*SHARES, "hysteresis") | ranges(5e-4, 0.3, "yield_bend"), Joints(sliders=[JenkinsElement(0.2, 0.02)]),
     ),
     "friction": Effect(
         "tendon friction", "identify_damping",
         ranges(0.005, 3.0, "tendon_friction") | ranges(0.003, 0.3, "friction_time"),
     ),
     "holes": Effect(
-        "capstan friction", "identify_control", ranges(0.005, 2.0, "capstan_friction"), holes=Holes(0.2, 8)
+        "capstan friction", "identify_control", ranges(0.005, 2.0, "capstan_friction"), holes=GuideHoles(0.2, 8)
     ),
     "dead_time": Effect("dead time", "identify_control", ranges(0.001, 0.2, "dead_time"), dead_time=0.02),
     "lag": Effect("lag of the motors", "identify_control", ranges(0.002, 0.3, "time_constant"), lag=0.02),
@@ -109,7 +109,7 @@ def cad_model(effects: list[Effect]) -> mujoco.MjModel:
         [slider for effect in effects for slider in effect.joints.sliders],
         any(effect.joints.round for effect in effects),
     )
-    config.holes = next((effect.holes for effect in effects if effect.holes.stretches), Holes())
+    config.holes = next((effect.holes for effect in effects if effect.holes.stretches), GuideHoles())
     config.actuation.dead_time = max((effect.dead_time for effect in effects), default=0.0)
     config.actuation.time_constant = max((effect.lag for effect in effects), default=0.0) or NO_LAG
     model = cad_arm(config).spec.compile()

@@ -20,16 +20,17 @@ from trunkline.identification.evaluation.evaluation import replay, scores
 from trunkline.identification.fit.identify import identify
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.setup import set_up
-from trunkline.model.arm.joints import Slider
+from trunkline.model.arm.joints import JenkinsElement
 from trunkline.model.arm.uniform import Uniform
 from trunkline.pipeline.config import load_config
-from trunkline.recordings.filtering.filter import filter_take
-from trunkline.recordings.trials.raw_trial import Take, read_takes
+from trunkline.recordings.filtering.filter import filter_raw_trial
+from trunkline.recordings.trials.raw_trial import RawTrial, read_takes
 from trunkline.recordings.trials.splits import DECIDING, IDENTIFY, VALIDATE
 from upkeep.results import recorded
 
 EXAMPLE = Path("examples/asl_trunk")
-SLIDERS = [Slider(2.0, 0.002), Slider(0.7, 0.015), Slider(0.3, 0.06)]  # they slip one after the other
+# they slip one after the other
+SLIDERS = [JenkinsElement(2.0, 0.002), JenkinsElement(0.7, 0.015), JenkinsElement(0.3, 0.06)]
 
 
 @dataclass
@@ -44,7 +45,7 @@ class Case:
     parameters: dict[str, Bounds] = field(default_factory=dict)
     filtered: dict = field(default_factory=dict)
     settings: dict = field(default_factory=dict)
-    sliders: list[Slider] = field(default_factory=list)
+    sliders: list[JenkinsElement] = field(default_factory=list)
     quadratic_damping: float = 0.0
     as_stamped: bool = False
 
@@ -77,11 +78,11 @@ def cases() -> dict[str, Case]:
     }
 
 
-def error(case: Case, takes: list[Take]) -> tuple[float, float, float, float]:
+def error(case: Case, takes: list[RawTrial]) -> tuple[float, float, float, float]:
     """Mean position error on the identify and on the validate releases, mm, and of the latter also the tip error, mm
     and % of the arm's length."""
     chosen = replace(load_config(filter.Config, "filter", EXAMPLE), **case.filtered)
-    trials = [filter_take(as_stamped(take) if case.as_stamped else take, chosen)[0] for take in takes]
+    trials = [filter_raw_trial(as_stamped(take) if case.as_stamped else take, chosen)[0] for take in takes]
     config = load_config(identify_stiffness.Config, "identify_stiffness", EXAMPLE)
     config = replace(config, parameters=config.parameters | case.parameters, **case.settings)
     model, experiments, fit = set_up(config, trials, arm(case))
@@ -108,7 +109,7 @@ def arm(case: Case) -> mujoco.MjModel:
     return model
 
 
-def as_stamped(take: Take) -> Take:
+def as_stamped(take: RawTrial) -> RawTrial:
     """A take without the time of its lost frames."""
     return replace(take, time=np.arange(len(take.time)) * np.median(np.diff(take.time)))
 

@@ -100,7 +100,7 @@ JUDGES = {  # by function, the test that has its table, and its file below tests
         "test_sheets_are_checked_with_tips_and_points_beyond",
     ),
     "trunkline.model.statics.newton:find_equilibrium": (
-        "model/statics/test_converged.py",
+        "model/statics/test_newton.py",
         "test_balance_alone_is_no_rest",
     ),
 }
@@ -132,7 +132,7 @@ def test_a_table_is_one_and_is_of_its_judge(function):
     tree = ast.parse((ROOT / "tests" / file).read_text("utf-8"))
     tests = [node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name == name]
     assert len(tests) == 1, f"{file}: found {len(tests)} tests {name}"
-    parametrized = any("parametrize" in ast.unparse(one) for one in tests[0].decorator_list)
+    parametrized = any("parametrize" in ast.unparse(decorator) for decorator in tests[0].decorator_list)
     assert parametrized or any(isinstance(node, ast.For | ast.comprehension) for node in ast.walk(tests[0]))
     assert function.rpartition(":")[2].rpartition(".")[2] in names(tree)
 
@@ -186,11 +186,11 @@ def names(tree: ast.AST) -> set[str]:
     ("reachable = x > 1", {"<module> reachable"}),
 ])  # fmt: skip
 def test_who_decides_is_read_off_the_code(source, words):
-    found = judges([("room.module", ast.parse(textwrap.dedent(source)))])
-    assert {f"{judge.function.partition(':')[2]} {judge.word}" for judge in found} == words
+    result = judges([("room.module", ast.parse(textwrap.dedent(source)))])
+    assert {f"{judge.function.partition(':')[2]} {judge.word}" for judge in result} == words
 
 
 def test_a_cause_in_words_is_a_verdict_among_the_experiments():
     source = ast.parse('def f(a) -> str:\n    return "" if a else "it fell"\n\ndef g(a) -> str:\n    return "it fell"')
-    for module, found in (("rehearsal.experiments.push", {"f"}), ("trunkline.ar.teleop.targets", set())):
-        assert {judge.function.partition(":")[2] for judge in judges([(module, source)])} == found
+    for module, expected in (("rehearsal.experiments.push", {"f"}), ("trunkline.ar.teleop.targets", set())):
+        assert {judge.function.partition(":")[2] for judge in judges([(module, source)])} == expected

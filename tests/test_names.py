@@ -25,7 +25,7 @@ Counts = dict[str, int]
 
 
 def folder_of(path: str) -> str:
-    """The top folder; of the library the package: `trunkline/kinematics/ik`."""
+    """The top folder; of the library the package: `trunkline/kinematics`."""
     parts = path.split("/")
     return "/".join(parts[:2]) if parts[0] == "trunkline" and len(parts) > 2 else parts[0]
 
@@ -106,7 +106,7 @@ def test_names_are_counted_by_folder_and_by_package_of_the_library():
         "docs/a.md",
     )
     assert vague_names({path: text for path in paths} | {"demo/a.py": "length = 1"}) == {
-        "new": 2, "tests": 2, "trunkline": 2, "trunkline/kinematics/ik": 4,
+        "new": 2, "tests": 2, "trunkline": 2, "trunkline/kinematics": 4,
     }  # fmt: skip
 
 

@@ -10,13 +10,13 @@ import numpy as np
 
 from trunkline.identification.evaluation.error_tables import number
 from trunkline.identification.stages import STAGES
-from trunkline.recordings.trials.experiments import EXPERIMENTS, Kind
+from trunkline.recordings.trials.experiments import EXPERIMENTS, ExperimentKind
 from trunkline.recordings.trials.splits import TEST, VALIDATE
 
 TRUTH = Path("data/raw/demo.truth.json")
 
 
-def judge(kind: Kind) -> str:
+def judge(kind: ExperimentKind) -> str:
     """The stage whose model is judged by trials of this kind: the first to know all that acts in them."""
     if kind.needs_motors:
         return "identify_control"

@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from trunkline.ar.hybrid.objects import GRIP, object_geoms
 from trunkline.ar.hybrid.worlds import HOOK_LENGTH
 from trunkline.frames import STANDARD_GRAVITY, rotation_from_wxyz, wxyz_from_rotation
-from trunkline.model.elements import actuators, give_way
+from trunkline.model.elements import actuators, unload_branches
 from trunkline.model.simulation.motion import batch_of, hold, move
 from trunkline.model.simulation.rest import settle
 from trunkline.model.simulation.winch import Winches
@@ -144,7 +144,7 @@ def try_grasps(
     initial = straight + np.where(begun > 0, -begun, 0.0 if tries.before is None else PAID_OUT)
     if tries.before is not None:
         place[:, : arm.nq] = settle(arm, initial, to_base.apply(model.opt.gravity)).qpos
-    give_way(model, place)
+    unload_branches(model, place)
     tie = _hang(batch, model, place[:, address : address + 7], to_base.apply(UP))
 
     steps, simulations = round(BLOCK / timestep), np.arange(count, dtype=np.int32)

@@ -71,10 +71,10 @@ def test_a_processor_without_avx2_is_left_as_it_is(tmp_path, monkeypatch):
 
 def test_training_gives_the_same_network_whatever_mkl_chooses():
     """MKL chooses by the processor; `MKL_CBWR=COMPATIBLE` makes it choose as on none that is near this one."""
-    found = {
+    outputs = {
         subprocess.run(
             [sys.executable, "-c", TRAINED], cwd=ROOT, env=os.environ | more, capture_output=True, text=True, check=True
         ).stdout
         for more in ({}, {"MKL_CBWR": "COMPATIBLE"})
     }
-    assert len(found) == 1
+    assert len(outputs) == 1

@@ -22,7 +22,7 @@ from tests.support.small_arm import small_spec
 from trunkline.compute import cluster as workers
 from trunkline.compute import scheduler
 from trunkline.compute.cluster import VARIABLE
-from trunkline.compute.environment import likeness_for
+from trunkline.compute.environment import fingerprint_for
 from trunkline.compute.scheduler import arriving, pieces, spread
 from trunkline.errors import InputError
 from trunkline.identification.fit.problem import Bounds, Problem
@@ -34,7 +34,7 @@ from trunkline.kinematics.dataset import sampling
 from trunkline.kinematics.dataset.deviation import mujoco_deviation
 from trunkline.kinematics.dataset.table import sample_table
 from trunkline.kinematics.panda import labels
-from trunkline.model.arm.guide_holes import Holes, add_holes
+from trunkline.model.arm.guide_holes import GuideHoles, add_holes
 from trunkline.model.statics.chain import read_chain
 from trunkline.pipeline.identify import CAD_MODEL, run
 from trunkline.pipeline.stage import output_folder
@@ -62,15 +62,16 @@ def spreading(cluster, monkeypatch):
     return lambda: monkeypatch.setenv(VARIABLE, cluster.scheduler_address)
 
 
-def same(one, other) -> bool:
-    return len(one) == len(other) and all(np.array_equal(a, b, equal_nan=True) for a, b in zip(one, other, strict=True))
+def same(first, second) -> bool:
+    pairs = zip(first, second, strict=True)
+    return len(first) == len(second) and all(np.array_equal(a, b, equal_nan=True) for a, b in pairs)
 
 
 def rubbing_model():
     """Cables rub, winches wind at a limited rate and with backlash: all that goes on between two steps."""
     spec = small_spec(4, rate_limit=0.3, backlash=1e-3)
     spec.option.timestep = FRAME / 8
-    add_holes(spec, Holes(0.1, 2))
+    add_holes(spec, GuideHoles(0.1, 2))
     return spec.compile()
 
 
@@ -141,8 +142,8 @@ def test_a_candidate_that_diverges_does_so_there_too(spreading):
     assert same(there.positions, here.positions)
 
 
-def _run_or_die(given, piece):
-    population, flag = given
+def _run_or_die(shared, piece):
+    population, flag = shared
     try:
         flag.touch(exist_ok=False)
     except FileExistsError:
@@ -159,7 +160,7 @@ def test_a_worker_killed_on_the_way_changes_no_bit(trials, spreading, tmp_path, 
     population = Population(model, experiments, segments_of(model))
     monkeypatch.setattr(
         "trunkline.identification.simulate.population.spread",
-        lambda work, pieces, given: spread(_run_or_die, pieces, (given, flag)),
+        lambda work, pieces, shared: spread(_run_or_die, pieces, (shared, flag)),
     )
     there = population.simulate(fields)
     assert flag.exists(), "one was killed"
@@ -178,8 +179,8 @@ def test_samples_of_forward_kinematics_are_the_same_bits(spreading, monkeypatch)
     here = made()
     spreading()
     monkeypatch.setattr(sampling, "LEAST", 20)
-    for one, other in zip(made(), here, strict=True):
-        assert one.equals(other)
+    for result, expected in zip(made(), here, strict=True):
+        assert result.equals(expected)
 
 
 def test_labels_of_the_rigid_map_are_the_same(spreading, monkeypatch):
@@ -205,8 +206,8 @@ def test_rehearsals_arrive_from_workers_too(monkeypatch, tmp_path):
     with LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as cluster:
         monkeypatch.setenv(VARIABLE, cluster.scheduler_address)
         made = runs.make(wanted, package, source, tmp_path / "runs.csv", workers=1)
-        assert sorted(one.seed for one in made) == [0, 1, 2, 3, 4]
-        assert {one.cause for one in made} == {"a package"}
+        assert sorted(rehearsed.seed for rehearsed in made) == [0, 1, 2, 3, 4]
+        assert {rehearsed.cause for rehearsed in made} == {"a package"}
         other = replace(source, code="other")
         answers = iter([source, *[other] * 9])
         monkeypatch.setattr(runs, "source_of", lambda file: next(answers))
@@ -233,28 +234,28 @@ def _mistaken(_, piece):
 @pytest.mark.parametrize("joined_late", [False, True])
 def test_a_worker_with_another_library_is_refused_in_one_line(spreading, monkeypatch, joined_late):
     spreading()
-    real = likeness_for(_mistaken)
+    real = fingerprint_for(_mistaken)
     wanted = replace(real, parts=real.parts | {"mujoco": "9.9.9"})
-    monkeypatch.setattr(workers, "likeness_for", lambda _: wanted)
-    own = scheduler._cluster()
-    monkeypatch.setattr(own, "_alike", set())
+    monkeypatch.setattr(workers, "fingerprint_for", lambda _: wanted)
+    here = scheduler._cluster()
+    monkeypatch.setattr(here, "_alike", set())
     if joined_late:
-        monkeypatch.setattr(own, "_check", lambda expected: None)
+        monkeypatch.setattr(here, "_check", lambda expected: None)
     else:
         monkeypatch.setattr(workers, "_do", None)  # no work is sent
-    told = rf"^{VARIABLE}: worker tcp://\S+: found mujoco {real.parts['mujoco']}, expected 9\.9\.9 as here$"
-    with pytest.raises(InputError, match=told):
+    message = rf"^{VARIABLE}: worker tcp://\S+: found mujoco {real.parts['mujoco']}, expected 9\.9\.9 as here$"
+    with pytest.raises(InputError, match=message):
         spread(_mistaken, [1, 2])
 
 
 @pytest.mark.parametrize(
-    ("address", "told"),
+    ("address", "message"),
     [
         ("tcp://127.0.0.1:9", "found no scheduler at tcp://127.0.0.1:9, expected one that answers"),
         ("nonsense", "found 'nonsense', expected an address such as tcp://host:8786"),
     ],
 )
-def test_a_stage_without_its_scheduler_ends_in_one_line_and_writes_nothing(monkeypatch, tmp_path, address, told):
+def test_a_stage_without_its_scheduler_ends_in_one_line_and_writes_nothing(monkeypatch, tmp_path, address, message):
     monkeypatch.chdir(tmp_path)
     model = begin_project(tmp_path, 4)
     truth = truth_of(model, stiffness=0.7)
@@ -262,7 +263,7 @@ def test_a_stage_without_its_scheduler_ends_in_one_line_and_writes_nothing(monke
     monkeypatch.setenv(VARIABLE, address)
     monkeypatch.setattr(workers, "CONNECTING", 1.0)
     before = sorted(tmp_path.rglob("*"))
-    with pytest.raises(InputError, match=f"^{VARIABLE}: {told}$"):
+    with pytest.raises(InputError, match=f"^{VARIABLE}: {message}$"):
         run("identify_stiffness", settings(["static_tilt"], ["static_tilt"], {"stiffness": (1, 9)}), CAD_MODEL)
     assert sorted(tmp_path.rglob("*")) == before
 
@@ -295,12 +296,12 @@ def test_a_scheduler_that_goes_away_is_told_in_one_line(monkeypatch, tmp_path):
         worker = ["trunkline.compute.worker", address, "--nworkers", "1", "--no-nanny", "--no-dashboard"]
         processes.append(_started(tmp_path / "worker", *worker, "--local-directory", str(tmp_path)))
         rows = arriving(_slowly, list(range(100)))
-        kept = [next(rows)]
+        received = [next(rows)]
         processes[0].kill()
         with pytest.raises(InputError, match=f"the scheduler at {address} went away"), output_folder(tmp_path / "out"):
-            kept += rows
+            received += rows
         assert not (tmp_path / "out").exists()
-        assert kept
+        assert received
     finally:
         for process in processes:
             process.kill()

@@ -23,8 +23,8 @@ def test_a_file_runs_in_one_worker_and_so_do_all_that_compile(tmp_path):
         (tmp_path / folder).mkdir()
         (tmp_path / folder / f"test_{folder}.py").write_text(TEST)
     command = [sys.executable, "-m", "pytest", "-q", "-p", "xdist", "-n", "2", "--dist", "loadgroup", str(tmp_path)]
-    own = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")}
-    alone = own | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+    clean = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")}
+    alone = clean | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
     done = subprocess.run(command, cwd=tmp_path, env=alone, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     ran = [line.split() for line in (tmp_path / "workers.txt").read_text().splitlines()]

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from tests.support.folders import demo_with
-from trunkline.recordings.cleaning.checks import Limits
+from trunkline.recordings.cleaning.checks import TrialLimits
 from trunkline.recordings.cleaning.clock_offset import align_clocks
-from trunkline.recordings.cleaning.loading import take_in
-from trunkline.recordings.filtering.filter import Filter, filter_take
+from trunkline.recordings.cleaning.loading import load_raw_trials
+from trunkline.recordings.filtering.filter import Filter, filter_raw_trial
 from trunkline.recordings.session.session import read_session
 
 TRIALS = ("curl_1_040", "curl_2_3_060", "motion_15_20_m2", "motion_5_40_1")
-LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
+LIMITS = TrialLimits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
 FILTER = Filter(120.0, 20.0, 4, 0.06, 8.0, "onset")
 
 
@@ -26,7 +26,7 @@ def raw():
 def recorded(raw):
     truth, session = json.loads((raw / "demo.truth.json").read_text()), read_session(raw / "demo")
     chosen = [trial for trial in session.trials if trial.name in TRIALS]
-    taken = list(take_in(raw / "demo", session.model_copy(update={"trials": chosen}), LIMITS))
+    taken = list(load_raw_trials(raw / "demo", session.model_copy(update={"trials": chosen}), LIMITS))
     takes, findings = [take for _, take, _ in taken], [findings for *_, findings in taken]
     assert {take.split for take in takes} == {"identify"}
     return truth, takes, findings, align_clocks(takes, findings, 0.1)
@@ -45,7 +45,7 @@ def test_the_clock_of_the_motors_is_right_within_its_uncertainty(recorded):
 def test_curls_and_motions_begin_when_their_commands_do(recorded):
     truth, takes, *_ = recorded
     for take in takes:
-        trial, _ = filter_take(take, FILTER)
+        trial, _ = filter_raw_trial(take, FILTER)
         assert abs(trial.start - truth["starts_s"][take.name]) < 3 * trial.start_sigma < 1 / 120
 
 
@@ -53,6 +53,6 @@ def test_releases_begin_when_the_arm_is_let_go(raw):
     """The arm of the lab leaves as a long beam does, not as a mass on a spring."""
     truth, session = json.loads((raw / "demo.truth.json").read_text()), read_session(raw / "demo")
     chosen = [t for t in session.trials if t.experiment == "release" and t.split == "identify"]
-    for _, take, _ in take_in(raw / "demo", session.model_copy(update={"trials": chosen}), LIMITS):
-        trial, _ = filter_take(take, FILTER)
+    for _, take, _ in load_raw_trials(raw / "demo", session.model_copy(update={"trials": chosen}), LIMITS):
+        trial, _ = filter_raw_trial(take, FILTER)
         assert abs(trial.start - truth["starts_s"][take.name]) < 2 * trial.start_sigma < 1 / 120

@@ -7,11 +7,11 @@ import pytest
 from examples.asl_trunk.session import COLUMNS, make_loaded_session, make_session, read_releases
 from tests.support.folders import SHARED, with_recordings
 from trunkline.errors import InputError
-from trunkline.recordings.cleaning.checks import Limits
-from trunkline.recordings.cleaning.loading import take_in
+from trunkline.recordings.cleaning.checks import TrialLimits
+from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.session.session import read_session
 
-LIMITS = Limits(0.5, 0.3, 0.1, 1.0)
+LIMITS = TrialLimits(0.5, 0.3, 0.1, 1.0)
 
 
 def rows(trajectories: int = 13, frames: int = 90) -> str:
@@ -37,7 +37,7 @@ def test_the_public_csv_becomes_a_session_that_ingest_reads(public, tmp_path):
     session = read_session(folder)
     assert [trial.split for trial in session.trials] == ["identify", "identify", "test"] * 3 + ["validate"] * 4
     positions = read_releases(public)
-    for number, (_, take, findings) in enumerate(take_in(folder, session, LIMITS)):
+    for number, (_, take, findings) in enumerate(load_raw_trials(folder, session, LIMITS)):
         assert (take.segments, take.tendons, take.quaternions) == (("1", "2", "3"), (), None)
         np.testing.assert_array_equal(take.positions, positions[number][: len(take.time)])  # to the last bit
         np.testing.assert_allclose(np.diff(take.time), 0.01)
@@ -59,7 +59,7 @@ def test_releases_with_another_load_are_a_session_of_their_own(public, tmp_path)
     assert (session.frame, session.base) == (first.frame, first.base)
     assert {(trial.experiment, trial.split, trial.load) for trial in session.trials} == {("release", "test", 0.1)}
     positions = read_releases(public)
-    for number, (_, take, _) in enumerate(take_in(folder, session, LIMITS)):
+    for number, (_, take, _) in enumerate(load_raw_trials(folder, session, LIMITS)):
         np.testing.assert_array_equal(take.positions, positions[number][: len(take.time)])
 
 
@@ -100,7 +100,7 @@ def test_the_csv_gives_the_very_logs_that_are_shared(recorded, tmp_path):
     lines = [",".join(COLUMNS)]
     for number, log in enumerate(sorted(recorded.glob("*.mcap"))):
         session.trials = [type(session.trials[0])(file=log.name, experiment="release", split="identify")]
-        [(_, take, _)] = take_in(recorded, session, LIMITS)
+        [(_, take, _)] = load_raw_trials(recorded, session, LIMITS)
         lines += [",".join([str(number), *map(repr, frame)]) for frame in take.positions.reshape(-1, 9).tolist()]
     (tmp_path / "public.csv").write_text("\n".join(lines) + "\n")
     make_session(tmp_path / "public.csv", tmp_path / "session")
@@ -110,7 +110,9 @@ def test_the_csv_gives_the_very_logs_that_are_shared(recorded, tmp_path):
 
 @with_recordings
 def test_frames_that_the_recorder_lost_are_found_in_two_logs_of_thirteen(recorded):
-    repairs = {take.name: findings.repairs for _, take, findings in take_in(recorded, read_session(recorded), LIMITS)}
+    repairs = {
+        take.name: findings.repairs for _, take, findings in load_raw_trials(recorded, read_session(recorded), LIMITS)
+    }
     assert len(repairs) == 13
     repaired = {name: lines for name, lines in repairs.items() if lines}
     assert set(repaired) == {"release_200g_09", "release_200g_10"}

@@ -11,13 +11,13 @@ from stages.build_mjcf import Config, cad_arm
 from tests.support.folders import SHARED, with_recordings
 from trunkline.errors import InputError
 from trunkline.pipeline.config import load_config
-from trunkline.recordings.cleaning.checks import Limits
-from trunkline.recordings.cleaning.loading import take_in
-from trunkline.recordings.filtering.filter import Filter, filter_take
+from trunkline.recordings.cleaning.checks import TrialLimits
+from trunkline.recordings.cleaning.loading import load_raw_trials
+from trunkline.recordings.filtering.filter import Filter, filter_raw_trial
 from trunkline.recordings.session.session import read_session
 
 ROOT = Path(__file__).parents[2]
-LIMITS = Limits(0.5, 0.3, 0.1, 1.0)
+LIMITS = TrialLimits(0.5, 0.3, 0.1, 1.0)
 FILTER = Filter(rate=120.0, cutoff=20.0, order=4, longest_bridge=0.06, outlier_deviations=8.0, release="onset")
 
 
@@ -45,10 +45,10 @@ def test_the_public_csvs_become_a_session_of_settled_poses(public, tmp_path):
     assert make_session(public, folder) == 9
     session = read_session(folder)
     assert [trial.split for trial in session.trials] == ["identify"] * 5 + ["validate", "identify"] + ["test"] * 2
-    for _, take, findings in take_in(folder, session, LIMITS):
+    for _, take, findings in load_raw_trials(folder, session, LIMITS):
         assert not isinstance(take, InputError), take
         assert not findings.repairs
-        trial, _ = filter_take(take, FILTER)
+        trial, _ = filter_raw_trial(take, FILTER)
         share = np.linspace(0, 1, 6)
         np.testing.assert_allclose(trial.positions[:, 0], 1e-3 * np.outer(share, [5, 7, 1]) - [0, 0, 0.188], atol=1e-12)
         np.testing.assert_allclose(trial.commands, 1e-3 * np.outer(share, range(1, 10)), atol=1e-12)

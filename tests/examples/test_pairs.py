@@ -5,11 +5,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from examples.pairs import session as made
-from trunkline.recordings.cleaning.checks import Limits
-from trunkline.recordings.cleaning.loading import take_in
+from trunkline.recordings.cleaning.checks import TrialLimits
+from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.session.session import read_session
 
-LIMITS = Limits(0.5, 0.3, 0.1, 1.0)
+LIMITS = TrialLimits(0.5, 0.3, 0.1, 1.0)
 
 
 @pytest.fixture(scope="module")
@@ -19,7 +19,7 @@ def takes(tmp_path_factory):
         patched.setattr(made, "SECONDS", 3.0)
         patched.setattr(made, "FADE", 0.5)
         assert made.make_session(folder) == len(made.SPLITS)
-    return [take for _, take, _ in take_in(folder, read_session(folder), LIMITS)]
+    return [take for _, take, _ in load_raw_trials(folder, read_session(folder), LIMITS)]
 
 
 def test_a_motor_pays_out_what_it_winds_in(takes):

@@ -18,8 +18,8 @@ from trunkline.identification.evaluation.evaluation import (
 from trunkline.identification.parameters.parameters import candidate_fields, set_fields
 from trunkline.identification.simulate.experiment import own_starts, prepare
 from trunkline.identification.simulate.loss import LossWeights
-from trunkline.model.arm.guide_holes import Holes, add_holes
-from trunkline.model.arm.joints import Branch, Joints, Slider, add_elements
+from trunkline.model.arm.guide_holes import GuideHoles, add_holes
+from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement, add_elements
 from trunkline.model.elements import arm_hinges, cables
 
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
@@ -39,8 +39,10 @@ def test_half_the_step_moves_little_with_every_option_on():
     """Branches, sliders, holes, dead time, lag, rate limit and backlash, on a curl of an arm that has none of them but
     the lag: with an error like that of an identified arm, at the pipeline's step."""
     spec, plant = small_spec(6, dead_time=0.02, rate_limit=0.25, backlash=3e-4), small_model(6)
-    add_elements(spec, Joints([Branch(0.3, 0.1), Branch(0.2, 1.0)], [Slider(0.2, 0.02), Slider(0.1, 0.05)]), 1e-5)
-    add_holes(spec, Holes(0.2, 4))
+    maxwell = [MaxwellElement(0.3, 0.1), MaxwellElement(0.2, 1.0)]
+    jenkins = [JenkinsElement(0.2, 0.02), JenkinsElement(0.1, 0.05)]
+    add_elements(spec, Joints(maxwell, jenkins), 1e-5)
+    add_holes(spec, GuideHoles(0.2, 4))
     spec.option.timestep = FRAME / 4
     model = spec.compile()
     model.dof_damping[: arm_hinges(model)] *= 4  # as the plant's

@@ -19,8 +19,8 @@ from trunkline.identification.parameters.parameters import (
     unit_of_hinge,
 )
 from trunkline.identification.parameters.saving import save_model
-from trunkline.model.arm.guide_holes import Holes, add_holes
-from trunkline.model.arm.joints import Branch, Joints, Slider, add_elements
+from trunkline.model.arm.guide_holes import GuideHoles, add_holes
+from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement, add_elements
 from trunkline.model.elements import BRANCH, PRELOAD, SECTIONS, WINDING, all_elements, arm_hinges
 
 VALUES = {
@@ -39,15 +39,15 @@ VALUES = {
 }  # fmt: skip
 
 
-SLIDERS = [Slider(0.2, 0.02), Slider(0.1, 0.05), Slider(0.05, 0.1)]
-ELEMENTS = Joints([Branch(0.3, 0.5), Branch(0.2, 2.0)], SLIDERS)
+SLIDERS = [JenkinsElement(0.2, 0.02), JenkinsElement(0.1, 0.05), JenkinsElement(0.05, 0.1)]
+ELEMENTS = Joints([MaxwellElement(0.3, 0.5), MaxwellElement(0.2, 2.0)], SLIDERS)
 
 
 def full_spec() -> mujoco.MjSpec:
     """A small arm that has every part that a parameter may belong to."""
     spec = small_spec(dead_time=0.02, rate_limit=0.1, backlash=0.001)
     add_elements(spec, ELEMENTS, 1e-5)
-    add_holes(spec, Holes(0.1, 2))
+    add_holes(spec, GuideHoles(0.1, 2))
     spec.add_numeric(name=WINDING, data=[1.0], size=1)
     spec.add_numeric(name=PRELOAD, data=[0.0, 0.001, 0.0], size=3)
     spec.add_numeric(name=SECTIONS, data=[3, 5], size=2)
@@ -125,7 +125,7 @@ def test_scaling_keeps_the_arm_s_proportions():
     np.testing.assert_allclose(model.dof_damping[arm] / start.dof_damping[arm], 0.02 / start.dof_damping[0])
     for part in all_elements(start, BRANCH):  # branches are as stiff beside their springs as before, and as slow
         np.testing.assert_allclose(model.tendon_stiffness[part.tendon] / start.tendon_stiffness[part.tendon], stiffer)
-        np.testing.assert_allclose(model.dof_damping[part.own] / start.dof_damping[part.own], stiffer)
+        np.testing.assert_allclose(model.dof_damping[part.branch] / start.dof_damping[part.branch], stiffer)
 
 
 @pytest.mark.parametrize(("place", "error"), [(0.0, 3 / 2 / 20 + 1 / 2 / 20**2), (0.5, -1 / 4 / 20**2)])

@@ -11,7 +11,7 @@ from trunkline.identification.fit.problem import DIVERGED_LOSS, Bounds, Problem
 from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields, set_fields
 from trunkline.identification.simulate.experiment import prepare
 from trunkline.identification.simulate.loss import LossWeights
-from trunkline.model.arm.joints import Branch, Joints, Slider
+from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement
 
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 
@@ -56,7 +56,7 @@ def test_per_joint_factors_come_back():
 
 def test_a_maxwell_branch_comes_back():
     """From an arm that was held for long before it was let go: its branches had given way."""
-    model = small_model(joints=Joints([Branch(0.3, 0.5)]))
+    model = small_model(joints=Joints([MaxwellElement(0.3, 0.5)]))
     true = {"damping": 1.5 * PARAMETERS["damping"].read(model), "relaxation": 0.6, "relaxation_time": 0.2}
     truth = changed(model, **true)
     trials = [release(truth, bend, frames=100) for bend in (0.3, -0.25, 0.15)]
@@ -68,7 +68,7 @@ def test_a_maxwell_branch_comes_back():
 
 
 def test_a_slider_comes_back():
-    model = small_model(joints=Joints(sliders=[Slider(0.2, 0.05)]))
+    model = small_model(joints=Joints(sliders=[JenkinsElement(0.2, 0.05)]))
     true = {"hysteresis": 0.5, "yield_bend": 0.03}
     truth = changed(model, **true)
     trials = [release(truth, bend, frames=100) for bend in (0.3, -0.25, 0.15)]

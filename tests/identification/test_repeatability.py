@@ -19,8 +19,8 @@ from trunkline.identification.evaluation.repeatability import (
 )
 from trunkline.identification.simulate.resting import LAST
 from trunkline.pipeline.config import settings_of
-from trunkline.recordings.cleaning.loading import take_in
-from trunkline.recordings.filtering.filter import filter_take
+from trunkline.recordings.cleaning.loading import load_raw_trials
+from trunkline.recordings.filtering.filter import filter_raw_trial
 from trunkline.recordings.session.session import read_session
 
 ROOT = Path(__file__).parents[2]
@@ -132,7 +132,9 @@ def test_a_real_hose_comes_to_rest_elsewhere_each_time(tmp_path):
         (tmp_path / log.name).symlink_to(log)
     (tmp_path / "session.yaml").write_text((ROOT / "examples/asl_trunk/session.yaml").read_text())
     limits, settings = settings_of("ingest", ROOT).limits, settings_of("filter", ROOT / "examples/asl_trunk")
-    trials = [filter_take(take, settings)[0] for _, take, _ in take_in(tmp_path, read_session(tmp_path), limits)]
+    trials = [
+        filter_raw_trial(take, settings)[0] for _, take, _ in load_raw_trials(tmp_path, read_session(tmp_path), limits)
+    ]
     table = repeatability(trials, tip=2)["release"]
     assert table["trials"] == 13
     assert 4 < table["tip_mm"] < 11

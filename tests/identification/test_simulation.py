@@ -16,7 +16,7 @@ from trunkline.identification.simulate.in_motion import InMotion
 from trunkline.identification.simulate.loss import position_error
 from trunkline.identification.simulate.population import Population
 from trunkline.identification.simulate.pose_fit import fit_pose
-from trunkline.model.arm.joints import Branch, Joints, Slider, add_elements
+from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement, add_elements
 from trunkline.model.elements import BRANCH, SLIDER, elements
 
 
@@ -224,7 +224,7 @@ def test_trials_of_another_arm_are_refused():
 def test_what_joints_remember_begins_as_the_hand_left_it():
     """A branch has given way entirely; a slider has slipped by what is beyond its yield."""
     spec = small_spec()
-    add_elements(spec, Joints([Branch(0.3, 0.5)], [Slider(0.2, 0.02)]), 1e-5)
+    add_elements(spec, Joints([MaxwellElement(0.3, 0.5)], [JenkinsElement(0.2, 0.02)]), 1e-5)
     model = spec.compile()
     start = np.tile([0.1, -0.01], 8)
     experiment = SimpleNamespace(
@@ -235,6 +235,6 @@ def test_what_joints_remember_begins_as_the_hand_left_it():
     moving = InMotion(model, {0: experiment}, False, np.zeros(0, int), 1.0)
     batch = moving._batch({"jnt_stiffness": model.jnt_stiffness[None]}, [0])
     branch, slider = elements(model, BRANCH), elements(model, SLIDER)
-    np.testing.assert_allclose(batch.bind("qpos")[0, branch.own], start)
+    np.testing.assert_allclose(batch.bind("qpos")[0, branch.branch], start)
     places = model.tendon_plasticadr[slider.tendon]
     np.testing.assert_allclose(batch.bind("plastic")[0, places], np.tile([0.08, 0.0], 8), atol=1e-12)

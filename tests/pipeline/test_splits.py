@@ -18,7 +18,7 @@ from tests.support.small_arm import small_spec
 from trunkline.identification.parameters.saving import save_model
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.identify import run
-from trunkline.recordings.cleaning.loading import take_in
+from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.filtering.filter import Filter
 from trunkline.recordings.session.session import read_session
 from trunkline.recordings.trials.raw_trial import write_takes
@@ -156,7 +156,7 @@ def test_poison_in_the_split_test_moves_no_bit_of_the_other_filtered_trials(tmp_
     config = load_config(Filter, "filter", ROOT)
     record(tmp_path / "raw", [*all_truths(), replace(static_truth(30.0), split=TEST)], instruments())
     limits = load_config(__import__("stages.ingest").ingest.Config, "ingest", ROOT).limits
-    takes = [take for _, take, _ in take_in(tmp_path / "raw", read_session(tmp_path / "raw"), limits)]
+    takes = [take for _, take, _ in load_raw_trials(tmp_path / "raw", read_session(tmp_path / "raw"), limits)]
     results = []
     for shift in (0.0, 1e3):
         moved = [

@@ -46,21 +46,21 @@ def read_folder(root: Path, rooms: tuple[str, ...] = ROOMS) -> list[tuple[str, a
 def judges(modules: list[tuple[str, ast.Module]]) -> set[Judge]:
     """All that decide in these modules."""
     read = [Read(module, tree, _imports(tree)) for module, tree in modules]
-    functions = {f"{one.module}:{name}": function for one in read for name, function in _functions(one.tree)}
+    functions = {f"{file.module}:{name}": function for file in read for name, function in _functions(file.tree)}
     built: dict[str, list[list[str]]] = {}
-    for name, fields in (pair for one in read for pair in _built(one.tree)):
+    for name, fields in (pair for file in read for pair in _built(file.tree)):
         built.setdefault(name, []).append(fields)
-    found = set()
-    for one in read:
-        for name, function in [("<module>", one.tree), *_functions(one.tree)]:
-            own = f"{one.module}:{name}"
+    result = set()
+    for file in read:
+        for name, function in [("<module>", file.tree), *_functions(file.tree)]:
+            name_here = f"{file.module}:{name}"
             if (word := name.rpartition(".")[2].strip("_")) in WORDS and _computes(function):
-                found.add(Judge(own, word))
+                result.add(Judge(name_here, word))
             for word, value in _bound(function, built):
-                found |= {Judge(decider, word) for decider in _deciders(value, own, one, functions)}
-            if one.module.startswith(CAUSES) and _says_why(function):
-                found.add(Judge(own, "success"))
-    return found
+                result |= {Judge(decider, word) for decider in _deciders(value, name_here, file, functions)}
+            if file.module.startswith(CAUSES) and _says_why(function):
+                result.add(Judge(name_here, "success"))
+    return result
 
 
 def _imports(tree: ast.Module) -> dict[str, str]:
@@ -128,11 +128,11 @@ def _targets(target: ast.expr, value: ast.expr) -> Iterator[tuple[str, ast.expr]
         yield target.id if isinstance(target, ast.Name) else target.attr, value
 
 
-def _deciders(value: ast.AST, own: str, read: Read, functions: dict[str, Function]) -> Iterator[str]:
+def _deciders(value: ast.AST, function_name: str, read: Read, functions: dict[str, Function]) -> Iterator[str]:
     """Who computes a value: this function, where there is logic in it; else those that it calls or hands on."""
     aside = _aside(value)
     if any(map(_logical, _without(value, aside))):
-        yield own
+        yield function_name
         return
     if isinstance(value, ast.Call):
         called = _called(value, read, functions)
@@ -143,21 +143,22 @@ def _deciders(value: ast.AST, own: str, read: Read, functions: dict[str, Functio
         return
     for part in ast.iter_child_nodes(value):
         if id(part) not in aside and not isinstance(part, ast.comprehension):
-            yield from _deciders(part, own, read, functions)
+            yield from _deciders(part, function_name, read, functions)
 
 
 def _called(call: ast.Call, read: Read, functions: dict[str, Function]) -> set[str]:
     """Functions that are called, or handed on to what is: of this module or imported, and methods that decide."""
     names = [name.id for name in [call.func, *call.args] if isinstance(name, ast.Name)]
-    found = {own for name in names for own in (read.imports.get(name, ""), f"{read.module}:{name}")} & set(functions)
+    keys = {key for name in names for key in (read.imports.get(name, ""), f"{read.module}:{name}")}
+    candidates = keys & set(functions)
     if isinstance(call.func, ast.Attribute) and not (
         isinstance(call.func.value, ast.Name) and call.func.value.id == "np"
     ):
         ending = f".{call.func.attr}"
-        found |= {
-            own for own, function in functions.items() if own.partition(":")[2].endswith(ending) and _computes(function)
+        candidates |= {
+            key for key, function in functions.items() if key.partition(":")[2].endswith(ending) and _computes(function)
         }
-    return found
+    return candidates
 
 
 def _logical(node: ast.AST) -> bool:

@@ -22,8 +22,8 @@ from trunkline.model.elements import (
     all_elements,
     arm_hinges,
     cables,
-    give_way,
     numeric,
+    unload_branches,
 )
 from trunkline.recordings.trials.trial import Trial
 
@@ -80,7 +80,7 @@ def _trial(model, name, experiment, split, level, gravity, frames, start, pulls,
     for motor in np.flatnonzero(model.actuator_history[:, 0]):
         sent = np.full((model.actuator_history[motor, 0], 1), lengths[0, motor])
         mujoco.mj_initCtrlHistory(model, data, motor, None, sent)
-    give_way(model, data.qpos)  # held for long before
+    unload_branches(model, data.qpos)  # held for long before
     for slider in all_elements(model, SLIDER):  # slipped on the way from the straight arm
         bend, give = data.qpos[slider.hinge], model.tendon_springyield[slider.tendon]
         for end in (0, 1):

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from tests.support.small_arm import small_spec
 from tests.unity.test_twin import LABEL, ROBOT, TRAJECTORY, sources_in
 from trunkline.frames import gravity_in_base
-from trunkline.model.arm.joints import Branch, Joints, add_elements
+from trunkline.model.arm.joints import Joints, MaxwellElement, add_elements
 from trunkline.model.simulation.rest import settle
 from trunkline.unity import start
 from trunkline.unity.importer import as_imported
@@ -35,7 +35,7 @@ def files(tmp_path_factory):
     spec = small_spec(max_force=20)
     for joint in spec.joints:
         joint.stiffness = [2 * joint.stiffness[0], 0, 2 * joint.stiffness[0]]
-    add_elements(spec, Joints([Branch(0.2, 0.5), Branch(0.1, 0.05)], round=True), 1e-5)
+    add_elements(spec, Joints([MaxwellElement(0.2, 0.5), MaxwellElement(0.1, 0.05)], round=True), 1e-5)
     spec.compile()
     sources = replace(sources_in(tmp_path_factory.mktemp("start")), mjcf=spec.to_xml())
     files, violations = assemble(LABEL, sources, TRAJECTORY, ROBOT)

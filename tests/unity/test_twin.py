@@ -25,7 +25,7 @@ from trunkline.kinematics.dataset.gravities import spread
 from trunkline.kinematics.ik.inputs import TILT
 from trunkline.kinematics.panda.mounts import PandaRobot
 from trunkline.kinematics.reachability.workspace_surface import WorkspaceSurfaces
-from trunkline.model.arm.joints import Branch, Joints, add_elements
+from trunkline.model.arm.joints import Joints, MaxwellElement, add_elements
 from trunkline.unity import manifest as schema
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import JointLaw, Laws, TendonLaw, compile_with
@@ -299,7 +299,7 @@ def test_what_a_file_cannot_say_of_winches_is_stated_and_left_out(sources):
 def test_branches_of_joints_are_packed_under_names_that_unity_can_hold(sources):
     """A branch's hinge and the tendon that ties it have names of their own."""
     spec = mujoco.MjSpec.from_string(sources.mjcf)
-    add_elements(spec, Joints([Branch(0.3, 0.5)]), 1e-5)
+    add_elements(spec, Joints([MaxwellElement(0.3, 0.5)]), 1e-5)
     files, violations = assemble(LABEL, replace(sources, mjcf=spec.to_xml()), TRAJECTORY, ROBOT)
     assert not violations
     packed = mujoco.MjModel.from_xml_string(files[MODEL].decode())

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from trunkline.compute.environment import Likeness, likeness, likeness_for, unlike
+from trunkline.compute.environment import Fingerprint, difference_from, fingerprint, fingerprint_for
 from trunkline.errors import InputError
 
 VARIABLE = "TRUNKLINE_SCHEDULER"
@@ -45,7 +45,7 @@ class Cluster:
         for name in [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == "distributed"]:
             logging.getLogger(name).setLevel(logging.CRITICAL)  # what goes wrong is told in one line here
         self._address, self._dask = address, distributed
-        self._given: dict[int, tuple[Any, Any]] = {}
+        self._shared: dict[int, tuple[Any, Any]] = {}
         self._alike: set[tuple[str, str]] = set()
         try:
             self._client: Any = distributed.Client(address, timeout=CONNECTING, set_as_default=False)
@@ -67,14 +67,14 @@ class Cluster:
         with self._failing():
             return sum(self._client.nthreads().values())
 
-    def arriving(self, work: Callable, parts: list, given: Any) -> Iterator[tuple[int, Any]]:
+    def arriving(self, work: Callable, parts: list, shared: Any) -> Iterator[tuple[int, Any]]:
         """As `trunkline.compute.scheduler.arriving`."""
-        expected, futures = likeness_for(work), []
+        expected, futures = fingerprint_for(work), []
         with self._failing():
             try:
                 self._check(expected)
                 do, packed = functools.partial(_do, work, expected), [pickle.dumps(part) for part in parts]
-                futures = self._client.map(do, [self._send(given)] * len(parts), packed, pure=False)
+                futures = self._client.map(do, [self._send(shared)] * len(parts), packed, pure=False)
                 for index in self._done(futures):
                     yield index, pickle.loads(futures[index].result())
                     futures[index].release()
@@ -106,7 +106,7 @@ class Cluster:
         done: queue.SimpleQueue = queue.SimpleQueue()
         for index, future in enumerate(futures):
             future.add_done_callback(lambda _, index=index: done.put(index))
-        left, seen = len(futures), time.monotonic()
+        left, last_progress = len(futures), time.monotonic()
         while left:
             try:
                 index = done.get(timeout=LOOK)
@@ -114,69 +114,69 @@ class Cluster:
                 if not self.answers():
                     raise self._gone() from None
                 if self._client.scheduler_info()["workers"]:
-                    seen = time.monotonic()
-                elif time.monotonic() - seen > NO_WORKERS:
+                    last_progress = time.monotonic()
+                elif time.monotonic() - last_progress > NO_WORKERS:
                     raise InputError(
                         f"{VARIABLE}: found no workers at {self._address} for {NO_WORKERS:.0f} s, expected one"
                     ) from None
                 continue
             yield index
-            left, seen = left - 1, time.monotonic()
+            left, last_progress = left - 1, time.monotonic()
 
-    def _send(self, given: Any) -> Any:
-        """`given` as a task of its own, which the scheduler does again if the workers that had it were killed."""
-        if id(given) not in self._given:
-            if len(self._given) == KEPT:
-                self._given.pop(next(iter(self._given)))
-            packed = _Given(pickle.dumps(given))
-            self._given[id(given)] = given, self._client.submit(_itself, packed, pure=False)
-        return self._given[id(given)][1]
+    def _send(self, shared: Any) -> Any:
+        """`shared` as a separate task, which the scheduler does again if the workers that had it were killed."""
+        if id(shared) not in self._shared:
+            if len(self._shared) == KEPT:
+                self._shared.pop(next(iter(self._shared)))
+            packed = _SharedValue(pickle.dumps(shared))
+            self._shared[id(shared)] = shared, self._client.submit(_itself, packed, pure=False)
+        return self._shared[id(shared)][1]
 
-    def _check(self, expected: Likeness) -> None:
+    def _check(self, expected: Fingerprint) -> None:
         """Refuse workers that are not as this process, before they have any work; those that come later refuse it."""
         there = self._client.scheduler_info(n_workers=-1)["workers"]
         new = [address for address in there if (address, expected.code_of) not in self._alike]
-        answers = self._client.run(likeness, expected.code_of, workers=new, on_error="return") if new else {}
-        for address, found in answers.items():
-            if told := unlike(found, expected):
-                raise InputError(f"{VARIABLE}: worker {address}: {told}")
+        answers = self._client.run(fingerprint, expected.code_of, workers=new, on_error="return") if new else {}
+        for address, answer in answers.items():
+            if mismatch := difference_from(answer, expected):
+                raise InputError(f"{VARIABLE}: worker {address}: {mismatch}")
             self._alike.add((address, expected.code_of))
 
 
-class _Given:
+class _SharedValue:
     """What all pieces need, as bytes until a thread of a worker asks: each has its own, as batches are no two
     threads' at once."""
 
     def __init__(self, packed: bytes) -> None:
-        self._packed, self._own = packed, threading.local()
+        self._packed, self._local = packed, threading.local()
 
     def __reduce__(self):
-        return _Given, (self._packed,)
+        return _SharedValue, (self._packed,)
 
     def unpacked(self) -> Any:
-        if not hasattr(self._own, "value"):
-            self._own.value = pickle.loads(self._packed)
-        return self._own.value
+        if not hasattr(self._local, "value"):
+            self._local.value = pickle.loads(self._packed)
+        return self._local.value
 
 
-def _itself(given: _Given) -> _Given:
-    return given
+def _itself(packed: _SharedValue) -> _SharedValue:
+    return packed
 
 
-def _do(work: Callable, expected: Likeness, given: _Given, part: bytes) -> bytes:
+def _do(work: Callable, expected: Fingerprint, packed: _SharedValue, part: bytes) -> bytes:
     """What a worker, which has to be as `expected`, does with a piece.
 
     Part and result are packed here: Dask would look for tasks of its own in the one, and may hand over arrays that
     cannot be written to.
     """
-    if told := unlike(likeness(expected.code_of), expected):
+    if mismatch := difference_from(fingerprint(expected.code_of), expected):
         import distributed
 
-        raise InputError(f"{VARIABLE}: worker {distributed.get_worker().address}: {told}")
+        raise InputError(f"{VARIABLE}: worker {distributed.get_worker().address}: {mismatch}")
     from threadpoolctl import threadpool_limits
 
     os.environ.setdefault("TRUNKLINE_THREADS", "1")  # workers are as many as the machine has cores
-    value, _thread.at_a_piece = given.unpacked(), True
+    value, _thread.at_a_piece = packed.unpacked(), True
     try:
         with threadpool_limits(1, user_api="blas"):  # as run_stage
             return pickle.dumps(work(value, pickle.loads(part)))

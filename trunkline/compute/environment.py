@@ -15,7 +15,7 @@ SHOWN = 12  # digits of a digest
 
 
 @dataclass(frozen=True)
-class Likeness:
+class Fingerprint:
     """parts: of each thing that matters what it is here, by its name. code_of: the package, beside the library, whose
     code matters."""
 
@@ -23,26 +23,26 @@ class Likeness:
     code_of: str
 
 
-def likeness_for(work: Callable) -> Likeness:
+def fingerprint_for(work: Callable) -> Fingerprint:
     """Of this process, in all that the function goes through."""
-    return likeness(work.__module__.partition(".")[0])
+    return fingerprint(work.__module__.partition(".")[0])
 
 
 @functools.lru_cache
-def likeness(code_of: str) -> Likeness:
+def fingerprint(code_of: str) -> Fingerprint:
     """Of this process, with the code of one package beside the library's."""
     parts = {"Python": platform.python_version()}
     parts |= {name: _installed(name) for name in _libraries()}
     parts |= {f"code of {name}": _digest(name) for name in dict.fromkeys((OURS, code_of))}
-    return Likeness(parts | {"loops for": _loops()}, code_of)
+    return Fingerprint(parts | {"loops for": _loops()}, code_of)
 
 
-def unlike(found: Likeness | BaseException, expected: Likeness) -> str:
+def difference_from(actual: Fingerprint | BaseException, expected: Fingerprint) -> str:
     """The first thing in which another process differs from this one, found and expected; empty if in none."""
-    if not isinstance(found, Likeness):
-        return f"found no {OURS} like this one ({type(found).__name__}: {found}), expected the same code"
+    if not isinstance(actual, Fingerprint):
+        return f"found no {OURS} like this one ({type(actual).__name__}: {actual}), expected the same code"
     for name, value in expected.parts.items():
-        if (other := found.parts.get(name, "none")) != value:
+        if (other := actual.parts.get(name, "none")) != value:
             return f"found {name} {other}, expected {value} as here"
     return ""
 

@@ -16,8 +16,8 @@ def parent_pid() -> int:
 
 def leave_signals_to_parent() -> None:
     """What a terminal sends to all of its processes, by Ctrl-C or as it is closed, is the parent's to hear."""
-    for one in (signal.SIGINT, signal.SIGHUP):
-        signal.signal(one, signal.SIG_IGN)
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
 
 
 def end_with_parent() -> None:

@@ -35,13 +35,13 @@ def rough_by_warp() -> bool:
     Raises:
         InputError: there is no such name, or workers are to share the work.
     """
-    found = os.environ.get(BATCHES, "").strip() or MUJOCO
-    if found not in (MUJOCO, WARP):
+    library = os.environ.get(BATCHES, "").strip() or MUJOCO
+    if library not in (MUJOCO, WARP):
         names = [MUJOCO, WARP]
-        raise InputError(f"{BATCHES}: found {found!r}, expected one of {', '.join(names)}{nearest(found, names)}")
-    if found == WARP and elsewhere():
+        raise InputError(f"{BATCHES}: found {library!r}, expected one of {', '.join(names)}{nearest(library, names)}")
+    if library == WARP and elsewhere():
         raise InputError(f"{BATCHES}: found {WARP} beside {VARIABLE}, expected one of them: a GPU is of this machine")
-    return found == WARP and not at_a_piece()
+    return library == WARP and not at_a_piece()
 
 
 def pieces(most: int) -> int:
@@ -62,9 +62,9 @@ def cuts(count: int, parts: int) -> list[slice]:
 
 
 def spread_rows(
-    work: Callable, rows: tuple[np.ndarray, ...], given: Any = None, least: int = 1
+    work: Callable, rows: tuple[np.ndarray, ...], shared: Any = None, least: int = 1
 ) -> tuple[np.ndarray, ...]:
-    """`work(given, rows)`, each row of whose results is of one of `rows` alone: some of them at a time where there are
+    """`work(shared, rows)`, each row of whose results is of one of `rows` alone: some of them at a time where there are
     workers.
 
     Args:
@@ -76,26 +76,26 @@ def spread_rows(
     """
     count = len(rows[0])
     parts = [tuple(values[cut] for values in rows) for cut in cuts(count, pieces(count // least))]
-    found = spread(work, parts, given)
-    return found[0] if len(found) == 1 else tuple(np.concatenate(values) for values in zip(*found, strict=True))
+    results = spread(work, parts, shared)
+    return results[0] if len(results) == 1 else tuple(np.concatenate(values) for values in zip(*results, strict=True))
 
 
-def spread(work: Callable, parts: list, given: Any = None) -> list:
-    """`work(given, part)` of every part, in their order.
+def spread(work: Callable, parts: list, shared: Any = None) -> list:
+    """`work(shared, part)` of every part, in their order.
 
     Args:
-        given: what all of them need, not to be changed; sent to a worker once, not with each piece.
+        shared: what all of them need, not to be changed; sent to a worker once, not with each piece.
 
     Raises:
         InputError: as `arriving`.
     """
-    found = [None] * len(parts)
-    for index, result in arriving(work, parts, given):
-        found[index] = result
-    return found
+    results = [None] * len(parts)
+    for index, result in arriving(work, parts, shared):
+        results[index] = result
+    return results
 
 
-def arriving(work: Callable, parts: list, given: Any = None) -> Iterator[tuple[int, Any]]:
+def arriving(work: Callable, parts: list, shared: Any = None) -> Iterator[tuple[int, Any]]:
     """As `spread`, each part's number and its result as it comes. A part whose worker was killed is done again.
 
     Raises:
@@ -104,9 +104,9 @@ def arriving(work: Callable, parts: list, given: Any = None) -> Iterator[tuple[i
     """
     cluster = _cluster()
     if cluster is None:
-        yield from ((index, work(given, part)) for index, part in enumerate(parts))
+        yield from ((index, work(shared, part)) for index, part in enumerate(parts))
     else:
-        yield from cluster.arriving(work, parts, given)
+        yield from cluster.arriving(work, parts, shared)
 
 
 def _address() -> str:

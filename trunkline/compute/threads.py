@@ -11,9 +11,9 @@ def thread_count() -> int:
     Raises:
         InputError: if `TRUNKLINE_THREADS` is not a whole number of at least 1.
     """
-    found = os.environ.get("TRUNKLINE_THREADS", "").strip()
-    if not found:
+    setting = os.environ.get("TRUNKLINE_THREADS", "").strip()
+    if not setting:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    if not found.isascii() or not found.isdigit() or int(found) < 1:
-        raise InputError(f"TRUNKLINE_THREADS: found {found!r}, expected a whole number of at least 1")
-    return int(found)
+    if not setting.isascii() or not setting.isdigit() or int(setting) < 1:
+        raise InputError(f"TRUNKLINE_THREADS: found {setting!r}, expected a whole number of at least 1")
+    return int(setting)

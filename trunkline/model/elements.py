@@ -30,24 +30,25 @@ WINDING, PRELOAD, SECTIONS = "winding", "preload", "sections"
 class Elements:
     """Those of one kind and number in a model, one for each of n hinges of the arm.
 
-    tendon, hinge: numbers of their tendons and of the arm's hinges. own: of a branch's own hinges. Shape (n,).
+    tendon, hinge: numbers of their tendons and of the hinges of the arm. branch: hinges of Maxwell elements, empty
+    for other kinds. Shape (n,).
     """
 
     tendon: np.ndarray
     hinge: np.ndarray
-    own: np.ndarray
+    branch: np.ndarray
 
 
 # by model: those that were looked for; names are fixed once a model is compiled, and looking through them takes long
-_KNOWN: WeakKeyDictionary[mujoco.MjModel, dict[tuple[str, int], Elements]] = WeakKeyDictionary()
+_CACHE: WeakKeyDictionary[mujoco.MjModel, dict[tuple[str, int], Elements]] = WeakKeyDictionary()
 
 
 def elements(model: mujoco.MjModel, kind: str, number: int = 1) -> Elements:
     """The model's elements `kind`, BRANCH, SLIDER or DIAGONAL, of this number; none where it was built without."""
-    known = _KNOWN.setdefault(model, {})
-    if (kind, number) not in known:
-        known[kind, number] = _named(model, kind, number)
-    return known[kind, number]
+    cached = _CACHE.setdefault(model, {})
+    if (kind, number) not in cached:
+        cached[kind, number] = _named(model, kind, number)
+    return cached[kind, number]
 
 
 def _named(model: mujoco.MjModel, kind: str, number: int) -> Elements:
@@ -55,41 +56,41 @@ def _named(model: mujoco.MjModel, kind: str, number: int) -> Elements:
     names = {tendon: model.tendon(tendon).name.removesuffix(TIE) for tendon in range(model.ntendon)}
     names = {tendon: name for tendon, name in names.items() if name.endswith(ending)}
     hinges = [model.joint(name.removesuffix(ending)).id for name in names.values()]
-    own = [model.joint(name).id for name in names.values()] if kind == BRANCH else []
-    return Elements(*(np.array(found, dtype=int) for found in (list(names), hinges, own)))
+    own_hinges = [model.joint(name).id for name in names.values()] if kind == BRANCH else []
+    return Elements(*(np.array(numbers, dtype=int) for numbers in (list(names), hinges, own_hinges)))
 
 
 def all_elements(model: mujoco.MjModel, kind: str) -> list[Elements]:
     """Those of every number that the model has, in order."""
-    found = []
-    while len((one := elements(model, kind, len(found) + 1)).tendon):
-        found.append(one)
-    return found
+    result = []
+    while len((group := elements(model, kind, len(result) + 1)).tendon):
+        result.append(group)
+    return result
 
 
 def diagonal_lengths(model: mujoco.MjModel, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Numbers of the tendons that are diagonals of round joints (D,), and how long they are, rad, at joint angles
     (..., nq): the sum of the joint's two, and their difference. Shape (..., D)."""
     tendons, lengths = [np.zeros(0, dtype=int)], [np.zeros((*angles.shape[:-1], 0))]
-    for one, sign in zip(all_elements(model, DIAGONAL), (1, -1), strict=False):
-        tendons.append(one.tendon)
-        lengths.append(angles[..., one.hinge] + sign * angles[..., one.hinge + 1])
+    for diagonals, sign in zip(all_elements(model, DIAGONAL), (1, -1), strict=False):
+        tendons.append(diagonals.tendon)
+        lengths.append(angles[..., diagonals.hinge] + sign * angles[..., diagonals.hinge + 1])
     return np.concatenate(tendons), np.concatenate(lengths, axis=-1)
 
 
-def give_way(model: mujoco.MjModel, qpos: np.ndarray) -> None:
+def unload_branches(model: mujoco.MjModel, qpos: np.ndarray) -> None:
     """Put the joints' branches where they bear nothing, in place: those of an arm that was long in the pose `qpos`.
 
     Args:
         qpos: angles of all hinges, rad; those of the arm are read, those of branches written. Shape (..., nq).
     """
-    for one in all_elements(model, BRANCH):
-        qpos[..., one.own] = qpos[..., one.hinge]
+    for branches in all_elements(model, BRANCH):
+        qpos[..., branches.branch] = qpos[..., branches.hinge]
 
 
 def arm_hinges(model: mujoco.MjModel) -> int:
     """How many hinges are the arm's; they come first, branches after them."""
-    return model.njnt - sum(len(branch.own) for branch in all_elements(model, BRANCH))
+    return model.njnt - sum(len(group.branch) for group in all_elements(model, BRANCH))
 
 
 def segment_sites(model: mujoco.MjModel, segments: tuple[str, ...]) -> np.ndarray:
@@ -107,7 +108,7 @@ def hole_name(cable: str, number: int) -> str:
     return f"{cable}_{HOLE}_{number}"
 
 
-def holes(model: mujoco.MjModel) -> np.ndarray:
+def hole_tendons(model: mujoco.MjModel) -> np.ndarray:
     """Numbers of the tendons by which each cable rubs, P for each. Shape (K, P), P = 0 where nothing rubs."""
     tendons = [t for t in range(model.ntendon) if is_hole(model.tendon(t).name)]
     return np.array(tendons, dtype=int).reshape(len(cables(model)), -1) if tendons else np.zeros((0, 0), dtype=int)
@@ -172,13 +173,13 @@ def switch_off(model: mujoco.MjModel, *names: str) -> None:
             model.numeric_data[place] = 0
 
 
-def let_slide(model: mujoco.MjModel) -> None:
+def switch_off_capstan_friction(model: mujoco.MjModel) -> None:
     """Take the friction of cables on their holes from a model, in place."""
     switch_off(model, CAPSTAN_FRICTION)
 
 
-def let_hang(model: mujoco.MjModel) -> None:
+def switch_off_cables(model: mujoco.MjModel) -> None:
     """Take all cables from a model in place, for where they are slack and so move nothing: each is cut down to a
     point, as its path takes much of a step."""
-    let_slide(model)
+    switch_off_capstan_friction(model)
     model.tendon_num[cables(model)] = 1

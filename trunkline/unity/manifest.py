@@ -236,7 +236,7 @@ def branches_of(model: mujoco.MjModel) -> list[BranchBlock]:
     return [
         BranchBlock(joint=model.joint(hinge).name, branch=model.joint(own_hinge).name, tie=model.tendon(tendon).name)
         for element in all_elements(model, BRANCH)
-        for hinge, own_hinge, tendon in zip(element.hinge, element.own, element.tendon, strict=True)
+        for hinge, own_hinge, tendon in zip(element.hinge, element.branch, element.tendon, strict=True)
     ]
 
 

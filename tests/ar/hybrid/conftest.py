@@ -8,8 +8,8 @@ import pytest
 from pydantic import TypeAdapter
 
 from trunkline.ar.hybrid.settings import HybridModelSettings
-from trunkline.model.arm.guide_holes import Holes, add_holes
-from trunkline.model.arm.joints import Branch, Joints, add_elements
+from trunkline.model.arm.guide_holes import GuideHoles, add_holes
+from trunkline.model.arm.joints import Joints, MaxwellElement, add_elements
 from trunkline.model.arm.material import unit_properties
 from trunkline.model.arm.mjcf import Solver, Tendons, build_spec
 from trunkline.model.arm.spiral import spiral_chain
@@ -38,8 +38,8 @@ def rubbing_arm(chain, stretches: int) -> mujoco.MjSpec:
     tendons = Tendons(friction=0.0, kp=2000.0, max_force=18.0, time_constant=0.02, dead_time=0.02, kv=7.0,
                       routes=even_routes(chain, 3, 0.85))  # fmt: skip
     spec = build_spec(chain, properties, tendons, Solver(1 / 480, 1e-5, *STIFFER, *STIFFER))
-    add_elements(spec, Joints(branches=[Branch(0.2, 0.3)]), 1e-5)
-    add_holes(spec, Holes(0.12, stretches))
+    add_elements(spec, Joints(branches=[MaxwellElement(0.2, 0.3)]), 1e-5)
+    add_holes(spec, GuideHoles(0.12, stretches))
     return spec
 
 

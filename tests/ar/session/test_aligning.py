@@ -12,7 +12,7 @@ from tests.ar.session.test_session import asked, grips
 from tests.ar.teleop.test_plan import START
 from tests.ar.teleop.test_plan import TIP as TARGET
 from tests.support.live import Hands, controlling, hand, laid, live
-from tests.support.touches import PLACES, TRUE, UP, at_reach, directions, seen
+from tests.support.touches import PLACES, TRUE, UP, at_reach, directions, noisy_places
 from trunkline.ar.session.alignment import (
     DWELL,
     POSES,
@@ -42,7 +42,7 @@ MARK = live().alignment.mark
 
 
 def test_exact_touches_give_the_pose_back():
-    touched = seen(PLACES, np.random.default_rng(0), 0.0)
+    touched = noisy_places(PLACES, np.random.default_rng(0), 0.0)
     found = fit(touched, PLACES)
     np.testing.assert_allclose(found.position, TRUE.position, atol=1e-12)
     np.testing.assert_allclose(in_base(found, touched), PLACES, atol=1e-12)
@@ -55,7 +55,7 @@ def test_six_places_of_a_millimetre_are_within_three_at_reach_and_told_so():
     """The goal is a 95th percentile of 3 mm at 0.9 m from the base, for touches of 1 mm along each axis."""
     rng, off, told = np.random.default_rng(1), [], []
     for _ in range(400):
-        touched = seen(PLACES, rng, 1e-3)
+        touched = noisy_places(PLACES, rng, 1e-3)
         found = fit(touched, PLACES)
         point = at_reach(rng)
         off.append(np.linalg.norm(in_base(found, in_base(inverse(TRUE), point)) - point))
@@ -67,7 +67,7 @@ def test_six_places_of_a_millimetre_are_within_three_at_reach_and_told_so():
 def test_a_touch_that_is_ten_millimetres_off_is_named_and_a_good_one_is_not():
     rng, right, alarms = np.random.default_rng(2), 0, 0
     for number in range(200):
-        touched = seen(PLACES, rng, 1e-3)
+        touched = noisy_places(PLACES, rng, 1e-3)
         alarms += suspect(touched, PLACES) is not None
         bad = number % len(PLACES)
         touched[bad] += 0.01 * directions(1, rng)[0]
@@ -78,12 +78,12 @@ def test_a_touch_that_is_ten_millimetres_off_is_named_and_a_good_one_is_not():
 
 
 def test_too_few_touches_and_those_in_a_plane_are_refused_by_name():
-    touched = seen(PLACES, np.random.default_rng(3), 1e-3)
+    touched = noisy_places(PLACES, np.random.default_rng(3), 1e-3)
     with pytest.raises(InputError, match="touches: found 3, expected at least 4"):
         fit(touched[:3], PLACES[:3])
     flat = PLACES * [1.0, 1.0, 0.0] + [0.0, 0.0, 0.3]
     with pytest.raises(InputError, match="found all within 0 mm of a plane"):
-        fit(seen(flat, np.random.default_rng(4), 1e-3), flat)
+        fit(noisy_places(flat, np.random.default_rng(4), 1e-3), flat)
     assert suspect(touched[:3], PLACES[:3]) is None
     nowhere = np.array([*PLACES[:-1], [0.1, np.nan, np.inf]])
     for reference, base in ((touched, nowhere), (nowhere, PLACES)):

@@ -41,8 +41,8 @@ from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.messages import Input, Pose, from_json, to_json
 from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT, load_folder
-from trunkline.recordings.cleaning.checks import Limits
-from trunkline.recordings.cleaning.loading import take_in
+from trunkline.recordings.cleaning.checks import TrialLimits
+from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.preparation.inspect import main as inspect
 from trunkline.recordings.session.session import read_session
 from trunkline.recordings.session.source import open_log
@@ -185,7 +185,7 @@ def test_a_session_in_which_the_arm_was_seen_is_one_to_identify_from(tmp_path, c
     (tmp_path / "session.yaml").write_text(capsys.readouterr().out.split("Proposed session.yaml:\n")[1])
     session = read_session(tmp_path)
     session.segments = {name: name for name in truth.segments}  # the Panda's links are left out
-    ((_, take, _),) = take_in(tmp_path, session, Limits(0.2, 0.3, 0.1, 1.0))
+    ((_, take, _),) = load_raw_trials(tmp_path, session, TrialLimits(0.2, 0.3, 0.1, 1.0))
     assert (take.segments, take.tendons) == (truth.segments, truth.tendons), take
     moves = take.time > 0.5  # poses that repeat themselves to the last bit are taken for frozen ones
     np.testing.assert_allclose(take.positions[moves], truth.positions[::4][moves], atol=1e-9)
@@ -254,7 +254,7 @@ def test_with_motion_capture_merged_into_it_a_real_session_is_one_to_identify_fr
     assert f"topics: {topics}" in proposed
     (tmp_path / "merged/session.yaml").write_text(proposed)
     session = read_session(tmp_path / "merged")
-    ((_, take, _),) = take_in(tmp_path / "merged", session, Limits(0.2, 0.3, 0.1, 1.0))
+    ((_, take, _),) = load_raw_trials(tmp_path / "merged", session, TrialLimits(0.2, 0.3, 0.1, 1.0))
     assert (take.segments, take.tendons) == (truth.segments, truth.tendons), take
     far = np.linalg.norm(take.positions[:, -1] - take.base_positions, axis=1)
     true = np.linalg.norm(truth.positions[::4, -1] - truth.base_position, axis=1)

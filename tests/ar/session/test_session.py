@@ -143,7 +143,7 @@ def test_nobody_is_told_that_nobody_who_controls_is_silent():
             guest = await here.come()
             await asyncio.sleep(1.0)
             assert here.desk.intent.notice == "base is not aligned; holding"
-            assert {told["notice"] for told in guest.said if told["type"] == "state"} == {""}
+            assert {told["notice"] for told in guest.messages if told["type"] == "state"} == {""}
 
     asyncio.run(session())
 
@@ -284,7 +284,7 @@ def test_who_comes_later_sees_the_plan_that_is_previewed():
             last = await here.come()
             await last.hears("state")
             await asyncio.sleep(0.2)
-            assert not [told for told in last.said if told["type"] == "preview"]
+            assert not [told for told in last.messages if told["type"] == "preview"]
             assert not any(frame[0] == 2 for frame in last.frames)
 
     asyncio.run(session())

@@ -18,9 +18,9 @@ from trunkline.identification.fit.setup import check_parameters
 from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields, set_fields
 from trunkline.identification.parameters.saving import save_model
 from trunkline.model.arm.from_file import FromFile
-from trunkline.model.arm.guide_holes import Holes, add_holes
-from trunkline.model.arm.joints import Branch, Joints, Slider, add_elements
-from trunkline.model.elements import BACKLASH, BRANCH, PRELOAD, RATE_LIMIT, SECTIONS, WINDING, elements, holes
+from trunkline.model.arm.guide_holes import GuideHoles, add_holes
+from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement, add_elements
+from trunkline.model.elements import BACKLASH, BRANCH, PRELOAD, RATE_LIMIT, SECTIONS, WINDING, elements, hole_tendons
 from trunkline.model.statics.chain import read_chain
 from trunkline.pipeline.config import load_config
 
@@ -66,8 +66,9 @@ def test_the_stage_builds_it_and_the_statics_read_it(project, tmp_path):
 
 def arm_with_every_part() -> mujoco.MjSpec:
     spec = mujoco.MjSpec.from_string(FromFile("mjcf", FILE).build(None, None, MODELS).spec.to_xml())
-    add_elements(spec, Joints([Branch(0.3, 0.5), Branch(0.2, 2.0)], [Slider(0.2, 0.02)] * 3), 1e-5)
-    add_holes(spec, Holes(0.1, 2))
+    maxwell = [MaxwellElement(0.3, 0.5), MaxwellElement(0.2, 2.0)]
+    add_elements(spec, Joints(maxwell, [JenkinsElement(0.2, 0.02)] * 3), 1e-5)
+    add_holes(spec, GuideHoles(0.1, 2))
     for number in (RATE_LIMIT, BACKLASH):
         spec.add_numeric(name=number, data=[0.01], size=1)
     for actuator in spec.actuators:
@@ -96,10 +97,10 @@ def test_what_the_settings_name_is_added_and_its_motors_stay_its_own(project):
     names = "build_mjcf: {arm: four_links, joints: viscoelastic, holes: rubbing, solver: {timestep: 0.002}}"
     Path("params.yaml").write_text(names)
     added = cad_arm(project(TEXT)).spec.compile()
-    one = elements(added, BRANCH, 1)
-    assert (len(one.own), len(elements(drawn, BRANCH, 1).own)) == (8, 0)
-    np.testing.assert_allclose(added.dof_armature[one.own], 1e-5)
-    assert (holes(added).size, holes(drawn).size) == (12, 0)
+    group = elements(added, BRANCH, 1)
+    assert (len(group.branch), len(elements(drawn, BRANCH, 1).branch)) == (8, 0)
+    np.testing.assert_allclose(added.dof_armature[group.branch], 1e-5)
+    assert (hole_tendons(added).size, hole_tendons(drawn).size) == (12, 0)
     for name in ("actuator_gainprm", "actuator_dynprm", "actuator_delay"):
         np.testing.assert_array_equal(getattr(added, name), getattr(drawn, name))
     assert added.opt.timestep == drawn.opt.timestep == 0.001

@@ -6,8 +6,8 @@ import pytest
 
 from tests.support.small_arm import small_spec
 from trunkline.identification.parameters.parameters import candidate_fields, set_fields
-from trunkline.model.arm.joints import Branch, Joints, Slider, add_elements
-from trunkline.model.elements import BRANCH, SLIDER, all_elements, arm_hinges, cables, give_way
+from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement, add_elements
+from trunkline.model.elements import BRANCH, SLIDER, all_elements, arm_hinges, cables, unload_branches
 from trunkline.model.simulation.rest import settle
 from trunkline.model.statics.chain import read_chain
 
@@ -29,20 +29,20 @@ def one_joint(joints: Joints, inertia: float = 1e6, damping: float = 0.0) -> muj
 
 def torques(model: mujoco.MjModel, angles: np.ndarray) -> np.ndarray:
     """Passive torque on the arm's hinge, N m, while it is led through `angles` (T,), rad, one a step. Shape (T,)."""
-    data, found = mujoco.MjData(model), []
+    data, result = mujoco.MjData(model), []
     for angle in angles:
         data.qpos[0], data.qvel[0] = angle, 0
         mujoco.mj_forward(model, data)
-        found.append(data.qfrc_passive[0])
+        result.append(data.qfrc_passive[0])
         mujoco.mj_step(model, data)
-    return np.array(found)
+    return np.array(result)
 
 
 def test_a_held_joint_relaxes_as_a_standard_linear_solid():
     time, bend = np.arange(2000) * 1e-3, 0.2
-    found = -torques(one_joint(Joints([Branch(SHARE, TIME)])), np.full(len(time), bend))
+    result = -torques(one_joint(Joints([MaxwellElement(SHARE, TIME)])), np.full(len(time), bend))
     expected = STIFFNESS * bend * (1 + SHARE * np.exp(-time / TIME))
-    assert np.abs(found / expected - 1).max() < 1e-3
+    assert np.abs(result / expected - 1).max() < 1e-3
 
 
 def test_a_loaded_joint_creeps_as_a_standard_linear_solid():
@@ -50,28 +50,28 @@ def test_a_loaded_joint_creeps_as_a_standard_linear_solid():
     dies away with 2 I / D = 2 ms, so after 10 of these to e^-10. A stronger damper would end it sooner, and hold the
     creep back by about D / K, 0.1 % of the relaxation time."""
     inertia, damping, step, torque = 1e-6, 1e-3, 2e-4, 0.1
-    model = one_joint(Joints([Branch(SHARE, TIME)]), inertia, damping)
+    model = one_joint(Joints([MaxwellElement(SHARE, TIME)]), inertia, damping)
     model.opt.timestep = step
-    data, found = mujoco.MjData(model), []
+    data, bends = mujoco.MjData(model), []
     data.qfrc_applied[0] = torque
     for _ in range(round(2 / step)):
         mujoco.mj_step(model, data)
-        found.append(data.qpos[0])
-    time = step * np.arange(1, len(found) + 1)
+        bends.append(data.qpos[0])
+    time = step * np.arange(1, len(bends) + 1)
     expected = torque / STIFFNESS * (1 - SHARE / (1 + SHARE) * np.exp(-time / TIME / (1 + SHARE)))
     settled = time >= 10 * 2 * inertia / damping
-    assert np.abs(np.array(found) / expected - 1)[settled].max() < 1e-3
+    assert np.abs(np.array(bends) / expected - 1)[settled].max() < 1e-3
 
 
 def test_two_branches_relax_as_the_sum_of_their_terms():
     time, bend = np.arange(2000) * 1e-3, 0.2
-    found = -torques(one_joint(Joints([Branch(0.3, 0.1), Branch(0.2, 1.0)])), np.full(len(time), bend))
+    result = -torques(one_joint(Joints([MaxwellElement(0.3, 0.1), MaxwellElement(0.2, 1.0)])), np.full(len(time), bend))
     expected = STIFFNESS * bend * (1 + 0.3 * np.exp(-time / 0.1) + 0.2 * np.exp(-time / 1.0))
-    assert np.abs(found / expected - 1).max() < 1e-3
+    assert np.abs(result / expected - 1).max() < 1e-3
 
 
 def test_a_slider_turns_round_and_encloses_an_area_as_an_elastic_plastic_spring():
-    model, reach = one_joint(Joints(sliders=[Slider(SHARE, YIELD)])), 0.2
+    model, reach = one_joint(Joints(sliders=[JenkinsElement(SHARE, YIELD)])), 0.2
     quarter = np.linspace(0, reach, 2000)
     cycle = np.concatenate([quarter, quarter[::-1], -quarter, -quarter[::-1]])
     angles = np.concatenate([cycle, cycle])
@@ -86,7 +86,7 @@ def test_a_slider_turns_round_and_encloses_an_area_as_an_elastic_plastic_spring(
 
 def test_several_sliders_add_up_and_each_has_parameters_of_its_own():
     """Iwan: on the way out each bears k x up to its yield, on the way back it turns round by twice that (Masing)."""
-    model = one_joint(Joints(sliders=[Slider(0.1, 0.1)] * 3))
+    model = one_joint(Joints(sliders=[JenkinsElement(0.1, 0.1)] * 3))
     values = {
         "hysteresis": 0.3, "yield_bend": 0.01, "hysteresis_2": 0.2, "yield_bend_2": 0.03,
         "hysteresis_3": 0.1, "yield_bend_3": 0.1,
@@ -106,7 +106,8 @@ def test_several_sliders_add_up_and_each_has_parameters_of_its_own():
 @pytest.fixture(scope="module")
 def pair() -> tuple[mujoco.MjModel, mujoco.MjModel]:
     plain, full = small_spec(), small_spec()
-    add_elements(full, Joints([Branch(0.3, 0.5), Branch(0.2, 2.0)], [Slider(0.2, 0.02)]), ARMATURE)
+    maxwell = [MaxwellElement(0.3, 0.5), MaxwellElement(0.2, 2.0)]
+    add_elements(full, Joints(maxwell, [JenkinsElement(0.2, 0.02)]), ARMATURE)
     return plain.compile(), full.compile()
 
 
@@ -115,18 +116,18 @@ def test_elements_stand_after_the_arms_own(pair):
     assert arm_hinges(full) == arm_hinges(plain) == plain.njnt
     assert cables(full) == cables(plain) == list(range(plain.ntendon))
     for kind, count in ((BRANCH, 2), (SLIDER, 1)):
-        found = all_elements(full, kind)
-        assert len(found) == count
-        for one in found:
-            np.testing.assert_array_equal(one.hinge, np.arange(plain.njnt))
+        groups = all_elements(full, kind)
+        assert len(groups) == count
+        for group in groups:
+            np.testing.assert_array_equal(group.hinge, np.arange(plain.njnt))
 
 
 def test_branches_that_have_given_way_bear_nothing():
     spec, poses = small_spec(), np.random.default_rng(1).uniform(-0.2, 0.2, (2, 3 * 16))
-    add_elements(spec, Joints([Branch(0.3, 0.5), Branch(0.2, 2.0)]), ARMATURE)
+    add_elements(spec, Joints([MaxwellElement(0.3, 0.5), MaxwellElement(0.2, 2.0)]), ARMATURE)
     model = spec.compile()
     arm = arm_hinges(model)
-    give_way(model, poses)
+    unload_branches(model, poses)
     for pose in poses:
         data = mujoco.MjData(model)
         data.qpos[:] = pose
@@ -142,13 +143,13 @@ def test_elements_change_nothing_at_rest(pair):
     rests = [settle(model, commands, np.array([3.0, 0.0, -9.0])) for model in pair]
     assert all(rest.rested.all() for rest in rests)
     np.testing.assert_allclose(rests[1].position, rests[0].position, atol=1e-8)
-    for one, other in zip(read_chain(plain), read_chain(full), strict=True):
-        np.testing.assert_array_equal(one, other)
+    for expected, actual in zip(read_chain(plain), read_chain(full), strict=True):
+        np.testing.assert_array_equal(expected, actual)
 
 
 def test_the_model_survives_its_file(pair):
     full = small_spec()
-    add_elements(full, Joints([Branch(0.3, 0.5)], [Slider(0.2, 0.02)]), ARMATURE)
+    add_elements(full, Joints([MaxwellElement(0.3, 0.5)], [JenkinsElement(0.2, 0.02)]), ARMATURE)
     again = mujoco.MjModel.from_xml_string(full.to_xml())
     for field in ("tendon_stiffness", "tendon_springyield", "dof_damping"):
         np.testing.assert_allclose(getattr(again, field), getattr(full.compile(), field), rtol=1e-5)

@@ -45,9 +45,9 @@ def test_the_torque_is_the_same_in_all_directions(model, direction):
 
 def test_hinges_that_harden_by_themselves_are_half_as_hard_between_their_axes():
     model = with_parameters(small_model(UNITS), {"hardening": HARDENING})
-    found = torques(model, 0.3 * np.full(2, np.sqrt(0.5)))
+    result = torques(model, 0.3 * np.full(2, np.sqrt(0.5)))
     expected = model.jnt_stiffness[0] * 0.3 * (1 + HARDENING * 0.3**2 / 2)
-    assert np.linalg.norm(found) == pytest.approx(expected)
+    assert np.linalg.norm(result) == pytest.approx(expected)
 
 
 def test_hardening_is_read_as_it_was_written_and_scales_with_stiffness(model):
@@ -74,11 +74,11 @@ def test_the_statics_rest_where_mujoco_does(model):
     chain = read_chain(model)
     pulls = np.array([[0.03, 0.02, -0.3], [-0.3, 0.035, 0.01]])
     gravity = np.array([[3.0, 1.0, -9.0]] * 2)
-    found = actuated(chain, chain.straight_lengths - pulls, gravity)
+    result = actuated(chain, chain.straight_lengths - pulls, gravity)
     expected = settle(model, chain.straight_lengths - pulls, gravity)
     assert expected.rested.all()
     assert np.abs(expected.qpos).max() > 0.2
-    np.testing.assert_allclose(found.position, expected.position, atol=1e-6)
+    np.testing.assert_allclose(result.position, expected.position, atol=1e-6)
 
 
 def test_a_rest_shape_is_where_the_arm_hangs(model):

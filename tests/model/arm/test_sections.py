@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from trunkline.errors import InputError
-from trunkline.model.arm.guide_holes import Holes, add_holes
+from trunkline.model.arm.guide_holes import GuideHoles, add_holes
 from trunkline.model.arm.mjcf import Actuation, Marker, Solver
 from trunkline.model.arm.sections import Section, Sections
 from trunkline.model.arm.tendons import Tendon
-from trunkline.model.elements import PRELOAD, SECTIONS, WINDING, cables, holes, numbers_place, numeric
+from trunkline.model.elements import PRELOAD, SECTIONS, WINDING, cables, hole_tendons, numbers_place, numeric
 
 SOLVER = Solver(0.002, 1e-5, [0.01, 1.0], [0.9, 0.95, 0.001, 0.5, 2.0], [0.01, 1.0], [0.9, 0.95, 0.001, 0.5, 2.0])
 ACTUATION = Actuation(friction=0.0, kp=2000.0, max_force=50.0, time_constant=0.02)
@@ -53,10 +53,10 @@ def test_each_section_has_units_of_its_own(model):
 def test_cables_that_end_on_the_way_cannot_rub():
     spec = arm().build(ACTUATION, SOLVER, Path()).spec
     with pytest.raises(InputError, match="build_mjcf.holes: found .* 'tendon_1', which ends at unit 2 of 5, expected"):
-        add_holes(spec, Holes(0.1, 2))
+        add_holes(spec, GuideHoles(0.1, 2))
     whole = arm(tendons=TENDONS[1:]).build(ACTUATION, SOLVER, Path()).spec
-    add_holes(whole, Holes(0.1, 2))
-    assert holes(whole.compile()).shape == (2, 2)
+    add_holes(whole, GuideHoles(0.1, 2))
+    assert hole_tendons(whole.compile()).shape == (2, 2)
 
 
 def test_tendons_run_where_they_are_described(model):
@@ -84,8 +84,8 @@ def test_a_marker_may_stick_out_and_sit_aside(model):
 
 
 def test_an_arm_may_bring_guesses_of_its_own_motors(tmp_path):
-    own = Actuation(friction=0.0, kp=500.0, max_force=9.0, time_constant=0.02)
-    built = arm(actuation=own).build(ACTUATION, SOLVER, tmp_path).spec.compile()
+    actuation = Actuation(friction=0.0, kp=500.0, max_force=9.0, time_constant=0.02)
+    built = arm(actuation=actuation).build(ACTUATION, SOLVER, tmp_path).spec.compile()
     assert built.actuator_gainprm[0, 0] == 500.0
 
 

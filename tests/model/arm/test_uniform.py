@@ -142,7 +142,7 @@ def test_units_bend_at_their_upper_ends_where_the_file_does_not_say(project, arm
 
 @pytest.mark.parametrize("arm", ["asl_trunk", "spiral"])
 @pytest.mark.parametrize(
-    ("segments", "found"),
+    ("segments", "message"),
     [
         ({"wrist": 0.6}, "segments.wrist: found 0.6 m, expected at most the length of "),
         ({"base": 0.1}, "segments.base: found the name of a body, expected another"),
@@ -150,10 +150,10 @@ def test_units_bend_at_their_upper_ends_where_the_file_does_not_say(project, arm
         ({"unit_99": 0.1}, "units' centres have names, unit_01 to unit_"),
     ],
 )
-def test_a_tracked_point_lies_on_the_arm_and_has_a_name_of_its_own(project, arm, segments, found):
+def test_a_tracked_point_lies_on_the_arm_and_has_a_name_of_its_own(project, arm, segments, message):
     with pytest.raises(InputError) as caught:
         project({"segments": segments}, arm)
-    assert found in str(caught.value)
+    assert message in str(caught.value)
     assert "\n" not in str(caught.value)
 
 

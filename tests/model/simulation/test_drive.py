@@ -49,9 +49,9 @@ def test_an_arm_too_stiff_for_the_longest_step_is_driven_in_shorter_ones():
     long = copy.copy(stiff)
     long.opt.timestep = longest_step(stiff)
     assert not drive(long, command, gravity, 3.0).rested[0]  # as long as its own
-    own = drive(stiff, command, gravity, 3.0)
-    assert own.rested[0]
-    np.testing.assert_allclose(own.end, settle(stiff, command, gravity).position, atol=1e-5)
+    driven = drive(stiff, command, gravity, 3.0)
+    assert driven.rested[0]
+    np.testing.assert_allclose(driven.end, settle(stiff, command, gravity).position, atol=1e-5)
 
 
 def test_a_calmed_arm_rests_where_it_would_have_and_says_no_time_that_it_did_not_have(model):

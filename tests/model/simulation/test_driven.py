@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.support.small_arm import small_spec
-from trunkline.model.arm.joints import Joints, Slider, add_elements
+from trunkline.model.arm.joints import JenkinsElement, Joints, add_elements
 from trunkline.model.elements import BACKLASH, CAPSTAN_FRICTION, SLIDER, all_elements, cables, numeric_place, switch_off
 from trunkline.model.simulation.drive import LOOK, NEAR, Driven, has_friction
 
@@ -30,14 +30,14 @@ def test_the_time_to_rest_is_from_when_on_a_tip_stays_near_its_end(away, rested,
     """Beside another drive, which rests at once."""
     tips = np.zeros((2, len(away), 3))
     tips[0, :, 1] = away
-    found = Driven(tips, np.array([rested, True]), calmed).seconds_to_rest
-    np.testing.assert_equal(found, [seconds, 0.0])
+    result = Driven(tips, np.array([rested, True]), calmed).seconds_to_rest
+    np.testing.assert_equal(result, [seconds, 0.0])
 
 
 def plain():
     """An arm with everything that can rub, none of which does."""
     spec = small_spec(2, backlash=3e-4)
-    add_elements(spec, Joints([], [Slider(0.2, 0.02)]), 1e-5)
+    add_elements(spec, Joints([], [JenkinsElement(0.2, 0.02)]), 1e-5)
     spec.add_numeric(name=CAPSTAN_FRICTION, data=[0.2], size=1)
     model = spec.compile()
     model.tendon_frictionloss[:], model.dof_frictionloss[:] = 0, 0

@@ -40,11 +40,11 @@ def test_a_load_swings_and_hangs_as_one_that_was_compiled(turned):
         batch.expand("opt.gravity")[:] = gravity
         batch.bind("act")[:] = controls[:rows, 0]
         swing = move(batch, controls[:rows], ("site_xpos",))["site_xpos"][:, :, model.site("tip").id].copy()
-        seen = batch.bind("site_xpos")
+        sites = batch.bind("site_xpos")
         timestep = relax(batch, model)
         moving, _ = come_to_rest(batch, timestep, 20.0)
         assert not len(moving)
-        return swing, seen[:, model.site("tip").id].copy()
+        return swing, sites[:, model.site("tip").id].copy()
 
     batch = batch_of(model, len(LOADS))
     hang(batch, model, LOADS)

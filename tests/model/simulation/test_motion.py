@@ -39,23 +39,23 @@ def stepped(model, controls):
 def test_a_batch_moves_as_mj_step_does(model, monkeypatch, chunk):
     monkeypatch.setattr(motion, "CHUNK", chunk)
     controls = pulled(model, [0.0, 0.02, 0.04])
-    seen = []
+    counts = []
     batch = batch_of(model, 3)
-    found = move(batch, controls, ("site_xpos", "qpos"), every=4, at=3, moved=seen.append)
-    assert sum(seen) == STEPS // 4
+    recorded = move(batch, controls, ("site_xpos", "qpos"), every=4, at=3, moved=counts.append)
+    assert sum(counts) == STEPS // 4
     for row, control in enumerate(controls):
         sites, angles = stepped(model, control)
-        np.testing.assert_array_equal(found["site_xpos"][row], sites[3::4])
-        np.testing.assert_array_equal(found["qpos"][row], angles[3::4])
+        np.testing.assert_array_equal(recorded["site_xpos"][row], sites[3::4])
+        np.testing.assert_array_equal(recorded["qpos"][row], angles[3::4])
 
 
 def test_only_those_named_move(model):
     controls = pulled(model, [0.02, 0.04])
     batch = batch_of(model, 3)
-    found = move(batch, controls, ("qpos",), ids=np.array([0, 2], dtype=np.int32))
+    recorded = move(batch, controls, ("qpos",), ids=np.array([0, 2], dtype=np.int32))
     angles = batch.bind("qpos")
     np.testing.assert_array_equal(angles[1], model.qpos0)
-    np.testing.assert_array_equal(angles[[0, 2]], found["qpos"][:, -1])
+    np.testing.assert_array_equal(angles[[0, 2]], recorded["qpos"][:, -1])
 
 
 def test_contacts_are_left_out_only_where_nothing_can_touch(model):

@@ -10,8 +10,8 @@ import pytest
 from mujoco.batch import Batch
 
 from tests.identification.test_stage import settings, truth_of
+from tests.model.simulation.test_capstan import rubbing_arm
 from tests.model.simulation.test_motion import delayed
-from tests.model.simulation.test_rubbing import rubbing_arm
 from tests.support.matched_plant import begin_project, curl, release, segments_of, small_model
 from tests.support.small_arm import small_spec
 from trunkline.errors import InputError
@@ -21,8 +21,8 @@ from trunkline.identification.parameters.parameters import PARAMETERS, candidate
 from trunkline.identification.simulate.experiment import prepare
 from trunkline.identification.simulate.loss import LossWeights
 from trunkline.identification.simulate.population import Population
-from trunkline.model.arm.joints import Branch, Joints, Slider
-from trunkline.model.elements import arm_hinges, cables, give_way, let_hang
+from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement
+from trunkline.model.elements import arm_hinges, cables, switch_off_cables, unload_branches
 from trunkline.model.simulation import motion
 from trunkline.model.simulation.divergence import CountingBatch
 from trunkline.model.simulation.motion import batch_of, hold, move
@@ -71,7 +71,7 @@ def varied(batch: Batch, model: mujoco.MjModel, kind: str) -> np.ndarray:
     else:
         angles, hinges = batch.bind("qpos"), arm_hinges(model)
         angles[:, :hinges] = np.tile([0.02, 0.04], hinges // 2)
-        give_way(model, angles)
+        unload_branches(model, angles)
     hold(batch, model, controls[:, 0])
     return controls
 
@@ -123,7 +123,7 @@ def test_a_dead_time_that_takes_samples_as_they_are_is_refused(warp):
 
 def test_cables_cut_down_to_a_point_are_refused(warp):
     model = small_model()
-    let_hang(model)
+    switch_off_cables(model)
     with pytest.raises(InputError, match="found a cable cut down to a point"):
         batch_of(model, 2, rough=True)
 
@@ -149,7 +149,7 @@ def late():
 
 
 def with_elements():
-    return small_model(joints=Joints([Branch(0.3, 0.5)], [Slider(0.2, 0.02)], True))
+    return small_model(joints=Joints([MaxwellElement(0.3, 0.5)], [JenkinsElement(0.2, 0.02)], True))
 
 
 @pytest.mark.parametrize("model_of", [small_model, with_elements, late])
@@ -158,7 +158,7 @@ def test_its_sites_are_where_mujoco_has_them(library, kind, model_of):
     model = model_of()
     batch = batch_of(model, 4, rough=True)
     assert type(batch) is library.WarpBatch
-    ours, theirs = (sites(one, model, kind) for one in (batch_of(model, 4), batch))
+    ours, theirs = (sites(batched, model, kind) for batched in (batch_of(model, 4), batch))
     assert np.linalg.norm(ours - ours[:, :1], axis=-1).max() > 1000 * BOUND
     assert np.linalg.norm(ours[1:] - ours[:-1], axis=-1).max() > 100 * BOUND  # each simulation has its own
     assert np.linalg.norm(theirs - ours, axis=-1).max() < BOUND
@@ -168,7 +168,7 @@ def test_on_a_gpu_a_thousand_are_where_mujoco_has_them(library):
     if not library.libraries()[0].is_cuda_available():
         pytest.skip("no GPU")
     model = small_model()
-    ours, theirs = (sites(one, model, "pull") for one in (batch_of(model, 1024), batch_of(model, 1024, rough=True)))
+    ours, theirs = (sites(batch, model, "pull") for batch in (batch_of(model, 1024), batch_of(model, 1024, rough=True)))
     assert np.linalg.norm(theirs - ours, axis=-1).max() < BOUND
 
 
@@ -178,10 +178,10 @@ def test_only_those_named_move_and_outputs_follow(library):
     places, last = batch.bind("qpos"), batch.bind("site_xpos")
     controls, before = varied(batch, model, "pull"), places.copy()
     ids = np.array([0, 2], dtype=np.int32)
-    found = move(batch, controls[ids, :8], ("site_xpos", "qpos"), ids=ids)
+    recorded = move(batch, controls[ids, :8], ("site_xpos", "qpos"), ids=ids)
     np.testing.assert_array_equal(places[1], before[1])
-    np.testing.assert_array_equal(places[ids], found["qpos"][:, -1])
-    np.testing.assert_array_equal(last[ids], found["site_xpos"][:, -1])
+    np.testing.assert_array_equal(places[ids], recorded["qpos"][:, -1])
+    np.testing.assert_array_equal(last[ids], recorded["site_xpos"][:, -1])
 
 
 @pytest.mark.parametrize(("field", "value"), [("opt.gravity", 1e30), ("opt.gravity", 1e12), ("dof_damping", -5)])
@@ -191,9 +191,9 @@ def test_one_that_diverges_is_warned_of_and_stays(library, field, value):
     controls, places = varied(batch, model, "release"), batch.bind("qpos")
     batch.expand(field)[1] = value
     before = places.copy()
-    found = batch.rollout(len(controls[0]), control=controls, record=("qpos",))["qpos"]
+    recorded = batch.rollout(len(controls[0]), control=controls, record=("qpos",))["qpos"]
     assert batch.warning.any(axis=(1, 2)).tolist() == [False, True]
-    np.testing.assert_array_equal(places[0], found[0, -1])
+    np.testing.assert_array_equal(places[0], recorded[0, -1])
     np.testing.assert_array_equal(places[1], before[1])
     batch.reset()
     assert not batch.warning.any()
@@ -201,22 +201,23 @@ def test_one_that_diverges_is_warned_of_and_stays(library, field, value):
 
 def test_friction_that_some_simulations_have_alone_acts(library):
     """What Warp asks of a model once, whether anything is not 0, is asked of all simulations."""
-    model = small_model(joints=Joints([Branch(0.3, 0.5)]))
-    found = []
+    model = small_model(joints=Joints([MaxwellElement(0.3, 0.5)]))
+    recorded = []
     for batch in (batch_of(model, 2), batch_of(model, 2, rough=True)):
         controls = varied(batch, model, "release")
         for name in ("tendon_stiffness", "tendon_frictionloss"):
             batch.expand(name)[0] = 0
-        found.append(move(batch, controls, ("site_xpos",))["site_xpos"])
-    assert np.linalg.norm(found[0][1] - found[0][0], axis=-1).max() > 100 * BOUND
-    assert np.linalg.norm(found[1] - found[0], axis=-1).max() < BOUND
+        recorded.append(move(batch, controls, ("site_xpos",))["site_xpos"])
+    assert np.linalg.norm(recorded[0][1] - recorded[0][0], axis=-1).max() > 100 * BOUND
+    assert np.linalg.norm(recorded[1] - recorded[0], axis=-1).max() < BOUND
 
 
 @pytest.fixture(scope="module")
 def trials():
     model = small_model(4)
-    seen = [release(model, 0.3, frames=30), release(model, -0.25, frames=20, tilt_deg=20), curl(model, 15, frames=60)]
-    return model, [prepare(trial, model, len(trial.time)) for trial in seen]
+    tilted = release(model, -0.25, frames=20, tilt_deg=20)
+    recordings = [release(model, 0.3, frames=30), tilted, curl(model, 15, frames=60)]
+    return model, [prepare(trial, model, len(trial.time)) for trial in recordings]
 
 
 @pytest.mark.parametrize("load", [0.0, 0.05])
@@ -255,15 +256,15 @@ def test_a_stage_whose_starts_warp_ranks_finds_what_it_finds_by_mujoco(library, 
                  [release(truth, 0.3, frames=40), release(truth, -0.25, frames=40),
                   release(truth, 0.2, "validate", frames=40)])  # fmt: skip
     config = settings(["release"], ["release"], {"damping": (0.3 * middle, 3 * middle)})
-    found, moved, begin = {}, [], library.WarpBatch.__init__
+    damping, moved, begin = {}, [], library.WarpBatch.__init__
     monkeypatch.setattr(library.WarpBatch, "__init__",
-                        lambda self, *given: (moved.append(given), begin(self, *given))[1])  # fmt: skip
+                        lambda self, *arguments: (moved.append(arguments), begin(self, *arguments))[1])  # fmt: skip
     for name in ("warp", "mujoco"):
         monkeypatch.setenv("TRUNKLINE_BATCHES", name)
         moved.clear()
         run("identify_damping", config, CAD_MODEL)
         assert bool(moved) == (name == "warp")
         table = json.loads((tmp_path / "artifacts/identify_damping/parameters.json").read_text())
-        found[name] = table["parameters"]["damping"]["value"]
-    assert found["warp"] == pytest.approx(found["mujoco"], rel=1e-4)
-    assert found["warp"] == pytest.approx(1.4 * middle, rel=0.02)
+        damping[name] = table["parameters"]["damping"]["value"]
+    assert damping["warp"] == pytest.approx(damping["mujoco"], rel=1e-4)
+    assert damping["warp"] == pytest.approx(1.4 * middle, rel=0.02)

@@ -26,9 +26,9 @@ def delivered(commands, rate=NONE, play=0.0):
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_ramp_that_is_too_fast_lags_by_what_is_missing_and_is_caught_up(side):
     asked, rate, end = 0.3, 0.1, 0.06  # m/s, m/s, m
-    found = side * delivered(side * np.minimum(asked * TIME, end), rate)
-    np.testing.assert_allclose(found, np.minimum(rate * TIME, end), atol=1e-12)
-    lag = np.minimum(asked * TIME, end) - found
+    result = side * delivered(side * np.minimum(asked * TIME, end), rate)
+    np.testing.assert_allclose(result, np.minimum(rate * TIME, end), atol=1e-12)
+    lag = np.minimum(asked * TIME, end) - result
     assert lag.max() == pytest.approx((asked - rate) * end / asked, abs=asked * STEP)
     assert TIME[np.flatnonzero(lag > 1e-9)[-1]] == pytest.approx(end / rate, abs=2 * STEP)
 
@@ -42,23 +42,23 @@ def test_play_shifts_what_turns_round_by_its_width():
     until the drum has come back by all of it."""
     reach, play = 0.03, 0.004
     way = reach * np.interp(TIME, [0, 0.25, 0.75, 1.0], [0, 1, -1, 0])
-    found = delivered(way, play=play)
+    result = delivered(way, play=play)
     falling, rising = (TIME > 0.25) & (TIME <= 0.75), TIME > 0.75
-    np.testing.assert_allclose(found[~falling & ~rising], np.maximum(way[:250] - play / 2, 0), atol=1e-12)
-    np.testing.assert_allclose(found[falling], np.minimum(way[falling] + play / 2, reach - play / 2), atol=1e-12)
-    np.testing.assert_allclose(found[rising], np.maximum(way[rising] - play / 2, -reach + play / 2), atol=1e-12)
-    turned = way[falling][np.flatnonzero(found[falling] < reach - play / 2 - 1e-9)[0]]
+    np.testing.assert_allclose(result[~falling & ~rising], np.maximum(way[:250] - play / 2, 0), atol=1e-12)
+    np.testing.assert_allclose(result[falling], np.minimum(way[falling] + play / 2, reach - play / 2), atol=1e-12)
+    np.testing.assert_allclose(result[rising], np.maximum(way[rising] - play / 2, -reach + play / 2), atol=1e-12)
+    turned = way[falling][np.flatnonzero(result[falling] < reach - play / 2 - 1e-9)[0]]
     assert turned == pytest.approx(reach - play, abs=2 * reach / 0.5 * STEP)
 
 
 def test_many_winches_are_as_each_alone():
     commands = 0.03 * np.sin(np.outer(TIME, [7.0, 11.0, 13.0])) * np.linspace(0.5, 1.5, 4)[:, None, None]
     rates, plays = np.array([0.05, NONE, 0.2, NONE]), np.array([0.0, 0.002, 0.005, 0.0])
-    found = wind(commands, np.zeros((4, 3)), np.zeros((4, 3)), rates * STEP, plays)
-    for own, rate, play, row in zip(commands, rates, plays, found, strict=True):
+    result = wind(commands, np.zeros((4, 3)), np.zeros((4, 3)), rates * STEP, plays)
+    for sent, rate, play, row in zip(commands, rates, plays, result, strict=True):
         for tendon in range(3):
-            np.testing.assert_array_equal(row[:, tendon], delivered(own[:, tendon], rate, play))
-    np.testing.assert_allclose(found[3], commands[3], atol=1e-15)
+            np.testing.assert_array_equal(row[:, tendon], delivered(sent[:, tendon], rate, play))
+    np.testing.assert_allclose(result[3], commands[3], atol=1e-15)
 
 
 def test_simulations_have_the_model_s_numbers_or_their_own_and_go_on_where_they_were():
@@ -70,10 +70,10 @@ def test_simulations_have_the_model_s_numbers_or_their_own_and_go_on_where_they_
         for name, values in fields.items():
             batch.expand(name)[:] = values
         whole, pieces = Winches(batch, np.zeros((2, 3))), Winches(batch, np.zeros((2, 3)))
-        found = whole.deliver(commands, np.arange(2))
+        result = whole.deliver(commands, np.arange(2))
         parts = [pieces.deliver(commands[:, :300], np.arange(2)), pieces.deliver(commands[1:, 300:], np.array([1]))]
-        np.testing.assert_array_equal(found[1], np.concatenate([parts[0][1], parts[1][0]]))
-        for row, rate in zip(found, [0.05, 0.2] if fields else [0.1, 0.1], strict=True):
+        np.testing.assert_array_equal(result[1], np.concatenate([parts[0][1], parts[1][0]]))
+        for row, rate in zip(result, [0.05, 0.2] if fields else [0.1, 0.1], strict=True):
             np.testing.assert_array_equal(row[:, 1], delivered(commands[0, :, 1], rate, 0.002))
 
 

@@ -7,7 +7,7 @@ import pytest
 from tests.support.bent_chain import hardening_stump, stump, stump_spec
 from trunkline.frames import gravity_in_base
 from trunkline.kinematics.dataset.sampling import pull_directions
-from trunkline.model.arm.guide_holes import Holes, add_holes
+from trunkline.model.arm.guide_holes import GuideHoles, add_holes
 from trunkline.model.elements import SLIP
 from trunkline.model.simulation.drive import drive
 from trunkline.model.statics.capstan import eliminate, solve_eliminated
@@ -116,14 +116,14 @@ def test_derivatives_are_those_of_the_torques(slope, reach, slip):
     assert unsaturated > 0, "some holes have slid by less than the slip length"
     assert unsaturated < 1 or reach < 0.1, "and some by more"
     hessian, size = find_hessian(GRAVITY, pull, state), 2 * chain.units
-    found = np.triu(hessian.left.T @ hessian.right) + np.tril(state.rub.left.T @ state.rub.right, -1)
+    matrix = np.triu(hessian.left.T @ hessian.right) + np.tril(state.rub.left.T @ state.rub.right, -1)
     for i, (aa, ab, bb, ba) in enumerate(hessian.block):
-        found[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = [[aa, ab], [ba, bb]]
+        matrix[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = [[aa, ab], [ba, bb]]
     x = np.random.default_rng(3).normal(size=size)
     solved = x.copy()
     assert eliminate(hessian, state.rub, work.factor)
     solve_eliminated(hessian, state.rub, work.factor, solved)
-    np.testing.assert_allclose(found @ solved, x, rtol=1e-9, atol=1e-10)
+    np.testing.assert_allclose(matrix @ solved, x, rtol=1e-9, atol=1e-10)
     for j in range(size):
         ends = []
         for way in (step, -step):
@@ -131,8 +131,8 @@ def test_derivatives_are_those_of_the_torques(slope, reach, slip):
             moved[j] += way
             evaluate(chain, moved, GRAVITY, pull, state)
             ends.append(state.gradient.copy())
-        np.testing.assert_allclose(found[:, j], (ends[0] - ends[1]) / (2 * step), rtol=1e-5, atol=1e-5)
-    assert np.abs(found - found.T).max() > 1e-3, "without friction it were symmetric"
+        np.testing.assert_allclose(matrix[:, j], (ends[0] - ends[1]) / (2 * step), rtol=1e-5, atol=1e-5)
+    assert np.abs(matrix - matrix.T).max() > 1e-3, "without friction it were symmetric"
 
 
 def test_lengths_and_commands_lead_back_to_the_same_pose(chain):
@@ -141,11 +141,11 @@ def test_lengths_and_commands_lead_back_to_the_same_pose(chain):
     assert there.converged.all()
     assert there.residual.max() < 1e-9
     back = forward(chain, there.lengths, gravity)
-    held = actuated(chain, there.commands, gravity)
-    for found in (back, held):
-        assert found.converged.all()
-        np.testing.assert_allclose(found.position, there.position, rtol=0, atol=1e-7)
-        np.testing.assert_allclose(found.tensions, tensions, rtol=0, atol=1e-4)
+    by_commands = actuated(chain, there.commands, gravity)
+    for result in (back, by_commands):
+        assert result.converged.all()
+        np.testing.assert_allclose(result.position, there.position, rtol=0, atol=1e-7)
+        np.testing.assert_allclose(result.tensions, tensions, rtol=0, atol=1e-4)
     smooth = equilibrium(chain._replace(capstan=0.0), tensions, gravity)
     assert np.linalg.norm(smooth.position - there.position, axis=1).max() > 5e-3
 
@@ -180,7 +180,7 @@ def test_slow_motors_in_mujoco_come_to_rest_there():
     spec = stump_spec()
     for cable in spec.tendons:
         cable.frictionloss = 0.0
-    add_holes(spec, Holes(FRICTION, 7))
+    add_holes(spec, GuideHoles(FRICTION, 7))
     model = spec.compile()
     model.dof_frictionloss[:] = 0
     chain = read_chain(model)
@@ -223,7 +223,7 @@ def test_friction_builds_up_within_the_slip_length(chain, slip):
 
 def test_a_model_says_its_slip_length_and_one_that_does_not_has_the_usual():
     spec, without = stump_spec(), stump_spec()
-    add_holes(spec, Holes(FRICTION, 7, slip=7e-4))
+    add_holes(spec, GuideHoles(FRICTION, 7, slip=7e-4))
     assert read_chain(spec.compile()).slip == 7e-4
     again = mujoco.MjSpec.from_string(spec.to_xml())
     assert read_chain(again.compile()).slip == 7e-4

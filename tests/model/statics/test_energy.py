@@ -141,5 +141,5 @@ def test_limit_of_negative_solref_is_mujocos():
     data.qpos[2] = chain.limit[1, 0, 0] - 0.03
     mujoco.mj_forward(model, data)
     row = np.flatnonzero(data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT))
-    found = limit_torque(chain.limit_gain[1, 0], chain.limit_impedance[1, 0], 0.03)[0]
-    assert found == pytest.approx(data.efc_D[row[0]] * data.efc_aref[row[0]], rel=1e-10)
+    result = limit_torque(chain.limit_gain[1, 0], chain.limit_impedance[1, 0], 0.03)[0]
+    assert result == pytest.approx(data.efc_D[row[0]] * data.efc_aref[row[0]], rel=1e-10)

@@ -35,11 +35,11 @@ def test_equilibrium_is_where_mujoco_comes_to_rest(build):
     model = build()
     chain = read_chain(model)
     tensions, gravity = random_pulls(chain, 12)
-    found = equilibrium(chain, tensions, gravity)
-    assert found.converged.all()
-    settled = settle(model, found.lengths - tensions / chain.gain, gravity)
+    result = equilibrium(chain, tensions, gravity)
+    assert result.converged.all()
+    settled = settle(model, result.lengths - tensions / chain.gain, gravity)
     assert settled.rested.all()
-    np.testing.assert_allclose(settled.position, found.position, rtol=0, atol=2e-5)
+    np.testing.assert_allclose(settled.position, result.position, rtol=0, atol=2e-5)
     np.testing.assert_allclose(settled.tensions, tensions, rtol=0, atol=2e-3)
 
 
@@ -48,29 +48,29 @@ def test_an_arm_on_a_turned_mount_rests_there_in_its_own_frame(arm, chain):
     turned = arm.__copy__()
     set_fields(turned, candidate_fields(arm, {"mount_tilt_x": np.array([0.1]), "mount_twist": np.array([-0.2])}))
     tensions, gravity = random_pulls(chain, 3)
-    found = equilibrium(read_chain(turned), tensions, gravity)
-    np.testing.assert_allclose(found.position, equilibrium(chain, tensions, gravity).position, atol=1e-9)
-    settled = settle(turned, found.lengths - tensions / chain.gain, gravity)
-    np.testing.assert_allclose(settled.position, found.position, rtol=0, atol=2e-5)
+    result = equilibrium(read_chain(turned), tensions, gravity)
+    np.testing.assert_allclose(result.position, equilibrium(chain, tensions, gravity).position, atol=1e-9)
+    settled = settle(turned, result.lengths - tensions / chain.gain, gravity)
+    np.testing.assert_allclose(settled.position, result.position, rtol=0, atol=2e-5)
 
 
 def test_units_that_bend_further_down_rest_where_mujoco_does(arm, chain):
     lower = arm.__copy__()
     set_fields(lower, candidate_fields(arm, {"joint_place": np.array([0.4])}))
     tensions, gravity = random_pulls(chain, 6)
-    found = equilibrium(read_chain(lower), tensions, gravity)
-    settled = settle(lower, found.lengths - tensions / chain.gain, gravity)
-    np.testing.assert_allclose(settled.position, found.position, rtol=0, atol=2e-5)
-    assert np.linalg.norm(found.position - equilibrium(chain, tensions, gravity).position, axis=1).max() > 1e-3
+    result = equilibrium(read_chain(lower), tensions, gravity)
+    settled = settle(lower, result.lengths - tensions / chain.gain, gravity)
+    np.testing.assert_allclose(settled.position, result.position, rtol=0, atol=2e-5)
+    assert np.linalg.norm(result.position - equilibrium(chain, tensions, gravity).position, axis=1).max() > 1e-3
 
 
 def test_actuators_saturate_as_mujocos_do(arm, chain):
     commands = chain.straight_lengths - np.array([[0.5, -0.1, -0.1], [0.03, 0.02, -0.1]])
-    found = actuated(chain, commands, gravity_in_base(0.5))
-    assert found.converged.all()
-    assert found.tensions[0, 0] == chain.max_tension[0]
+    result = actuated(chain, commands, gravity_in_base(0.5))
+    assert result.converged.all()
+    assert result.tensions[0, 0] == chain.max_tension[0]
     settled = settle(arm, commands, gravity_in_base(0.5))
-    np.testing.assert_allclose(settled.position, found.position, rtol=0, atol=2e-5)
+    np.testing.assert_allclose(settled.position, result.position, rtol=0, atol=2e-5)
 
 
 def test_cantilever_sags_as_the_beam_formula_says():
@@ -82,17 +82,17 @@ def test_cantilever_sags_as_the_beam_formula_says():
     centers = hinges + length / 2
     moments = [mass * 9.81 * np.maximum(centers - s, 0).sum() for s in hinges]
     expected = np.sum(np.array(moments) / stiffness * (units * length - hinges))
-    found = equilibrium(chain, np.zeros((1, 0)), gravity)
-    assert found.converged.all()
-    assert found.position[0, 1] == pytest.approx(expected, rel=1e-4)
-    np.testing.assert_allclose(found.position[0, [0, 2]], [0, -units * length], atol=1e-5)
+    result = equilibrium(chain, np.zeros((1, 0)), gravity)
+    assert result.converged.all()
+    assert result.position[0, 1] == pytest.approx(expected, rel=1e-4)
+    np.testing.assert_allclose(result.position[0, [0, 2]], [0, -units * length], atol=1e-5)
 
 
 def test_straight_arm_hangs_straight(chain):
-    found = equilibrium(chain, np.zeros((1, 3)), gravity_in_base(0.0))
-    np.testing.assert_allclose(found.position[0], [0, 0, -chain.length], atol=1e-12)
-    np.testing.assert_allclose(found.quaternion[0], [1, 0, 0, 0], atol=1e-12)
-    np.testing.assert_allclose(found.lengths[0], chain.straight_lengths, atol=1e-12)
+    result = equilibrium(chain, np.zeros((1, 3)), gravity_in_base(0.0))
+    np.testing.assert_allclose(result.position[0], [0, 0, -chain.length], atol=1e-12)
+    np.testing.assert_allclose(result.quaternion[0], [1, 0, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(result.lengths[0], chain.straight_lengths, atol=1e-12)
 
 
 def test_lengths_lead_back_to_the_same_pose(chain):
@@ -129,9 +129,9 @@ def test_paths_and_single_solves_meet(chain):
 
 def test_buckled_arm_is_not_called_an_equilibrium(chain):
     """All tendons at full pull press the straight arm together: it balances, but on a knife's edge."""
-    found = equilibrium(chain, chain.max_tension[None], np.zeros(3))
-    assert found.residual[0] < 1e-9
-    assert not found.converged[0]
+    result = equilibrium(chain, chain.max_tension[None], np.zeros(3))
+    assert result.residual[0] < 1e-9
+    assert not result.converged[0]
 
 
 def test_sensitivities_are_differences_of_equilibria(chain):
@@ -157,7 +157,7 @@ def test_results_are_the_same_bits_at_any_thread_count(chain, monkeypatch, solve
     results = []
     for threads in ("1", "2"):
         monkeypatch.setenv("TRUNKLINE_THREADS", threads)
-        found = equilibrium(chain, tensions, gravity) if solve == "tensions" else forward(chain, lengths, gravity)
-        results.append(found)
+        result = equilibrium(chain, tensions, gravity) if solve == "tensions" else forward(chain, lengths, gravity)
+        results.append(result)
     for name, values in vars(results[0]).items():
         assert np.array_equal(values, vars(results[1])[name]), name

@@ -7,14 +7,15 @@ import pytest
 from tests.support.bent_chain import stump, stump_spec
 from tests.support.small_arm import small_spec
 from trunkline.frames import gravity_in_base
-from trunkline.model.arm.joints import Branch, Joints, Slider, add_elements
+from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement, add_elements
 from trunkline.model.statics.chain import read_chain
 from trunkline.model.statics.equilibria import equilibrium
 from trunkline.model.statics.hysteresis import friction_band, model_friction
 
 GRAVITY = gravity_in_base(0.6)
 TENSIONS = np.array([[24.0, 9.0, 0.0]])
-SLIDERS = [Slider(1.0, 0.005), Slider(0.5, 0.01)]  # they slip at small bends, as all joints bend by more
+# they slip at small bends, as all joints bend by more
+SLIDERS = [JenkinsElement(1.0, 0.005), JenkinsElement(0.5, 0.01)]
 
 
 def rubbing_stump(tendon_friction=1.0, joint_friction=0.0, sliders=()):
@@ -84,7 +85,7 @@ def test_band_grows_in_proportion_to_small_friction():
 
 def test_a_slider_is_dry_friction_of_its_joint_and_a_branch_is_none():
     """Both hang on tendons of their own, which are none of the cables."""
-    joints, bands = Joints([Branch(0.3, 0.5)], [Slider(0.2, 0.02), Slider(0.1, 0.01)]), []
+    joints, bands = Joints([MaxwellElement(0.3, 0.5)], [JenkinsElement(0.2, 0.02), JenkinsElement(0.1, 0.01)]), []
     for elements, friction in ((joints, 0.0), (Joints(), 0.2 * 0.02 + 0.1 * 0.01), (Joints(joints.branches), 0.0)):
         spec = small_spec()
         add_elements(spec, elements, 1e-5)

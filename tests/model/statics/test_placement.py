@@ -13,8 +13,8 @@ def test_joints_and_tip_are_where_mujoco_has_them():
     chain, data = read_chain(model), mujoco.MjData(model)
     rng = np.random.default_rng(3)
     every = rng.uniform(-0.3, 0.3, (4, model.nq))
-    found = joint_places(chain, every)
-    for qpos, places in zip(every, found, strict=True):
+    result = joint_places(chain, every)
+    for qpos, places in zip(every, result, strict=True):
         data.qpos[:] = qpos
         mujoco.mj_kinematics(model, data)
         base = data.body("base")

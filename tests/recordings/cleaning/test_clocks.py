@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from trunkline.errors import InputError
-from trunkline.recordings.cleaning.checks import Findings, Limits
+from trunkline.recordings.cleaning.checks import Findings, TrialLimits
 from trunkline.recordings.cleaning.clocks import check_clocks
 from trunkline.recordings.cleaning.trial_window import _log_fit
 from trunkline.recordings.logs.pose_stream import PoseStream
 from trunkline.recordings.signals.steps import find_step
 
-LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
+LIMITS = TrialLimits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
 RATE, START = 120.0, 1_760_000_000_000_000_000
 
 
@@ -67,21 +67,21 @@ NAMES = ("frame numbers", "stamps", "log times")
 def test_a_step_of_a_clock_that_is_used_is_refused(clock, which, size):
     with pytest.raises(InputError, match=r"a\.mcap: trial a: /poses: ") as error:
         check(clock, *stepped(which, size))
-    found = re.search(rf"{NAMES[which]} jump by \+([\d.]+) s at message (\d+)", str(error.value))
-    assert found, str(error.value)
-    assert float(found[1]) == pytest.approx(size, abs=0.01, rel=2e-3)
-    assert int(found[2]) == 300
+    match = re.search(rf"{NAMES[which]} jump by \+([\d.]+) s at message (\d+)", str(error.value))
+    assert match, str(error.value)
+    assert float(match[1]) == pytest.approx(size, abs=0.01, rel=2e-3)
+    assert int(match[2]) == 300
     assert f"`clock: {clock}`" not in str(error.value), "another clock is to be taken"
 
 
 @pytest.mark.parametrize(("clock", "which"), [("stamp", 0), ("stamp", 2), ("log", 0), ("log", 1), ("frame", 2)])
 def test_a_step_of_a_clock_that_is_not_used_is_said(clock, which):
-    said = check(clock, *stepped(which, 0.3))
-    assert said
-    for text in said:
-        found = re.match(rf"{NAMES[which]} jump by \+([\d.]+) s at message 300, .*; left so, as `clock: {clock}`", text)
-        assert found, text
-        assert float(found[1]) == pytest.approx(0.3, abs=0.01)
+    warnings = check(clock, *stepped(which, 0.3))
+    assert warnings
+    for text in warnings:
+        match = re.match(rf"{NAMES[which]} jump by \+([\d.]+) s at message 300, .*; left so, as `clock: {clock}`", text)
+        assert match, text
+        assert float(match[1]) == pytest.approx(0.3, abs=0.01)
 
 
 def test_a_small_step_back_is_refused_too():
@@ -96,8 +96,8 @@ def test_without_frame_numbers_the_unusual_interval_tells():
     with pytest.raises(InputError, match=r"stamps jump by \+0\.[23]"):
         check("stamp", None, stamps, logged)
     _, stamps, logged = stepped(2, 0.3)
-    (said,) = check("stamp", None, stamps, logged)
-    assert said.startswith("log times jump by +0.")
+    (warning,) = check("stamp", None, stamps, logged)
+    assert warning.startswith("log times jump by +0.")
 
 
 def test_log_times_that_went_back_interleave_and_are_refused():
@@ -109,8 +109,8 @@ def test_log_times_that_went_back_interleave_and_are_refused():
 
 
 def test_another_rate_is_said():
-    said = check("stamp", *log(drift=0.1))
-    assert any("stamps run 9.1 % slower than log times" in text for text in said), said
+    warnings = check("stamp", *log(drift=0.1))
+    assert any("stamps run 9.1 % slower than log times" in text for text in warnings), warnings
 
 
 def test_a_step_is_found_where_it_is():

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.recordings.cleaning.test_intake import edit_session, one_trial, taken
+from tests.recordings.cleaning.test_loading import edit_session, one_trial, taken
 from tests.support.sessions import curl_truth
 from trunkline.errors import InputError
 
@@ -72,8 +72,8 @@ def test_motors_without_stamps_are_dated_by_the_recorder(tmp_path, clock):
     take, findings = taken(tmp_path)[0]
     assert len(take.command_time) > 100
     assert len(take.tendon_time) > 400
-    said = [repair for repair in findings.repairs if "dated by the recorder's clock" in repair]
-    assert len(said) == (0 if clock == "log" else 2)
+    repairs = [repair for repair in findings.repairs if "dated by the recorder's clock" in repair]
+    assert len(repairs) == (0 if clock == "log" else 2)
 
 
 def test_tendons_take_the_names_of_the_session(tmp_path):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.recordings.filtering.test_gaps import SETTINGS, TIME, take
-from trunkline.recordings.filtering.filter import average_static, filter_take
+from trunkline.recordings.filtering.filter import average_static, filter_raw_trial
 
 
 @pytest.mark.parametrize("every", [2, 7, 360])
@@ -16,26 +16,26 @@ def test_whichever_sign_quaternions_have_they_are_filtered_alike(every):
         angle = np.pi / 2 + 0.2 * np.sin(6 * TIME)  # to both sides of half a turn, where the sign that is usual changes
         source.quaternions[:, 1] = np.stack([np.cos(angle), np.sin(angle), 0 * angle, 0 * angle], axis=1)
     mixed.quaternions[::every, 1] *= -1
-    expected, effect = filter_take(plain, SETTINGS)
-    found, same = filter_take(mixed, SETTINGS)
+    expected, effect = filter_raw_trial(plain, SETTINGS)
+    result, same = filter_raw_trial(mixed, SETTINGS)
     assert same.outliers == effect.outliers == 0
-    np.testing.assert_allclose(np.abs(np.sum(found.quaternions * expected.quaternions, axis=2)), 1.0, atol=1e-9)
-    np.testing.assert_array_equal(found.measured, expected.measured)
+    np.testing.assert_allclose(np.abs(np.sum(result.quaternions * expected.quaternions, axis=2)), 1.0, atol=1e-9)
+    np.testing.assert_array_equal(result.measured, expected.measured)
 
 
 @pytest.mark.parametrize("oriented", [False, True])
 def test_noise_is_what_the_low_pass_takes_away(oriented):
     smooth, noisy = take(oriented=oriented), take(oriented=oriented)
     noisy.positions[:] += 1e-3 * np.random.default_rng(0).normal(size=noisy.positions.shape)
-    assert filter_take(smooth, SETTINGS)[1].position_noise < 1e-5
-    assert 0.6e-3 < filter_take(noisy, SETTINGS)[1].position_noise < 1e-3  # what lies in its band stays
+    assert filter_raw_trial(smooth, SETTINGS)[1].position_noise < 1e-5
+    assert 0.6e-3 < filter_raw_trial(noisy, SETTINGS)[1].position_noise < 1e-3  # what lies in its band stays
 
 
-@pytest.mark.parametrize("seen", [1, 2, 50])
-def test_the_mean_of_what_was_measured_is_over_as_many_frames(seen):
-    trial, _ = filter_take(take(), SETTINGS)
+@pytest.mark.parametrize("count", [1, 2, 50])
+def test_the_mean_of_what_was_measured_is_over_as_many_frames(count):
+    trial, _ = filter_raw_trial(take(), SETTINGS)
     measured = np.zeros_like(trial.measured)
-    measured[100 : 100 + seen, 0] = True
-    found = average_static(replace(trial, measured=measured))
-    np.testing.assert_allclose(found.positions[0, 0], trial.positions[100 : 100 + seen, 0].mean(axis=0))
-    assert found.measured.tolist() == [[True, False]]
+    measured[100 : 100 + count, 0] = True
+    result = average_static(replace(trial, measured=measured))
+    np.testing.assert_allclose(result.positions[0, 0], trial.positions[100 : 100 + count, 0].mean(axis=0))
+    assert result.measured.tolist() == [[True, False]]

@@ -82,12 +82,12 @@ def test_starts_are_found(results):
 def test_commands_are_on_the_cameras_clock(results):
     trial = results[0]["curl_40"]
     truth = next(truth for truth in all_truths() if truth.name == "curl_40")
-    for found in (trial.commands, trial.tendon_positions):
+    for values in (trial.commands, trial.tendon_positions):
         expected = np.stack(
             [np.interp(trial.time, truth.time, pull) for pull in truth.tendon_positions.T], axis=1
         )
         # 70 mm/s at most: 0.5 mm for 8 ms of clock error
-        assert np.abs(found - expected).max() < 0.8e-3
+        assert np.abs(values - expected).max() < 0.8e-3
     assert results[0]["release_a"].commands.shape[1] == 0
 
 
@@ -101,9 +101,9 @@ def test_metrics(results):
 
 def test_orientation_noise_is_reduced(results):
     trial = results[0]["release_a"]
-    held = trial.time < RELEASE - 0.05
+    before_release = trial.time < RELEASE - 0.05
     rotations = [
-        Rotation.from_quat(q[held], scalar_first=True) for q in np.moveaxis(trial.quaternions, 1, 0)
+        Rotation.from_quat(q[before_release], scalar_first=True) for q in np.moveaxis(trial.quaternions, 1, 0)
     ]
     spread = [np.sqrt(np.mean((r.mean().inv() * r).magnitude() ** 2) / 3) for r in rotations]
     assert np.degrees(np.median(spread)) < 0.3 * 0.7

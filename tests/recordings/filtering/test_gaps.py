@@ -7,9 +7,9 @@ import pytest
 
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
-from trunkline.recordings.filtering.filter import Filter, average_static, filter_take, start_of
+from trunkline.recordings.filtering.filter import Filter, average_static, filter_raw_trial, start_of
 from trunkline.recordings.trials.experiments import EXPERIMENTS
-from trunkline.recordings.trials.raw_trial import Take
+from trunkline.recordings.trials.raw_trial import RawTrial
 from trunkline.recordings.trials.trial import Trial
 
 RATE, FRAMES = 120, 360
@@ -19,7 +19,7 @@ MARGIN = 3  # frames: half a period of the cutoff, as far as the low-pass carrie
 TIME = np.arange(FRAMES) / RATE
 
 
-def take(kind: str = "motion", oriented: bool = False, **changes) -> Take:
+def take(kind: str = "motion", oriented: bool = False, **changes) -> RawTrial:
     """Two segments that sway, seen in every frame of the uniform clock, and a base that stands still."""
     positions = np.zeros((FRAMES, 2, 3))
     positions[..., 2] = [-0.2, -0.4]
@@ -33,10 +33,10 @@ def take(kind: str = "motion", oriented: bool = False, **changes) -> Take:
         "up": np.array([0.0, 0.0, 1.0]), "tendons": ("tendon_1",), "command_time": TIME, "tendon_time": np.empty(0),
         "commands": 0.01 * np.clip(TIME - 0.5, 0, 1)[:, None], "tendon_positions": np.empty((0, 1)),
     }  # fmt: skip
-    return Take(**facts | changes)
+    return RawTrial(**facts | changes)
 
 
-def missing(source: Take, begin: int, count: int, segment: int = 1) -> Take:
+def missing(source: RawTrial, begin: int, count: int, segment: int = 1) -> RawTrial:
     positions = source.positions.copy()
     positions[begin : begin + count, segment] = np.nan
     return replace(source, positions=positions)
@@ -44,7 +44,7 @@ def missing(source: Take, begin: int, count: int, segment: int = 1) -> Take:
 
 @pytest.mark.parametrize("missed", [1, BRIDGED - 1, BRIDGED])
 def test_a_gap_that_is_short_enough_is_measured_throughout(missed):
-    trial, effect = filter_take(missing(take(), 100, missed), SETTINGS)
+    trial, effect = filter_raw_trial(missing(take(), 100, missed), SETTINGS)
     assert trial.measured.all()
     assert effect.gap_share == 0
     assert effect.filled_share == pytest.approx(missed / (2 * FRAMES))
@@ -52,7 +52,7 @@ def test_a_gap_that_is_short_enough_is_measured_throughout(missed):
 
 @pytest.mark.parametrize("missed", [BRIDGED + 1, 2 * BRIDGED, 3 * BRIDGED, 100])
 def test_a_longer_gap_is_not_measured_nor_is_what_the_low_pass_carries_beyond_it(missed):
-    trial, effect = filter_take(missing(take(), 100, missed), SETTINGS)
+    trial, effect = filter_raw_trial(missing(take(), 100, missed), SETTINGS)
     assert trial.measured[:, 0].all(), "the other segment was seen"
     hidden = np.flatnonzero(~trial.measured[:, 1])
     assert hidden.tolist() == list(range(100 - MARGIN, 100 + missed + MARGIN))
@@ -65,16 +65,16 @@ def test_what_is_measured_does_not_depend_on_what_fills_a_gap(missed):
     calm, jerked = take(), take()
     inside = slice(100, 100 + missed)
     jerked.positions[inside, 1, 1] += 0.1 * np.hanning(missed)
-    full, _ = filter_take(jerked, SETTINGS)
-    seen, _ = filter_take(missing(calm, 100, missed), SETTINGS)
-    off = np.abs(seen.positions - full.positions).max(axis=2)
-    assert off[~seen.measured].max() > 50e-3
-    assert off[seen.measured].max() < 0.5e-3
+    full, _ = filter_raw_trial(jerked, SETTINGS)
+    filtered, _ = filter_raw_trial(missing(calm, 100, missed), SETTINGS)
+    off = np.abs(filtered.positions - full.positions).max(axis=2)
+    assert off[~filtered.measured].max() > 50e-3
+    assert off[filtered.measured].max() < 0.5e-3
 
 
 @pytest.mark.parametrize(("begin", "hidden"), [(0, range(20 + MARGIN)), (340, range(340 - MARGIN, FRAMES))])
 def test_before_the_first_and_after_the_last_sample_nothing_is_measured(begin, hidden):
-    trial, _ = filter_take(missing(take(), begin, 20), SETTINGS)
+    trial, _ = filter_raw_trial(missing(take(), begin, 20), SETTINGS)
     assert np.flatnonzero(~trial.measured[:, 1]).tolist() == list(hidden)
 
 
@@ -85,9 +85,9 @@ def test_a_sample_that_is_off_in_either_way_is_dropped(what):
         source.positions[150, 1, 1] += 0.02
     else:
         source.quaternions[150, 1] = [np.cos(0.4), np.sin(0.4), 0, 0]
-    trial, effect = filter_take(source, SETTINGS)
+    trial, effect = filter_raw_trial(source, SETTINGS)
     assert effect.outliers == 1
-    plain = filter_take(take(oriented=True), SETTINGS)[0]
+    plain = filter_raw_trial(take(oriented=True), SETTINGS)[0]
     np.testing.assert_allclose(trial.positions, plain.positions, atol=1e-4)
     np.testing.assert_allclose(trial.quaternions, plain.quaternions, atol=1e-3)
 
@@ -95,21 +95,21 @@ def test_a_sample_that_is_off_in_either_way_is_dropped(what):
 def test_a_sample_counts_only_with_its_orientation():
     source = take(oriented=True)
     source.quaternions[100:140, 1] = np.nan
-    trial, _ = filter_take(source, SETTINGS)
+    trial, _ = filter_raw_trial(source, SETTINGS)
     assert np.flatnonzero(~trial.measured[:, 1]).tolist() == list(range(100 - MARGIN, 140 + MARGIN))
 
 
-@pytest.mark.parametrize(("seen", "enough"), [(8, True), (7, False)])
-def test_fewer_samples_than_the_low_pass_needs_are_refused(seen, enough):
-    source = missing(take(), seen, FRAMES)
+@pytest.mark.parametrize(("samples", "enough"), [(8, True), (7, False)])
+def test_fewer_samples_than_the_low_pass_needs_are_refused(samples, enough):
+    source = missing(take(), samples, FRAMES)
     if enough:
-        assert filter_take(source, SETTINGS)[0].measured[:, 1].sum() == seen - MARGIN
+        assert filter_raw_trial(source, SETTINGS)[0].measured[:, 1].sum() == samples - MARGIN
         return
-    with pytest.raises(InputError, match=f"'unit_2': found {seen} good samples, expected more"):
-        filter_take(source, SETTINGS)
+    with pytest.raises(InputError, match=f"'unit_2': found {samples} good samples, expected more"):
+        filter_raw_trial(source, SETTINGS)
 
 
-def moving_while_hidden(count: int) -> tuple[Take, slice]:
+def moving_while_hidden(count: int) -> tuple[RawTrial, slice]:
     """At rest, but for a while in which nobody sees the second segment and after which it is 2 mm elsewhere."""
     source, hidden = take("static_pull"), slice(100, 100 + count)
     source.positions[hidden.stop :, 1, 0] += 2e-3
@@ -119,7 +119,7 @@ def moving_while_hidden(count: int) -> tuple[Take, slice]:
 
 def test_a_shape_at_rest_is_the_mean_of_the_frames_that_were_measured():
     source, hidden = moving_while_hidden(160)
-    trial, _ = filter_take(source, SETTINGS)
+    trial, _ = filter_raw_trial(source, SETTINGS)
     before, after = hidden.start - MARGIN, FRAMES - hidden.stop - MARGIN
     assert trial.positions.shape == (1, 2, 3)
     assert trial.measured.all()
@@ -148,12 +148,12 @@ def test_the_mean_shape_by_hand():
     quaternions[1, 0] = [0, 1, 0, 0]
     quaternions[2, 0] = [0, 0, 0, 1]
     measured = np.array([[True, False], [True, False], [False, False], [False, False]])
-    found = average_static(static(positions, measured, quaternions))
-    assert found.positions[0, 0].tolist() == [1.5, 0, 0]
-    np.testing.assert_allclose(found.quaternions[0, 0], [half, half, 0, 0])
-    assert found.measured.tolist() == [[True, False]]
-    assert (found.commands.item(), found.tendon_positions.item()) == (1.5, 3.0)
-    assert found.time.tolist() == [0.0]
+    result = average_static(static(positions, measured, quaternions))
+    assert result.positions[0, 0].tolist() == [1.5, 0, 0]
+    np.testing.assert_allclose(result.quaternions[0, 0], [half, half, 0, 0])
+    assert result.measured.tolist() == [[True, False]]
+    assert (result.commands.item(), result.tendon_positions.item()) == (1.5, 3.0)
+    assert result.time.tolist() == [0.0]
 
 
 @pytest.mark.parametrize("oriented", [False, True])
@@ -162,7 +162,7 @@ def test_a_path_counts_frame_by_frame_what_was_seen_whole(oriented):
     source.positions[5, 1] = np.nan
     if oriented:
         source.quaternions[7, 0] = np.nan
-    trial, effect = filter_take(source, SETTINGS)
+    trial, effect = filter_raw_trial(source, SETTINGS)
     hidden = [(5, 1), (7, 0)] if oriented else [(5, 1)]
     assert [tuple(place) for place in np.argwhere(~trial.measured).tolist()] == hidden
     assert effect.gap_share == pytest.approx(len(hidden) / (2 * FRAMES))
@@ -176,7 +176,7 @@ def test_of_commands_and_positions_one_stands_for_the_other(lacking):
     source = take(
         command_time=TIME[: len(commands)], commands=commands, tendon_time=TIME[: len(wound)], tendon_positions=wound
     )
-    trial, _ = filter_take(source, SETTINGS)
+    trial, _ = filter_raw_trial(source, SETTINGS)
     expected = np.zeros((FRAMES, 1)) if lacking == "both" else pulls
     np.testing.assert_allclose(trial.commands, expected, atol=1e-9)
     np.testing.assert_allclose(trial.tendon_positions, expected, atol=1e-9)
@@ -184,7 +184,7 @@ def test_of_commands_and_positions_one_stands_for_the_other(lacking):
 
 def test_commands_come_on_the_poses_clock():
     source = take(clock_offset=0.25)
-    trial, _ = filter_take(source, SETTINGS)
+    trial, _ = filter_raw_trial(source, SETTINGS)
     np.testing.assert_allclose(trial.commands[:, 0], 0.01 * np.clip(TIME - 0.75, 0, 1), atol=1e-9)
 
 
@@ -194,15 +194,15 @@ def test_only_a_release_that_is_to_be_free_begins_in_motion(kind, release, free)
     source = take(kind)
     aside = np.clip(1.2 - TIME, 0, 0.2) / 0.2  # let go at 1 s
     source.positions[..., 0] = 0.1 * aside[:, None] * [0.5, 1.0]
-    trial, _ = filter_take(source, SETTINGS)
-    found = start_of(trial, EXPERIMENTS[kind], replace(SETTINGS, release=release))
-    assert found["in_motion"] is free
+    trial, _ = filter_raw_trial(source, SETTINGS)
+    result = start_of(trial, EXPERIMENTS[kind], replace(SETTINGS, release=release))
+    assert result["in_motion"] is free
     if free:
-        assert not found["swaying"]
-        assert found["start"] == pytest.approx(1.0, abs=0.1)
+        assert not result["swaying"]
+        assert result["start"] == pytest.approx(1.0, abs=0.1)
 
 
 def test_gravity_is_against_up_in_the_frame_of_the_base():
     turned = np.tile([np.sqrt(0.5), np.sqrt(0.5), 0, 0], (FRAMES, 1))  # a quarter about x
-    trial, _ = filter_take(take(base_quaternions=turned), SETTINGS)
+    trial, _ = filter_raw_trial(take(base_quaternions=turned), SETTINGS)
     np.testing.assert_allclose(trial.gravity, [0, -STANDARD_GRAVITY, 0], atol=1e-9)

@@ -5,15 +5,15 @@ import pytest
 
 from tests.support.sessions import CURL_BEGIN, all_truths, instruments, motion_truth, pull_truth, record
 from trunkline.frames import tilt_of_gravity
-from trunkline.recordings.cleaning.checks import Limits
-from trunkline.recordings.cleaning.loading import take_in
-from trunkline.recordings.cleaning.sanity_checks import Plausible
-from trunkline.recordings.cleaning.session_checks import gather
-from trunkline.recordings.filtering.filter import Filter, filter_take
+from trunkline.recordings.cleaning.checks import TrialLimits
+from trunkline.recordings.cleaning.loading import load_raw_trials
+from trunkline.recordings.cleaning.sanity_checks import SanityLimits
+from trunkline.recordings.cleaning.session_checks import check_session
+from trunkline.recordings.filtering.filter import Filter, filter_raw_trial
 from trunkline.recordings.session.session import read_session
 
-LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
-PLAUSIBLE = Plausible(still=0.02, distance=0.1, pull=3.0, clock=0.1, otherwise="refuse")
+LIMITS = TrialLimits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
+PLAUSIBLE = SanityLimits(still=0.02, distance=0.1, pull=3.0, clock=0.1, otherwise="refuse")
 SETTINGS = Filter(rate=120, cutoff=20, order=4, longest_bridge=0.1, outlier_deviations=8, release="onset")
 
 
@@ -21,8 +21,8 @@ def test_static_pulls_motions_and_loads_come_through(tmp_path):
     pulls = (40.0, -20.0, -20.0)
     record(tmp_path, [*all_truths(), pull_truth(pulls, load=0.125), motion_truth(tilt_deg=50.0)], instruments())
     session = read_session(tmp_path)
-    gathered = gather(take_in(tmp_path, session, LIMITS), session, PLAUSIBLE, "stop", "here")
-    trials = {trial.name: trial for trial in (filter_take(take, SETTINGS)[0] for take in gathered.takes)}
+    gathered = check_session(load_raw_trials(tmp_path, session, LIMITS), session, PLAUSIBLE, "stop", "here")
+    trials = {trial.name: trial for trial in (filter_raw_trial(take, SETTINGS)[0] for take in gathered.takes)}
     pull, motion = trials["pull_40_-20_-20"], trials["motion_identify"]
     assert {name: trial.load for name, trial in trials.items() if trial.load} == {pull.name: 0.125}
     assert pull.positions.shape[0] == len(pull.commands) == 1

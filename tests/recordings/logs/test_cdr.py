@@ -93,8 +93,8 @@ def test_messages_that_do_not_fit_are_left_out(log):
     topic = log.topics["/tendon_states"]
     broken = [*topic.messages[:5], topic.messages[0][:-3], b"", b"\0\1\0\0" + b"\xff" * 60]
     definitions = parse_definition(topic.schema, topic.definition.decode())
-    kept = np.concatenate([rows for rows, _ in decode(broken, topic.schema, definitions)])
-    assert sorted(kept) == [0, 1, 2, 3, 4]
+    decoded = np.concatenate([rows for rows, _ in decode(broken, topic.schema, definitions)])
+    assert sorted(decoded) == [0, 1, 2, 3, 4]
 
 
 def test_definitions_with_constants_bounds_and_defaults():

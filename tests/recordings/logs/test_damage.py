@@ -12,14 +12,14 @@ from stages import ingest
 from tests.support.sessions import SEGMENTS, all_truths, curl_truth, instruments, record, release_truth, static_truth
 from tests.support.workbench import ROOT
 from trunkline.pipeline.stage import run_stage
-from trunkline.recordings.cleaning.checks import Limits
-from trunkline.recordings.cleaning.clock_offset import settle_vertical
-from trunkline.recordings.cleaning.label_swaps import find_swaps, usual_distances
-from trunkline.recordings.cleaning.loading import take_in
-from trunkline.recordings.cleaning.stale_poses import frozen
+from trunkline.recordings.cleaning.checks import TrialLimits
+from trunkline.recordings.cleaning.clock_offset import set_gravity_direction
+from trunkline.recordings.cleaning.label_swaps import find_label_swaps, usual_distances
+from trunkline.recordings.cleaning.loading import load_raw_trials
+from trunkline.recordings.cleaning.stale_poses import stale_samples
 from trunkline.recordings.session.session import read_session
 
-LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
+LIMITS = TrialLimits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
 CLEAN = instruments(occlusions_per_s=0.3, outliers=0)
 
 
@@ -39,9 +39,9 @@ def session(folder, change=None, truths=None, settings=CLEAN):
 
 
 def taken(folder):
-    found = read_session(folder)
-    _, takes, findings = zip(*take_in(folder, found, LIMITS), strict=True)
-    settle_vertical(takes, findings, found)
+    declared = read_session(folder)
+    _, takes, findings = zip(*load_raw_trials(folder, declared, LIMITS), strict=True)
+    set_gravity_direction(takes, findings, declared)
     return takes, findings
 
 
@@ -61,15 +61,15 @@ def test_of_three_discs_one_may_be_lost_as_another_takes_its_place():
     """As in a real log: disc 3 is at disc 1's place while nothing is said of disc 1, so two distances have to do."""
     discs = np.array([[0, 0, 0], [0, 0, -0.1], [0, 0, -0.2], [0, 0, -0.32]])
     swing = 0.1 * np.sin(np.linspace(0, 9, 200))[:, None, None] * np.array([1.0, 0, 0]) * [[0], [0.2], [0.5], [1]]
-    seen = discs + swing
-    usual = usual_distances([seen])
-    wrong = seen.copy()
-    wrong[50:56, 3], wrong[50:56, 1] = seen[50:56, 1], np.nan
-    wrong[90, 3], wrong[90, 1] = seen[90, 1], np.nan  # for a frame alone, it may be an outlier
-    (found,) = find_swaps(wrong, usual, marked_base=False)
-    assert (found.bodies, np.flatnonzero(found.frames).tolist()) == ((1, 3), list(range(50, 56)))
-    seen[60:70, 1] = np.nan
-    assert find_swaps(seen, usual, marked_base=False) == []
+    positions = discs + swing
+    usual = usual_distances([positions])
+    wrong = positions.copy()
+    wrong[50:56, 3], wrong[50:56, 1] = positions[50:56, 1], np.nan
+    wrong[90, 3], wrong[90, 1] = positions[90, 1], np.nan  # for a frame alone, it may be an outlier
+    (swap,) = find_label_swaps(wrong, usual, marked_base=False)
+    assert (swap.bodies, np.flatnonzero(swap.frames).tolist()) == ((1, 3), list(range(50, 56)))
+    positions[60:70, 1] = np.nan
+    assert find_label_swaps(positions, usual, marked_base=False) == []
 
 
 @pytest.mark.parametrize("frames", [slice(60, 110), slice(60, 61), slice(200, None), slice(0, 250)])
@@ -83,9 +83,9 @@ def test_bodies_taken_for_each_other_are_put_right(tmp_path, right, frames, bodi
 
     takes, findings = session(tmp_path / "wrong", swap)
     names = " and ".join(repr(("base", *SEGMENTS)[body]) for body in bodies)
-    (told,) = [line for line in findings[0].repairs if "taken for each other" in line]
-    assert told.startswith(f"{names} were taken for each other in ")
-    begin, end = map(float, told.partition(" between ")[2].removesuffix(" s, put right").split(" and "))
+    (repair,) = [line for line in findings[0].repairs if "taken for each other" in line]
+    assert repair.startswith(f"{names} were taken for each other in ")
+    begin, end = map(float, repair.partition(" between ")[2].removesuffix(" s, put right").split(" and "))
     times = takes[0].time[frames]
     assert begin == pytest.approx(times[0], abs=0.02)
     assert end == pytest.approx(times[-1], abs=0.02)
@@ -113,8 +113,8 @@ def test_rounds_of_four_are_told_too(bodies):
     usual, positions = usual_distances([right]), right.copy()
     wrong = np.isin(np.arange(300), [50, 51, 120])
     positions[np.ix_(wrong, bodies)] = right[np.ix_(wrong, [*bodies[1:], bodies[0]])]
-    assert find_swaps(right, usual) == []
-    for swap in find_swaps(positions, usual):
+    assert find_label_swaps(right, usual) == []
+    for swap in find_label_swaps(positions, usual):
         positions[np.ix_(swap.frames, [*swap.bodies[1:], swap.bodies[0]])] = positions[np.ix_(swap.frames, swap.bodies)]
     np.testing.assert_array_equal(positions, right)
 
@@ -125,7 +125,7 @@ def test_memory_for_finding_swaps_hardly_grows_with_the_rounds_that_are_tried():
     positions = np.linspace([0, 0, 0], [0, 0, -0.5], bodies) + np.random.default_rng(0).normal(0, 3e-4, (frames, 1, 3))
     usual = usual_distances([positions])
     tracemalloc.start()
-    find_swaps(positions, usual)
+    find_label_swaps(positions, usual)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 2 * 8 * frames * bodies**2
@@ -136,7 +136,7 @@ def test_nothing_is_swapped_where_nothing_was(tmp_path, truth):
     for seed in range(3):
         settings = instruments(occlusions_per_s=2.0, outliers=0.01)
         m = measure(truth, settings, np.random.default_rng(seed))
-        assert find_swaps(m.positions, usual_distances([m.positions])) == []
+        assert find_label_swaps(m.positions, usual_distances([m.positions])) == []
 
 
 def test_repeated_poses_are_dropped_as_frozen(tmp_path):
@@ -163,9 +163,9 @@ def test_rounded_and_constant_positions_are_not_frozen():
     rng = np.random.default_rng(0)
     noise = rng.normal(scale=3e-4, size=(600, 2, 3))
     rounded = np.round(noise, 3)
-    assert not frozen(rounded).any(), "noise of 0.3 mm rounded to 1 mm repeats itself"
-    assert not frozen(np.zeros((600, 2, 3))).any()
-    assert not frozen(noise).any()
+    assert not stale_samples(rounded).any(), "noise of 0.3 mm rounded to 1 mm repeats itself"
+    assert not stale_samples(np.zeros((600, 2, 3))).any()
+    assert not stale_samples(noise).any()
 
 
 @pytest.mark.parametrize(("factor", "declared", "taken_as"), [(1000.0, "m", "mm"), (1.0, "mm", "m")])
@@ -181,21 +181,21 @@ def test_wrong_unit_is_recognised(tmp_path, factor, declared, taken_as):
     write_session(folder, measured, CLEAN)
     edit(folder, "unit: m}", f"unit: {declared}}}")
     takes, findings = taken(folder)
-    for one, other, found in zip(takes, right, findings, strict=True):
-        np.testing.assert_allclose(one.positions, other.positions, rtol=1e-12)
-        assert f"are no arm in {declared}, as declared; taken as {taken_as}" in found.repairs[0]
+    for take, expected, remarks in zip(takes, right, findings, strict=True):
+        np.testing.assert_allclose(take.positions, expected.positions, rtol=1e-12)
+        assert f"are no arm in {declared}, as declared; taken as {taken_as}" in remarks.repairs[0]
 
 
 def test_wrong_vertical_is_put_right_by_the_tilts(tmp_path):
     truths = [static_truth(0.0), static_truth(30.0), static_truth(60.0), release_truth()]
     takes, findings = session(tmp_path, truths=truths)
-    assert [found.repairs + found.warnings for found in findings] == [[]] * 4
+    assert [remarks.repairs + remarks.warnings for remarks in findings] == [[]] * 4
     edit(tmp_path, "up: [0, 1, 0]", "up: [0, 0, 1]")
     takes, findings = taken(tmp_path)
-    for take, found in zip(takes, findings, strict=True):
+    for take, remarks in zip(takes, findings, strict=True):
         np.testing.assert_array_equal(take.up, [0, 1, 0])
-        assert "with [0, 0, 1]" in found.repairs[-1]
-        assert "with [0, 1, 0], which was taken" in found.repairs[-1]
+        assert "with [0, 0, 1]" in remarks.repairs[-1]
+        assert "with [0, 1, 0], which was taken" in remarks.repairs[-1]
 
 
 def test_wrong_levels_are_named_and_change_nothing(tmp_path):
@@ -203,16 +203,16 @@ def test_wrong_levels_are_named_and_change_nothing(tmp_path):
     for old, new in (("level: 30", "level: 85"), ("level: 0", "level: 50"), ("level: 60", "level: 10")):
         edit(tmp_path, old, new)
     takes, findings = taken(tmp_path)
-    assert all(found.repairs == [] and "no other axis fits" in found.warnings[0] for found in findings)
+    assert all(remarks.repairs == [] and "no other axis fits" in remarks.warnings[0] for remarks in findings)
     np.testing.assert_array_equal(takes[0].up, [0, 1, 0])
 
 
 def test_releases_alone_only_warn_of_a_wrong_vertical(tmp_path):
     session(tmp_path, truths=[release_truth()])
     edit(tmp_path, "up: [0, 1, 0]", "up: [0, 0, 1]")
-    takes, (found,) = taken(tmp_path)
-    assert "released arms come to rest" in found.warnings[0]
-    assert "with [0, 1, 0]: check `frame.up`" in found.warnings[0]
+    takes, (findings,) = taken(tmp_path)
+    assert "released arms come to rest" in findings.warnings[0]
+    assert "with [0, 1, 0]: check `frame.up`" in findings.warnings[0]
     np.testing.assert_array_equal(takes[0].up, [0, 0, 1])
 
 
@@ -227,4 +227,4 @@ def test_the_report_names_what_was_found(tmp_path, monkeypatch, capsys):
     for trial in report.values():
         assert "which was taken" in trial["repairs"][-1]
         assert abs(trial["stamps_over_log_times"]["drift_ppm"]) < 2000
-        assert any("the vertical is by the tilts of other splits too" in said for said in trial["warnings"])
+        assert any("the vertical is by the tilts of other splits too" in warning for warning in trial["warnings"])

@@ -58,13 +58,13 @@ def test_intact_log_equals_the_reference_reader(tmp_path, compression, options):
             (c.topic, m.log_time, m.data)
             for _, c, m in make_reader(file, validate_crcs=True).iter_messages()
         ]
-    found = [
+    result = [
         (t.name, time, data)
         for t in log.topics.values()
         for time, data in zip(t.log_times, t.messages, strict=True)
     ]
-    assert sorted(found) == sorted(reference)
-    assert len(found) == COUNT
+    assert sorted(result) == sorted(reference)
+    assert len(result) == COUNT
     assert log.damage == []
 
 
@@ -77,9 +77,9 @@ def damaged(tmp_path, data: bytes):
 def test_truncated_log_keeps_its_beginning(tmp_path, whole):
     data, expected = whole
     log = damaged(tmp_path, data[: len(data) // 2])
-    found = messages(log)
-    assert found == {time: expected[time] for time in sorted(expected)[: len(found)]}
-    assert 20 < len(found) < 80
+    result = messages(log)
+    assert result == {time: expected[time] for time in sorted(expected)[: len(result)]}
+    assert 20 < len(result) < 80
     assert "cut off" in log.damage[0]
 
 
@@ -96,10 +96,10 @@ def test_damaged_chunk_is_left_out_and_its_loss_counted(tmp_path, whole):
     broken = bytearray(data)
     broken[chunk.chunk_start_offset + chunk.chunk_length - 9] ^= 0x10
     log = damaged(tmp_path, bytes(broken))
-    found = messages(log)
-    assert found.items() < expected.items()
-    assert max(found) == max(expected), "chunks behind the damaged one are intact"
-    assert log.damage[-1] == f"{COUNT - len(found)} of {COUNT} messages lost"
+    result = messages(log)
+    assert result.items() < expected.items()
+    assert max(result) == max(expected), "chunks behind the damaged one are intact"
+    assert log.damage[-1] == f"{COUNT - len(result)} of {COUNT} messages lost"
 
 
 @settings(max_examples=150, deadline=None)
@@ -112,10 +112,10 @@ def test_any_flipped_bit_never_changes_a_message_unnoticed(tmp_path_factory, who
         log = damaged(tmp_path_factory.getbasetemp(), bytes(broken))
     except InputError:
         return
-    found = messages(log)
-    assert found.items() <= expected.items() or log.damage
-    assert {time: data for time, data in found.items() if time in expected}.items() <= expected.items()
-    if len(found) < len(expected):
+    result = messages(log)
+    assert result.items() <= expected.items() or log.damage
+    assert {time: data for time, data in result.items() if time in expected}.items() <= expected.items()
+    if len(result) < len(expected):
         assert log.damage
 
 
@@ -125,11 +125,11 @@ def test_any_truncation_gives_a_prefix_or_a_refusal(tmp_path_factory, whole, sha
     data, expected = whole
     cut = int(share * len(data))
     try:
-        found = messages(damaged(tmp_path_factory.getbasetemp(), data[:cut]))
+        result = messages(damaged(tmp_path_factory.getbasetemp(), data[:cut]))
     except InputError:
-        found = {}
+        result = {}
         assert cut < 8
-    assert found == {time: expected[time] for time in sorted(expected)[: len(found)]}
+    assert result == {time: expected[time] for time in sorted(expected)[: len(result)]}
 
 
 def test_chunk_that_no_longer_looks_like_one_is_missed(tmp_path):
@@ -179,8 +179,8 @@ def test_another_schema_on_a_topic_is_left_out_and_said(tmp_path):
     log = two_channels(tmp_path / "log.mcap", ("a_msgs/msg/A", "a_msgs/msg/B"))
     assert log.topics["/a"].schema == "a_msgs/msg/A"
     assert log.topics["/a"].messages == [bytes([number]) for number in range(30) if number % 3]
-    (said,) = log.damage
-    assert "/a: 10 messages of another schema (a_msgs/msg/B, cdr) left out, 20 are a_msgs/msg/A" in said
+    (damage,) = log.damage
+    assert "/a: 10 messages of another schema (a_msgs/msg/B, cdr) left out, 20 are a_msgs/msg/A" in damage
 
 
 def write_at(path: Path, times: list[int], **options) -> None:

@@ -16,13 +16,13 @@ from mcap.writer import CompressionType, Writer
 
 from tests.support.sessions import curl_truth, instruments, record
 from trunkline.errors import InputError
-from trunkline.recordings.cleaning.checks import Limits
-from trunkline.recordings.cleaning.loading import take_in
+from trunkline.recordings.cleaning.checks import TrialLimits
+from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.logs.log import read_log
 from trunkline.recordings.logs.records import MAGIC
 from trunkline.recordings.session.session import read_session
 
-LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
+LIMITS = TrialLimits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
 POSES, PULLS = {"/rigid_bodies"}, {"/tendon_commands", "/tendon_states"}
 ENOUGH = 1e9  # ns of poses and pulls, with which no trial is refused
 FOOTER = b"\x02" + (20).to_bytes(8, "little") + bytes(20) + MAGIC
@@ -49,11 +49,11 @@ def log(request, folder):
         channels = {}
         for schema, channel, message in make_reader(BytesIO(original)).iter_messages():
             if channel.topic not in channels:
-                known = writer.register_schema(schema.name, schema.encoding, schema.data)
-                channels[channel.topic] = writer.register_channel(channel.topic, "cdr", known)
+                schema_id = writer.register_schema(schema.name, schema.encoding, schema.data)
+                channels[channel.topic] = writer.register_channel(channel.topic, "cdr", schema_id)
             writer.add_message(channels[channel.topic], message.log_time, message.data, message.publish_time)
         writer.finish()
-    data, ((_, take, findings),) = path.read_bytes(), take_in(folder, read_session(folder), LIMITS)
+    data, ((_, take, findings),) = path.read_bytes(), load_raw_trials(folder, read_session(folder), LIMITS)
     assert findings.repairs == []
     whole = messages(path)
     yield data, whole, take
@@ -81,14 +81,14 @@ def trusted(data: bytes) -> list[tuple[str, int, bytes]]:
 
     It gives a chunk whole or not at all.
     """
-    topics, found = {}, []
+    topics, records = {}, []
     with suppress(Exception):  # whatever it raises, it goes no further
         for record in StreamReader(BytesIO(data), validate_crcs=True).records:
             if isinstance(record, Channel):
                 topics[record.id] = record.topic
             elif isinstance(record, Message):
-                found.append((record.channel_id, record.log_time, record.data))
-    return [(topics[channel], time, data) for channel, time, data in found if channel in topics]
+                records.append((record.channel_id, record.log_time, record.data))
+    return [(topics[channel], time, data) for channel, time, data in records if channel in topics]
 
 
 def before(damaged: bytes, data: bytes) -> bytes:
@@ -143,20 +143,20 @@ def test_messages_are_the_original_ones_or_the_loss_is_said(folder, log, data):
     last = data.draw(st.sampled_from(DAMAGES)) if broken is whole else flip
     damaged = last(broken, data.draw)
     path.write_bytes(damaged)
-    kept = set(trusted(before(damaged, broken) if last in (truncate, flip) else damaged))
+    expected_left = set(trusted(before(damaged, broken) if last in (truncate, flip) else damaged))
     try:
-        said, refusal = read_log(path).damage, "none"
+        reported, refusal = read_log(path).damage, "none"
     except InputError as error:
         refusal = str(error)
     if refusal != "none":
         assert "curl_40.mcap" in refusal
-        assert not kept, "refused, though another reader finds messages"
+        assert not expected_left, "refused, though another reader finds messages"
         return
-    found = messages(path)
-    assert len(found) == len(set(found))
-    assert set(found) <= set(expected) or said
-    assert found == expected or said
-    assert kept <= set(found)
+    result = messages(path)
+    assert len(result) == len(set(result))
+    assert set(result) <= set(expected) or reported
+    assert result == expected or reported
+    assert expected_left <= set(result)
 
 
 @AGAIN
@@ -166,21 +166,21 @@ def test_a_trial_is_refused_or_holds_measured_poses_only(folder, log, data):
     damage = data.draw(st.sampled_from(DAMAGES))
     broken = damage(whole, data.draw)
     (folder / "curl_40.mcap").write_bytes(broken)
-    kept = trusted(before(broken, whole) if damage in (truncate, flip) else broken)
-    ((_, found, findings),) = take_in(folder, read_session(folder), LIMITS)
-    poses, pulls = ([t for name, t, _ in set(kept) if name in names] for names in (POSES, PULLS))
-    if isinstance(found, InputError):
-        assert "curl_40.mcap" in str(found)
-        assert "\n" not in str(found)
+    expected_left = trusted(before(broken, whole) if damage in (truncate, flip) else broken)
+    ((_, result, findings),) = load_raw_trials(folder, read_session(folder), LIMITS)
+    poses, pulls = ([t for name, t, _ in set(expected_left) if name in names] for names in (POSES, PULLS))
+    if isinstance(result, InputError):
+        assert "curl_40.mcap" in str(result)
+        assert "\n" not in str(result)
         assert min(np.ptp(poses), np.ptp(pulls)) < ENOUGH if poses and pulls else True
         return
     rows = {row.tobytes() for row in take.positions}
-    assert {row.tobytes() for row in found.positions} <= rows
-    assert len(found.positions) >= len(poses)
-    if len(found.positions) < len(take.positions):
+    assert {row.tobytes() for row in result.positions} <= rows
+    assert len(result.positions) >= len(poses)
+    if len(result.positions) < len(take.positions):
         assert findings.repairs[0].startswith("log: ")
     else:
-        np.testing.assert_array_equal(found.time, take.time)
+        np.testing.assert_array_equal(result.time, take.time)
 
 
 @pytest.mark.parametrize("damage", [drop_summary, duplicate, reorder])

@@ -18,8 +18,8 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.sessions import curl_truth, instruments, record
 from trunkline.errors import InputError
-from trunkline.recordings.cleaning.checks import Limits
-from trunkline.recordings.cleaning.loading import take_in
+from trunkline.recordings.cleaning.checks import TrialLimits
+from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.logs.definitions import HEADER, MARKERS, RIGID_BODIES, SEPARATOR
 from trunkline.recordings.session.session import Session, read_session
 from trunkline.recordings.session.source import open_log
@@ -86,12 +86,12 @@ def pose(frame, body):
     }
 
 
-def seen(frame):
+def expected_poses(frame):
     return [body for body in range(3) if not HIDDEN[frame, body]]
 
 
 def named_poses(frame):
-    poses = [{"name": BODIES[body], "pose": pose(frame, body)} for body in seen(frame)]
+    poses = [{"name": BODIES[body], "pose": pose(frame, body)} for body in expected_poses(frame)]
     return [("/poses", {"header": header(STAMPS[frame]), "poses": poses})]
 
 
@@ -102,7 +102,7 @@ def stamped_poses(frame):
             f"/vrpn/{BODIES[body]}/pose",
             {"header": header(STAMPS[frame] + 1000 * body), "pose": pose(frame, body)},
         )
-        for body in seen(frame)
+        for body in expected_poses(frame)
     ]
 
 
@@ -121,7 +121,7 @@ def transforms(frame):
                 "rotation": rotation(QUATERNIONS[frame, body]),
             },
         }
-        for body in seen(frame)
+        for body in expected_poses(frame)
     ]
 
 
@@ -148,7 +148,7 @@ def markers(frame):
                         "marker_name": "base" if body == 0 else "",
                         "translation": point(POSITIONS[frame, body]),
                     }
-                    for body in seen(frame)
+                    for body in expected_poses(frame)
                 ],
             },
         )
@@ -170,11 +170,11 @@ def foxglove_transform(frame, body):
 
 
 def foxglove_transforms(frame):
-    return [("/tf", {"transforms": [foxglove_transform(frame, body) for body in seen(frame)]})]
+    return [("/tf", {"transforms": [foxglove_transform(frame, body) for body in expected_poses(frame)]})]
 
 
 def foxglove_transforms_apart(frame):
-    return [("/tf", foxglove_transform(frame, body)) for body in seen(frame)]
+    return [("/tf", foxglove_transform(frame, body)) for body in expected_poses(frame)]
 
 
 def foxglove_poses(frame):
@@ -188,7 +188,7 @@ def foxglove_pose(frame):
             f"/mocap/{BODIES[body]}",
             {"timestamp": foxglove_time(frame), "frame_id": "mocap", "pose": pose(frame, body)},
         )
-        for body in seen(frame)
+        for body in expected_poses(frame)
     ]
 
 
@@ -325,10 +325,10 @@ def test_topics_can_be_given_by_body(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("encoding", "schema_encoding", "found"),
+    ("encoding", "schema_encoding", "encoding_found"),
     [("ros1", "ros1msg", "encoding 'ros1'"), ("cdr", "ros2idl", "schema in 'ros2idl'")],
 )
-def test_other_encodings_are_refused_by_name(tmp_path, encoding, schema_encoding, found):
+def test_other_encodings_are_refused_by_name(tmp_path, encoding, schema_encoding, encoding_found):
     path = tmp_path / "log.mcap"
     with open(path, "wb") as file:
         writer = Writer(file)
@@ -337,7 +337,7 @@ def test_other_encodings_are_refused_by_name(tmp_path, encoding, schema_encoding
         channel = writer.register_channel("/poses", encoding, schema)
         writer.add_message(channel, 0, b"\0\1\0\0", 0)
         writer.finish()
-    with pytest.raises(InputError, match=rf"log\.mcap: /poses: found (a )?{found}"):
+    with pytest.raises(InputError, match=rf"log\.mcap: /poses: found (a )?{encoding_found}"):
         open_log(path, a_session())
 
 
@@ -357,19 +357,19 @@ def rewrite_motors(source, target):
 
 def test_float_arrays_count_by_log_time(tmp_path):
     record(tmp_path, [curl_truth()], instruments())
-    limits = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
-    ((_, stamped, _),) = take_in(tmp_path, read_session(tmp_path), limits)
+    limits = TrialLimits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
+    ((_, stamped, _),) = load_raw_trials(tmp_path, read_session(tmp_path), limits)
     log = tmp_path / "curl_40.mcap"
     original = log.rename(tmp_path / "original.log")
     rewrite_motors(original, log)
-    ((_, refused, _),) = take_in(tmp_path, read_session(tmp_path), limits)
+    ((_, refused, _),) = load_raw_trials(tmp_path, read_session(tmp_path), limits)
     assert "/tendon_commands: found 3 numbers without names, expected `tendons`" in str(refused)
     with open(tmp_path / "session.yaml", "a") as file:
         file.write("tendons: [tendon_1, tendon_2, tendon_3]\n")
-    ((_, take, found),) = take_in(tmp_path, read_session(tmp_path), limits)
+    ((_, take, findings),) = load_raw_trials(tmp_path, read_session(tmp_path), limits)
     assert take.tendons == stamped.tendons
     # the recorder dates all messages by one clock, so that of the offset of 137 ms only the delivery's jitter is left
     pulls = np.interp(take.command_time, stamped.command_time - 0.137, stamped.commands[:, 0])
     np.testing.assert_allclose(take.commands[:, 0], pulls, atol=2e-3)
-    assert found.by_log_times.offset == pytest.approx(0, abs=0.02)
+    assert findings.by_log_times.offset == pytest.approx(0, abs=0.02)
     assert abs(take.command_time[0]) < 0.02

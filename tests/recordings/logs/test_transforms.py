@@ -167,7 +167,7 @@ def test_a_parent_that_is_turned_by_no_rotation_places_nothing(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("links", "name", "found"),
+    ("links", "name", "message"),
     [
         ([("a", "b"), ("b", "c"), ("c", "a")], None, "found a cycle of frames, b in a in c in b, expected a tree"),
         ([("mocap", "base"), ("base", "tip"), ("lab", "tip")], None, "found 'tip' in the frames base and lab"),
@@ -176,12 +176,12 @@ def test_a_parent_that_is_turned_by_no_rotation_places_nothing(tmp_path):
         ([("mocap", "base")], "room", "found poses in the frames mocap, expected 'room', as in session.yaml"),
     ],
 )
-def test_frames_that_are_no_tree_are_refused_by_name(tmp_path, links, name, found):
+def test_frames_that_are_no_tree_are_refused_by_name(tmp_path, links, name, message):
     path = tmp_path / "log.mcap"
     write(path, [("/tf", [link(STAMPS[i], *pair, at(i, 0))]) for i in range(COUNT) for pair in links])
     with pytest.raises(InputError) as caught:
         open_log(path, a_session(frame={"up": [0, 0, 1], "name": name}))
-    assert f"{path}: /tf: {found}" in str(caught.value)
+    assert f"{path}: /tf: {message}" in str(caught.value)
 
 
 def test_of_several_trees_the_named_one_counts(tmp_path):

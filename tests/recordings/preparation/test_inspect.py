@@ -10,36 +10,36 @@ import pytest
 from tests.recordings.logs.test_schemas import CASES, write_foxglove, write_ros
 from tests.support.sessions import SEGMENTS, all_truths, instruments, motion_truth, pull_truth, record
 from tests.support.workbench import ROOT
-from trunkline.recordings.cleaning.checks import Limits
-from trunkline.recordings.cleaning.loading import take_in
+from trunkline.recordings.cleaning.checks import TrialLimits
+from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.preparation.inspect import main
 from trunkline.recordings.session.session import read_session
 
-LIMITS = Limits(duration=0.2, coverage=0.3, disorder=0.1, clock_offset=1.0)
+LIMITS = TrialLimits(duration=0.2, coverage=0.3, disorder=0.1, clock_offset=1.0)
 
 
 def inspect(capsys, *paths) -> tuple[str, str]:
     """(description, proposed session.yaml)"""
     assert main([str(path) for path in paths]) == 0
-    said, proposed = capsys.readouterr().out.split("Proposed session.yaml:\n")
-    return said, proposed
+    described, proposed = capsys.readouterr().out.split("Proposed session.yaml:\n")
+    return described, proposed
 
 
 def test_a_lab_session_is_described_and_its_proposal_is_the_session(tmp_path, capsys):
     record(tmp_path, [*all_truths(), pull_truth(), motion_truth()], instruments())
     right = read_session(tmp_path)
-    said, proposed = inspect(capsys, tmp_path)
-    assert "mocap4r2_msgs/msg/RigidBodies (cdr), poses: " in said
-    assert "tilt_60.mcap" in said
+    described, proposed = inspect(capsys, tmp_path)
+    assert "mocap4r2_msgs/msg/RigidBodies (cdr), poses: " in described
+    assert "tilt_60.mcap" in described
     for name in ("base", *SEGMENTS):
-        assert f"    {name:7}  seen in " in said
+        assert f"    {name:7}  seen in " in described
     (tmp_path / "session.yaml").write_text(proposed)
     session = read_session(tmp_path)
     assert session.frame.up == (0, 1, 0)
     assert (session.base, session.clock, session.topics) == (right.base, right.clock, right.topics)
-    found = {trial.file: (trial.experiment, trial.level) for trial in session.trials}
-    assert found == {trial.file: (trial.experiment, trial.level) for trial in right.trials}
-    assert all(not isinstance(take, Exception) for _, take, _ in take_in(tmp_path, session, LIMITS))
+    experiments = {trial.file: (trial.experiment, trial.level) for trial in session.trials}
+    assert experiments == {trial.file: (trial.experiment, trial.level) for trial in right.trials}
+    assert all(not isinstance(take, Exception) for _, take, _ in load_raw_trials(tmp_path, session, LIMITS))
 
 
 def test_it_says_what_it_cannot_know(tmp_path, capsys):
@@ -47,11 +47,11 @@ def test_it_says_what_it_cannot_know(tmp_path, capsys):
     truth = motion_truth()
     motors = tuple(f"m{number + 1}" for number in range(len(truth.tendons)))
     record(tmp_path, [replace(truth, tendons=motors)], instruments())
-    said = inspect(capsys, tmp_path)[1].splitlines()
-    assert sum("no log tells it of a mount that is turned" in line for line in said) == 1
-    (told,) = [line for line in said if "`motors` is to say what each winds in" in line]
-    assert told.startswith("#")
-    assert "m1, m2, m3" in told
+    lines = inspect(capsys, tmp_path)[1].splitlines()
+    assert sum("no log tells it of a mount that is turned" in line for line in lines) == 1
+    (comment,) = [line for line in lines if "`motors` is to say what each winds in" in line]
+    assert comment.startswith("#")
+    assert "m1, m2, m3" in comment
 
 
 def test_experiments_are_told_apart_without_names(tmp_path, capsys):
@@ -81,7 +81,7 @@ def test_every_schema_gets_a_proposal_that_is_read(tmp_path, capsys, encoding, k
     if kind == "markers":
         assert session.base == "base"
     else:
-        ((_, take, _),) = take_in(tmp_path, session, LIMITS)
+        ((_, take, _),) = load_raw_trials(tmp_path, session, LIMITS)
         assert len(take.segments) == 2, take
         assert np.isfinite(take.positions).any()
 

@@ -8,14 +8,14 @@ import pytest
 from demo.instruments import measure
 from tests.support.sessions import SEGMENTS, instruments, release_truth
 from trunkline.errors import InputError
-from trunkline.recordings.cleaning.checks import Limits
-from trunkline.recordings.cleaning.loading import take_in
+from trunkline.recordings.cleaning.checks import TrialLimits
+from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.preparation.export import read_export
 from trunkline.recordings.preparation.motive import main
 from trunkline.recordings.session.session import read_session
 
 BODIES = ("base", *SEGMENTS)
-LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
+LIMITS = TrialLimits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +63,7 @@ def test_an_export_becomes_a_session_that_is_ingested(tmp_path, measured, unit, 
     assert main(["--session", str(tmp_path / "session"), str(path)]) == 0
     session = read_session(tmp_path / "session")
     assert (session.frame.up, session.frame.unit, session.base, session.clock) == ((0, 1, 0), "m", "base", "frame")
-    ((_, take, findings),) = take_in(tmp_path / "session", session, LIMITS)
+    ((_, take, findings),) = load_raw_trials(tmp_path / "session", session, LIMITS)
     assert take.segments == SEGMENTS
     assert take.experiment == "release"
     assert findings.repairs == []
@@ -77,10 +77,10 @@ def test_decimal_commas_between_semicolons(tmp_path, measured):
     path = write(tmp_path / "release_1.csv", measured)
     text = path.read_text(encoding="utf-8-sig")
     (tmp_path / "german.csv").write_text(text.replace(",", ";").replace(".", ","), encoding="utf-8-sig")
-    expected, found = read_export(path), read_export(tmp_path / "german.csv")
-    assert found.names == expected.names
-    np.testing.assert_array_equal(found.positions, expected.positions)
-    np.testing.assert_array_equal(found.stamps, expected.stamps)
+    expected, result = read_export(path), read_export(tmp_path / "german.csv")
+    assert result.names == expected.names
+    np.testing.assert_array_equal(result.positions, expected.positions)
+    np.testing.assert_array_equal(result.stamps, expected.stamps)
 
 
 def test_markers_alone_become_positions_alone(tmp_path, measured):
@@ -90,7 +90,7 @@ def test_markers_alone_become_positions_alone(tmp_path, measured):
         "frame: {up: [0, 1, 0]}\nbase: {position: [0, 0, 0]}\ntrials:\n"
         "  - {file: swing.mcap, experiment: release, split: identify}\n"
     )
-    ((_, take, _),) = take_in(tmp_path / "session", read_session(tmp_path / "session"), LIMITS)
+    ((_, take, _),) = load_raw_trials(tmp_path / "session", read_session(tmp_path / "session"), LIMITS)
     assert take.quaternions is None
     np.testing.assert_allclose(take.positions, measured.positions, atol=1e-8)
 

@@ -10,9 +10,9 @@ from trunkline.recordings.signals.runs import lasting, stretches
 FLAGS = np.array([1, 1, 0, 1, 1, 1, 0, 0, 1], bool)
 
 
-@pytest.mark.parametrize(("least", "kept"), [(1, [0, 1, 3, 4, 5, 8]), (2, [0, 1, 3, 4, 5]), (3, [3, 4, 5]), (4, [])])
-def test_a_run_lasts_or_goes_whole_also_at_the_ends(least, kept):
-    assert np.flatnonzero(lasting(FLAGS, least)).tolist() == kept
+@pytest.mark.parametrize(("least", "rows"), [(1, [0, 1, 3, 4, 5, 8]), (2, [0, 1, 3, 4, 5]), (3, [3, 4, 5]), (4, [])])
+def test_a_run_lasts_or_goes_whole_also_at_the_ends(least, rows):
+    assert np.flatnonzero(lasting(FLAGS, least)).tolist() == rows
 
 
 def test_stretches_name_first_and_last():

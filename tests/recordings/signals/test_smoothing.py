@@ -49,17 +49,17 @@ def test_outliers_are_found_and_fast_motion_is_not():
 
 def test_resampling_bridges_jitter_and_short_gaps():
     rng = np.random.default_rng(4)
-    seen = np.ones(600, bool)
-    seen[200:206] = False  # 58 ms between the neighbours
-    time = (TIME + rng.normal(scale=1e-3, size=600))[seen]
+    visible = np.ones(600, bool)
+    visible[200:206] = False  # 58 ms between the neighbours
+    time = (TIME + rng.normal(scale=1e-3, size=600))[visible]
     error = np.linalg.norm(resample(time, swing(time), TIME) - swing(TIME), axis=1)
     assert error[5:-5].max() < 2e-4
 
 
 def test_only_long_gaps_and_ends_are_not_trusted():
-    seen = np.ones(600, bool)
-    seen[200:206] = seen[300:330] = seen[590:] = False
-    trusted = bridged(TIME[seen], TIME, 0.06)
+    visible = np.ones(600, bool)
+    visible[200:206] = visible[300:330] = visible[590:] = False
+    trusted = bridged(TIME[visible], TIME, 0.06)
     assert np.flatnonzero(~trusted).tolist() == [*range(300, 330), *range(590, 600)]
 
 

@@ -22,8 +22,8 @@ def test_no_two_kinds_have_the_same_words():
     words = [word for kind in EXPERIMENTS.values() for word in kind.words]
     assert len(words) == len(set(words))
     assert len({kind.plural for kind in EXPERIMENTS.values()}) == len(EXPERIMENTS), "tables tell kinds by it"
-    told = {name: (kind.needs_motors, kind.static) for name, kind in EXPERIMENTS.items()}
-    assert {(True, False), (False, True), (False, False)} <= set(told.values()), "what a log without a word can be"
+    signs = {name: (kind.needs_motors, kind.static) for name, kind in EXPERIMENTS.items()}
+    assert {(True, False), (False, True), (False, False)} <= set(signs.values()), "what a log without a word can be"
 
 
 def test_a_name_that_is_no_experiment_is_told_which_there_are():

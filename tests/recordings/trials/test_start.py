@@ -20,10 +20,10 @@ def ring_down(release: float, noise: float, seed: int, hand: float = 0.0, durati
     since = np.clip(time - release, 0, None)
     omega, decay = 2 * np.pi * 1.3, 1.0
     swing = np.exp(-decay * since) * (np.cos(omega * since) + decay / omega * np.sin(omega * since))
-    held = hand * (np.minimum(time, release) + np.exp(-decay * since) * np.sin(omega * since) / omega)
+    pushed = hand * (np.minimum(time, release) + np.exp(-decay * since) * np.sin(omega * since) / omega)
     along = np.array([0.05, 0.12, 0.2])
     positions = np.zeros((len(time), 3, 3))
-    positions[..., 0] = (swing + held[:, None].T[0] / 0.2)[:, None] * along
+    positions[..., 0] = (swing + pushed[:, None].T[0] / 0.2)[:, None] * along
     positions += np.random.default_rng(seed).normal(scale=noise, size=positions.shape)
     return time, smooth(positions.reshape(len(time), -1)).reshape(positions.shape)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from trunkline.errors import InputError
-from trunkline.recordings.trials.raw_trial import Take, read_takes, write_takes
+from trunkline.recordings.trials.raw_trial import RawTrial, read_takes, write_takes
 from trunkline.recordings.trials.splits import SPLITS
 from trunkline.recordings.trials.trial import Trial, read_trials, write_trials
 
@@ -34,7 +34,7 @@ def trial(name, frames, segments, tendons, oriented):
 
 
 def take(name, frames, segments, tendons, commands, oriented):
-    return Take(
+    return RawTrial(
         name=name,
         experiment="release",
         split="validate",
@@ -70,14 +70,14 @@ def take(name, frames, segments, tendons, commands, oriented):
 )
 def test_round_trip(tmp_path, rows, write, read):
     write(tmp_path, rows)
-    found = read(tmp_path, SPLITS)
-    assert len(found) == len(rows)
-    for one, other in zip(rows, found, strict=True):
-        for key, value in vars(one).items():
+    result = read(tmp_path, SPLITS)
+    assert len(result) == len(rows)
+    for row, copy in zip(rows, result, strict=True):
+        for key, value in vars(row).items():
             if isinstance(value, np.ndarray):
-                np.testing.assert_array_equal(getattr(other, key), value, err_msg=key)
+                np.testing.assert_array_equal(getattr(copy, key), value, err_msg=key)
             else:
-                assert getattr(other, key) == value, key
+                assert getattr(copy, key) == value, key
 
 
 @pytest.mark.parametrize(("read", "stage"), [(read_takes, "ingest"), (read_trials, "filter")])

@@ -23,7 +23,7 @@ from trunkline.identification.uncertainty.identifiability import (
     unidentifiable,
 )
 from trunkline.recordings.trials.inventory import missing_lines, recorded_lines
-from trunkline.recordings.trials.raw_trial import Take
+from trunkline.recordings.trials.raw_trial import RawTrial
 from trunkline.recordings.trials.trial import Trial, write_trials
 from trunkline.tools.preflight.__main__ import main
 from trunkline.tools.preflight.up_axis import other_ups, up_lines
@@ -159,14 +159,14 @@ def test_no_other_up_is_looked_for_where_none_can_be_right(model):
     assert other_ups([monday, friday]) == {}
 
 
-def mounted(trial: Trial, base: Rotation, up: tuple[float, ...], noise: float = 0.0, session: str = "") -> Take:
+def mounted(trial: Trial, base: Rotation, up: tuple[float, ...], noise: float = 0.0, session: str = "") -> RawTrial:
     """As much of the take of a trial as tells its base: turned by `base`, as cameras see it with noise, in a frame of
     which `up` is up."""
     ones = np.ones((4, 1))
     fields = {"name": trial.name, "session": session, "up": np.array(up, float),
               "base_positions": 0 * ones * np.ones(3),
               "base_quaternions": ones * wxyz_from_rotation(base) + noise * np.eye(4)}  # fmt: skip
-    return cast(Take, SimpleNamespace(**fields))
+    return cast(RawTrial, SimpleNamespace(**fields))
 
 
 def test_the_expected_width_is_that_of_fits_to_trials_that_are_off_so(model):

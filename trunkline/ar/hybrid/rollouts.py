@@ -27,7 +27,7 @@ from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields
 from trunkline.identification.parameters.saving import ELEMENTS
 from trunkline.kinematics.panda.shipped import JOINTS
-from trunkline.model.elements import actuators, give_way
+from trunkline.model.elements import actuators, unload_branches
 from trunkline.model.simulation.motion import batch_of, hold, move
 from trunkline.model.simulation.winch import Winches
 
@@ -231,7 +231,7 @@ def _place(
         places[:] = start
     else:
         places[:, model.jnt_qposadr[panda_joints(model)]] = trajectory.joints[0]
-        give_way(model, places)
+        unload_branches(model, places)
     joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, "object")
     if joint < 0:
         return

@@ -30,7 +30,7 @@ from trunkline.ar.teleop.trajectory import MotionLimits
 from trunkline.compute.processes import leave_signals_to_parent, parent_pid
 from trunkline.kinematics.panda.shipped import JOINTS
 from trunkline.model.elements import actuators
-from trunkline.model.simulation.capstan import REFRESH, rubbing
+from trunkline.model.simulation.capstan import REFRESH, capstan_friction_of
 from trunkline.model.simulation.motion import batch_of, hold
 from trunkline.model.simulation.winch import Winches
 
@@ -81,7 +81,7 @@ class Plant:
         controls[:, self._motors] = self._commands = simulation.commands
         controls[:, self._servos] = self._servo = self._sent(simulation.joints)
         hold(self.batch, model, controls)
-        self._winches, self._rub = Winches(self.batch, controls[:, self._motors]), rubbing(self.batch)
+        self._winches, self._rub = Winches(self.batch, controls[:, self._motors]), capstan_friction_of(self.batch)
         if self._rub is not None:
             self._rub.begin(self._own)
 

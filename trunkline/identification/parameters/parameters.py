@@ -28,12 +28,12 @@ from trunkline.model.elements import (
     cables,
     diagonal_lengths,
     elements,
-    holes,
+    hole_tendons,
     numbers_place,
     numeric,
     numeric_place,
 )
-from trunkline.recordings.trials.experiments import Kind
+from trunkline.recordings.trials.experiments import ExperimentKind
 
 SHORTEST = 1e-6  # m; a unit whose ends are nearer to each other has no line along which its hinges may move
 Fields = dict[str, np.ndarray]  # name of an MjModel field → its values per candidate, (candidates, ...)
@@ -62,7 +62,7 @@ class Parameter:
     write: Callable[[Fields, np.ndarray, mujoco.MjModel], None]
     signed: bool = False
     part: str = ""
-    identifiable_from: Callable[[Kind], bool] = lambda kind: True
+    identifiable_from: Callable[[ExperimentKind], bool] = lambda kind: True
     scale: float = 1.0
 
     def belongs_to(self, model: mujoco.MjModel) -> bool:
@@ -70,7 +70,7 @@ class Parameter:
         if self.part == "dead time":
             return bool(model.nhistory)
         if self.part == "holes":
-            return holes(model).size > 0
+            return hole_tendons(model).size > 0
         if self.part in (RATE_LIMIT, BACKLASH, WINDING):
             return numeric_place(model, self.part) is not None
         kind, _, number = self.part.partition(" ")
@@ -91,20 +91,20 @@ class Parameter:
         return np.asarray(coordinate, dtype=float) * self.scale if self.signed else np.exp(coordinate)
 
 
-def _moving(kind: Kind) -> bool:
+def _moving(kind: ExperimentKind) -> bool:
     """At rest friction, dampers, branches and sliders are off."""
     return not kind.static
 
 
-def _pulled(kind: Kind) -> bool:
+def _pulled(kind: ExperimentKind) -> bool:
     return kind.needs_motors
 
 
-def _pulled_and_moving(kind: Kind) -> bool:
+def _pulled_and_moving(kind: ExperimentKind) -> bool:
     return kind.needs_motors and not kind.static
 
 
-def _start_measured(kind: Kind) -> bool:
+def _start_measured(kind: ExperimentKind) -> bool:
     """The bent pose from which a release starts is fitted beforehand, with the hinges where they were then."""
     return kind.static or kind.needs_motors
 
@@ -122,7 +122,7 @@ def _scale_stiffness(fields: Fields, factors: np.ndarray, model: mujoco.MjModel)
         fields["tendon_stiffnesspoly"][:, part.tendon] *= factors[:, part.hinge, None]
     for part in (*all_elements(model, BRANCH), *all_elements(model, SLIDER)):
         fields["tendon_stiffness"][:, part.tendon] *= factors[:, part.hinge]
-        fields["dof_damping"][:, part.own] *= factors[:, part.hinge[: len(part.own)]]
+        fields["dof_damping"][:, part.branch] *= factors[:, part.hinge[: len(part.branch)]]
 
 
 def _scale_damping(fields: Fields, factors: np.ndarray, model: mujoco.MjModel) -> None:
@@ -278,10 +278,10 @@ def _share(kind: str, number: int) -> Parameter:
 
     def write(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
         part = elements(model, kind, number)
-        times = fields["dof_damping"][:, part.own] / fields["tendon_stiffness"][:, part.tendon[: len(part.own)]]
+        times = fields["dof_damping"][:, part.branch] / fields["tendon_stiffness"][:, part.tendon[: len(part.branch)]]
         stiffness = values[:, None] * fields["jnt_stiffness"][:, part.hinge]
         fields["tendon_stiffness"][:, part.tendon] = stiffness
-        fields["dof_damping"][:, part.own] = times * stiffness[:, : len(part.own)]
+        fields["dof_damping"][:, part.branch] = times * stiffness[:, : len(part.branch)]
 
     fields = ("tendon_stiffness", "dof_damping", "jnt_stiffness")
     return Parameter("", fields, read, write, part=f"{kind} {number}", identifiable_from=_moving)
@@ -290,11 +290,15 @@ def _share(kind: str, number: int) -> Parameter:
 def _relaxation_time(number: int) -> Parameter:
     def read(model: mujoco.MjModel) -> float:
         part = elements(model, BRANCH, number)
-        return float(model.dof_damping[part.own[0]] / model.tendon_stiffness[part.tendon[0]]) if len(part.own) else 0.0
+        return (
+            float(model.dof_damping[part.branch[0]] / model.tendon_stiffness[part.tendon[0]])
+            if len(part.branch)
+            else 0.0
+        )
 
     def write(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
         part = elements(model, BRANCH, number)
-        fields["dof_damping"][:, part.own] = values[:, None] * fields["tendon_stiffness"][:, part.tendon]
+        fields["dof_damping"][:, part.branch] = values[:, None] * fields["tendon_stiffness"][:, part.tendon]
 
     fields = ("dof_damping", "tendon_stiffness")
     return Parameter("s", fields, read, write, part=f"{BRANCH} {number}", identifiable_from=_moving)
@@ -336,7 +340,7 @@ def _rest_bend(axis: int, power: int) -> Parameter:
 
 
 def _number(
-    name: str, unit: str, part: str, identifiable_from: Callable[[Kind], bool] = _pulled_and_moving
+    name: str, unit: str, part: str, identifiable_from: Callable[[ExperimentKind], bool] = _pulled_and_moving
 ) -> Parameter:
     """One that is no field of MuJoCo's but a number of that name, which the stepper reads."""
 
@@ -347,7 +351,7 @@ def _number(
     return Parameter(unit, ("numeric_data",), read, write, part=part, identifiable_from=identifiable_from)
 
 
-def _winds(kind: Kind) -> bool:
+def _winds(kind: ExperimentKind) -> bool:
     """Backlash shows where tendons go to and fro."""
     return kind.needs_motors and (not kind.static or kind.stepwise)
 

@@ -10,7 +10,14 @@ from mujoco.batch import Batch
 from trunkline.identification.parameters.parameters import Fields
 from trunkline.identification.parameters.spool_scale import wound_by_each
 from trunkline.identification.simulate.experiment import Experiment
-from trunkline.model.elements import SLIDER, all_elements, cables, give_way, let_hang, let_slide
+from trunkline.model.elements import (
+    SLIDER,
+    all_elements,
+    cables,
+    switch_off_cables,
+    switch_off_capstan_friction,
+    unload_branches,
+)
 from trunkline.model.simulation.load import hang
 from trunkline.model.simulation.motion import batch_of, by_warp, hold, move
 from trunkline.model.simulation.winch import Winches
@@ -114,7 +121,7 @@ class InMotion:
     def _remember(self, batch: Batch) -> None:
         """Joints' branches and sliders as long after a straight arm was bent into the start pose."""
         angles = batch.bind("qpos")
-        give_way(self._model, angles)
+        unload_branches(self._model, angles)
         for element in all_elements(self._model, SLIDER):
             bend, give = angles[:, element.hinge], batch.expand("tendon_springyield")[:, element.tendon]
             place = self._model.tendon_plasticadr[element.tendon]
@@ -129,7 +136,7 @@ def _without_idle(model: mujoco.MjModel, slack: bool, fields: Fields, whole: boo
     parts = (model.tendon_frictionloss, model.tendon_stiffness, model.tendon_damping)
     bare = "tendon_frictionloss" not in fields and not any(values[cables(model)].any() for values in parts)
     if slack and bare and not whole:
-        let_hang(model)
+        switch_off_cables(model)
     elif slack:
-        let_slide(model)
+        switch_off_capstan_friction(model)
     return model

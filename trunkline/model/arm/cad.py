@@ -25,7 +25,7 @@ class CadArm:
 
 
 @dataclass
-class Chain(ABC):
+class ChainArm(ABC):
     """An arm that is made of units. A kind of it is a dataclass in a file of this folder, see `kinds`.
 
     Attributes:

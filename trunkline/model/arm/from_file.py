@@ -38,8 +38,8 @@ class FromFile:
             model = spec.compile()
         except ValueError as error:
             raise InputError(f"{path}: not a model that MuJoCo reads: {str(error).splitlines()[0]}") from error
-        if found := _missing(model) or _unlike(model):
-            raise InputError(f"{path}: {found}")
+        if fault := _missing(model) or _unlike(model):
+            raise InputError(f"{path}: {fault}")
         return CadArm(spec, _metrics(model))
 
 

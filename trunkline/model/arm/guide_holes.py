@@ -24,7 +24,7 @@ RIGID_TIME, RIGID = 0.004, 0.999  # s and impedance of the friction: nearer to r
 
 
 @dataclass
-class Holes:
+class GuideHoles:
     """friction: μ, a guess. stretches: of the arm, in each of which friction is taken together; 0 for none, and at most
     one a unit. slip: m of sliding within which friction builds up, at rest (`trunkline/model/statics/capstan.py`)."""
 
@@ -33,7 +33,7 @@ class Holes:
     slip: Annotated[float, Field(gt=0, le=0.1)] = SLIP
 
 
-def add_holes(spec: mujoco.MjSpec, holes: Holes) -> None:
+def add_holes(spec: mujoco.MjSpec, holes: GuideHoles) -> None:
     """Let the cables of an arm rub, in place.
 
     Raises:
@@ -51,8 +51,8 @@ def add_holes(spec: mujoco.MjSpec, holes: Holes) -> None:
     for cable in cables:
         arms = _moment_arms(straight, data, straight.tendon(cable.name).id)
         if len(arms) < units:
-            found = f"found holes in which cables rub, and {cable.name!r}, which ends at unit {len(arms)} of {units}"
-            raise InputError(f"build_mjcf.holes: {found}, expected cables to the last unit, or `smooth`")
+            problem = f"found holes in which cables rub, and {cable.name!r}, which ends at unit {len(arms)} of {units}"
+            raise InputError(f"build_mjcf.holes: {problem}, expected cables to the last unit, or `smooth`")
         edges = stretch_edges(len(arms), holes.stretches)
         for number, (begin, end) in enumerate(pairwise(edges), start=1):
             rubbing = spec.add_tendon(

@@ -26,7 +26,7 @@ Share = Annotated[float, Field(gt=0, le=10)]
 
 
 @dataclass
-class Branch:
+class MaxwellElement:
     """share: stiffness k over that of the joint's spring. time: τ, s, in which the branch gives way."""
 
     share: Share
@@ -34,7 +34,7 @@ class Branch:
 
 
 @dataclass
-class Slider:
+class JenkinsElement:
     """share: stiffness k over that of the joint's spring. yield_bend: rad, beyond which it slips."""
 
     share: Share
@@ -48,8 +48,8 @@ class Joints:
     round: whether it hardens by its whole bend, in place of each of its two hinges by its own.
     """
 
-    branches: Annotated[list[Branch], Field(max_length=3)] = field(default_factory=list)
-    sliders: Annotated[list[Slider], Field(max_length=5)] = field(default_factory=list)
+    branches: Annotated[list[MaxwellElement], Field(max_length=3)] = field(default_factory=list)
+    sliders: Annotated[list[JenkinsElement], Field(max_length=5)] = field(default_factory=list)
     round: bool = False
 
 
@@ -68,9 +68,9 @@ def add_elements(spec: mujoco.MjSpec, joints: Joints, armature: float) -> None:
     for number, branch in enumerate(joints.branches, 1):
         for joint, body in hinges:
             name = f"{joint.name}_{BRANCH}_{number}"
-            own = spec.body(f"{body}_{BRANCH}_{number}") or _light_body(spec, f"{body}_{BRANCH}_{number}")
+            light_body = spec.body(f"{body}_{BRANCH}_{number}") or _light_body(spec, f"{body}_{BRANCH}_{number}")
             stiffness = branch.share * float(joint.stiffness[0])
-            own.add_joint(
+            light_body.add_joint(
                 name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=joint.axis, limited=False, armature=armature,
                 damping=[stiffness * branch.time, 0, 0],
             )  # fmt: skip
@@ -93,8 +93,8 @@ def _make_round(spec: mujoco.MjSpec) -> None:
             continue
         springs = [tuple(map(float, hinge.stiffness)) for hinge in hinges]
         if len(springs) != 2 or springs[0] != springs[1] or springs[0][1]:
-            found, expected = f"found springs {springs}", "two hinges with the same odd one, or `round: false`"
-            raise InputError(f"build_mjcf.joints: round: body {body.name!r}: {found}, expected {expected}")
+            problem, expected = f"found springs {springs}", "two hinges with the same odd one, or `round: false`"
+            raise InputError(f"build_mjcf.joints: round: body {body.name!r}: {problem}, expected {expected}")
         for number, sign in enumerate((1, -1), 1):
             name = f"{hinges[0].name}_{DIAGONAL}_{number}"
             diagonal = spec.add_tendon(name=name, stiffness=[0, 0, DIAGONAL_SHARE * springs[0][2]])

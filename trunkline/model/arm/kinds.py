@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Protocol, Union, get_args
 from pydantic import Field
 
 from trunkline.model.arm.cad import CadArm
-from trunkline.model.arm.guide_holes import Holes, add_holes
+from trunkline.model.arm.guide_holes import GuideHoles, add_holes
 from trunkline.model.arm.joints import Joints, add_elements
 from trunkline.model.arm.mjcf import Actuation, Solver
 from trunkline.settings import settings
@@ -21,24 +21,24 @@ from trunkline.settings import settings
 PACKAGE = __name__.rpartition(".")[0]
 
 
-class Kind(Protocol):
+class ArmKind(Protocol):
     """What a stage needs of an arm's settings."""
 
     def build(self, actuation: Actuation, solver: Solver, models: Path) -> CadArm: ...
 
 
-def _kinds() -> dict[str, type[Kind]]:
-    found = {}
+def _kinds() -> dict[str, type[ArmKind]]:
+    kinds = {}
     for module in pkgutil.iter_modules([str(Path(__file__).parent)], f"{PACKAGE}."):
         for value in list(vars(import_module(module.name)).values()):
             if is_dataclass(value) and value.__module__ == module.name and "kind" in value.__annotations__:
-                found |= dict.fromkeys(get_args(value.__annotations__["kind"]), value)
-    return found
+                kinds |= dict.fromkeys(get_args(value.__annotations__["kind"]), value)
+    return kinds
 
 
 ARMS = _kinds()
 if TYPE_CHECKING:
-    Arm = Kind  # which classes there are is found out when the program runs
+    Arm = ArmKind  # which classes there are is found out when the program runs
 else:
     Arm = Annotated[Union[tuple(ARMS.values())], Field(discriminator="kind")]  # noqa: UP007 (of found classes)
 
@@ -52,7 +52,7 @@ class Description:
 
     arm: Arm
     joints: Joints
-    holes: Holes
+    holes: GuideHoles
     actuation: Actuation
     solver: Solver
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from trunkline.model.arm.cad import Chain
+from trunkline.model.arm.cad import ChainArm
 from trunkline.model.arm.geometry import ChainGeometry
 from trunkline.model.arm.material import UnitProperties
 from trunkline.model.arm.uniform import slender_properties
@@ -28,8 +28,8 @@ class Section:
 
     def __post_init__(self):
         if (self.bending_stiffness is None) == (self.joint_stiffness is None):
-            found = "neither" if self.joint_stiffness is None else "both"
-            raise ValueError(f"found {found}, expected either bending_stiffness (EI) or joint_stiffness (K)")
+            which = "neither" if self.joint_stiffness is None else "both"
+            raise ValueError(f"found {which}, expected either bending_stiffness (EI) or joint_stiffness (K)")
 
     @property
     def stiffness(self) -> float:
@@ -41,7 +41,7 @@ class Section:
 
 
 @dataclass
-class Sections(Chain):
+class Sections(ChainArm):
     """sections: from the mount on. joint_range_deg: how far a joint bends."""
 
     kind: Literal["sections"]

@@ -8,7 +8,7 @@ from pydantic import Field
 from scipy.optimize import brentq
 
 from trunkline.errors import InputError
-from trunkline.model.arm.cad import Chain
+from trunkline.model.arm.cad import ChainArm
 from trunkline.model.arm.geometry import ChainGeometry
 from trunkline.model.arm.material import UnitProperties, unit_properties
 
@@ -16,7 +16,7 @@ GROWTH_BRACKET = (1e-3, 10.0)  # b of any arm that one could print: 1e-3 is near
 
 
 @dataclass
-class Spiral(Chain):
+class Spiral(ChainArm):
     """base_width, tip_width: m. modulus: Pa. density: kg/m³. core_ratio: core diameter over the unit's."""
 
     kind: Literal["spiral"]

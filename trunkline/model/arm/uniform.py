@@ -6,13 +6,13 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from trunkline.model.arm.cad import Chain
+from trunkline.model.arm.cad import ChainArm
 from trunkline.model.arm.geometry import ChainGeometry
 from trunkline.model.arm.material import UnitProperties, joint_damping
 
 
 @dataclass
-class Uniform(Chain):
+class Uniform(ChainArm):
     """width: m. unit_masses: kg, one for all units or one each. joint_range_deg: how far a joint bends.
 
     Either bending_stiffness, EI in N m², or joint_stiffness, K of every joint in N m/rad.
@@ -28,8 +28,8 @@ class Uniform(Chain):
     def __post_init__(self):
         super().__post_init__()
         if (self.bending_stiffness is None) == (self.joint_stiffness is None):
-            found = "neither" if self.joint_stiffness is None else "both"
-            raise ValueError(f"found {found}, expected either bending_stiffness (EI) or joint_stiffness (K)")
+            which = "neither" if self.joint_stiffness is None else "both"
+            raise ValueError(f"found {which}, expected either bending_stiffness (EI) or joint_stiffness (K)")
         if len(self.unit_masses) not in (1, self.units):
             raise ValueError(f"unit_masses: found {len(self.unit_masses)}, expected one for all units, or "
                              f"one for each of the {self.units}")

@@ -10,13 +10,13 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from trunkline.model.elements import CAPSTAN_FRICTION, actuators, cables, holes, numeric_place, stretch_edges
+from trunkline.model.elements import CAPSTAN_FRICTION, actuators, cables, hole_tendons, numeric_place, stretch_edges
 
 REFRESH = 1 / 120  # s between new limits: the motors' tensions and the bends change little within
 CREEP = 1e-3  # m/s of sliding below which s is less than ±1
 
 
-class Rubbing:
+class CapstanFriction:
     """Sets the limits of `batch`'s simulations.
 
     Args:
@@ -28,7 +28,7 @@ class Rubbing:
 
     def __init__(self, batch: Batch, longest: float | None = None) -> None:
         model = batch.model
-        self._batch, self._tendons = batch, holes(model)
+        self._batch, self._tendons = batch, hole_tendons(model)
         self._actuators = actuators(model)
         self._hinges = _hinges(model)
         self._begins = stretch_edges(self._hinges.shape[1], self._tendons.shape[1])[:-1]
@@ -67,23 +67,23 @@ class Rubbing:
         self._arms[np.ix_(ids, self._entries)] = self._jacobian[np.ix_(ids, self._slopes)]
 
 
-def rubbing(batch: Batch, longest: float | None = None) -> Rubbing | None:
-    """What sets the limits of a batch, None if nothing in it rubs; `longest` as in `Rubbing`."""
-    if not holes(batch.model).size:
+def capstan_friction_of(batch: Batch, longest: float | None = None) -> CapstanFriction | None:
+    """What sets the limits of a batch, None if nothing in it rubs; `longest` as in `CapstanFriction`."""
+    if not hole_tendons(batch.model).size:
         return None
     values = batch.expanded("numeric_data")
     values = batch.model.numeric_data[None] if values is None else values
-    return Rubbing(batch, longest) if values[:, numeric_place(batch.model, CAPSTAN_FRICTION)].any() else None
+    return CapstanFriction(batch, longest) if values[:, numeric_place(batch.model, CAPSTAN_FRICTION)].any() else None
 
 
 def _hinges(model: mujoco.MjModel) -> np.ndarray:
     """Addresses of the two angles of each unit along each cable. Shape (K, n, 2)."""
-    found = []
+    addresses = []
     for cable in cables(model):
         path = slice(model.tendon_adr[cable], model.tendon_adr[cable] + model.tendon_num[cable])
         units = model.body_weldid[model.site_bodyid[model.wrap_objid[path]]][1:]
-        found.append(model.jnt_qposadr[model.body_jntadr[units][:, None] + np.arange(2)])
-    return np.array(found)
+        addresses.append(model.jnt_qposadr[model.body_jntadr[units][:, None] + np.arange(2)])
+    return np.array(addresses)
 
 
 def _arms(model: mujoco.MjModel, tendons: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -93,10 +93,10 @@ def _arms(model: mujoco.MjModel, tendons: np.ndarray) -> tuple[np.ndarray, np.nd
         tendons: by which cables rub. Shape (K, P).
     """
     entries, slopes = [], []
-    for cable, own in zip(cables(model), tendons, strict=True):
+    for cable, stretches in zip(cables(model), tendons, strict=True):
         row = model.ten_J_rowadr[cable] + np.arange(model.ten_J_rownnz[cable])
         place = dict(zip(model.ten_J_colind[row].tolist(), row.tolist(), strict=True))
-        for tendon in own:
+        for tendon in stretches:
             entries.append(model.tendon_adr[tendon] + np.arange(model.tendon_num[tendon]))
             slopes.append([place[dof] for dof in model.jnt_dofadr[model.wrap_objid[entries[-1]]].tolist()])
     return np.concatenate(entries), np.concatenate(slopes)

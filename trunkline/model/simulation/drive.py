@@ -82,7 +82,7 @@ def drive(
     Raises:
         ValueError: to calm an arm with friction.
     """
-    own, model = model.opt.timestep, copy.copy(model)
+    model_step, model = model.opt.timestep, copy.copy(model)
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     model.opt.timestep = longest_step(model)
     if not friction:
@@ -94,8 +94,8 @@ def drive(
         raise ValueError("found friction in a model to be calmed, expected none: where it rests depends on its way")
     gravity = np.broadcast_to(gravity, (len(commands), 3))
     driven = _drive(model, commands, gravity, seconds, tip_site, calm)
-    while model.opt.timestep > own and len(warned := np.flatnonzero(~np.isfinite(driven.end).all(axis=1))):
-        model.opt.timestep = max(model.opt.timestep / 2, own)
+    while model.opt.timestep > model_step and len(warned := np.flatnonzero(~np.isfinite(driven.end).all(axis=1))):
+        model.opt.timestep = max(model.opt.timestep / 2, model_step)
         again = _drive(model, commands[warned], gravity[warned], seconds, tip_site, calm)
         driven.tips[warned], driven.rested[warned] = again.tips, again.rested
     return driven
@@ -121,8 +121,8 @@ def _drive(
     for look in range(looks):
         sent = _sent(trajectories[moving], (look * every + np.arange(every)) * model.opt.timestep)
         controls = winches.deliver(sent, moving)
-        found = move(batch, controls, ("site_xpos",), every, every - 1, ids=moving)["site_xpos"][:, 0, site]
-        tips[moving, look] = (found - origin) @ to_world
+        places = move(batch, controls, ("site_xpos",), every, every - 1, ids=moving)["site_xpos"][:, 0, site]
+        tips[moving, look] = (places - origin) @ to_world
         sound = ~batch.warning[moving].any(axis=(1, 2))
         moving, wound = moving[sound], np.ptp(controls[sound], axis=1).max(axis=1)
         if (look - WINDOW) * LOOK >= last:

@@ -10,7 +10,7 @@ from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 INERTIAL = ("body_mass", "body_ipos", "body_iquat", "body_inertia")
 
 
-def hang(batch: Batch, model: mujoco.MjModel, loads: np.ndarray, given: tuple[str, ...] = ()) -> None:
+def hang(batch: Batch, model: mujoco.MjModel, loads: np.ndarray, individual: tuple[str, ...] = ()) -> None:
     """Hang a point mass at the site `tip` of each simulation, on top of what the model carries there.
 
     The body that holds the site becomes the rigid composite of itself and the mass. What MuJoCo derives from masses
@@ -19,10 +19,10 @@ def hang(batch: Batch, model: mujoco.MjModel, loads: np.ndarray, given: tuple[st
 
     Args:
         model: the one of the batch. loads: kg, one a simulation. Shape (B,).
-        given: which of `INERTIAL` each simulation has values of its own for; the others are set to the model's first.
+        individual: names in `INERTIAL` that already differ by simulation; the others are first set to the model's.
     """
     for name in INERTIAL:
-        if name not in given:
+        if name not in individual:
             batch.expand(name)[:] = getattr(model, name)
     site = model.site("tip").id
     body, chosen = model.site_bodyid[site], np.flatnonzero(loads)

@@ -8,7 +8,7 @@ from mujoco.batch import Batch
 
 from trunkline.compute.scheduler import rough_by_warp
 from trunkline.compute.threads import thread_count
-from trunkline.model.simulation.capstan import rubbing
+from trunkline.model.simulation.capstan import capstan_friction_of
 from trunkline.model.simulation.divergence import CountingBatch
 
 CHUNK = 128  # steps a call: few calls, and records of some MB
@@ -83,19 +83,19 @@ def move(
     Returns:
         A record for each name. Shape (n, T / every, ...).
     """
-    rub = rubbing(batch, longest)
-    own = np.arange(batch.nsim) if ids is None else ids
+    rub = capstan_friction_of(batch, longest)
+    simulations = np.arange(batch.nsim) if ids is None else ids
     length = rub.steps if rub else max(CHUNK // every, 1) * every
     if rub:
-        rub.begin(own)
+        rub.begin(simulations)
     parts: dict[str, list[np.ndarray]] = {name: [] for name in record}
     for start in range(0, controls.shape[1], length):
         if rub:
-            rub.refresh(own)
+            rub.refresh(simulations)
         rows = np.ascontiguousarray(controls[:, start : start + length])
-        found = batch.rollout(rows.shape[1], control=rows, record=record, ids=ids)
+        recorded = batch.rollout(rows.shape[1], control=rows, record=record, ids=ids)
         chosen = slice((at - start) % every, None, every)
         for name, part in parts.items():
-            part.append(found[name][:, chosen].copy())
+            part.append(recorded[name][:, chosen].copy())
         moved(len(range(rows.shape[1])[chosen]))
     return {name: np.concatenate(part, axis=1) for name, part in parts.items()}

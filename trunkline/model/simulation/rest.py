@@ -14,7 +14,7 @@ from mujoco.batch import Batch
 from scipy.spatial.transform import Rotation
 
 from trunkline.frames import wxyz_from_rotation
-from trunkline.model.elements import BRANCH, SLIDER, all_elements, arm_hinges, let_slide
+from trunkline.model.elements import BRANCH, SLIDER, all_elements, arm_hinges, switch_off_capstan_friction
 from trunkline.model.simulation.motion import batch_of, hold
 
 LONGEST_STEP = 0.005  # s
@@ -55,7 +55,7 @@ def settle(
     """
     model = copy.copy(model)
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    let_slide(model)
+    switch_off_capstan_friction(model)
     batch = batch_of(model, len(commands))
     origin, to_world = base_frame(model)
     batch.expand("opt.gravity")[:] = gravity @ to_world.T
@@ -103,8 +103,8 @@ def relax(batch: Batch, model: mujoco.MjModel) -> float:
     # a step never throws the arm past where its motors pull; their own damping ends where a tendon is slack
     pull = batch.expand("actuator_gainprm")[:, :, 0]
     batch.expand("tendon_damping")[:, model.actuator_trnid[:, 0]] = timestep * pull
-    for one in (*all_elements(model, BRANCH), *all_elements(model, SLIDER)):
-        batch.expand("tendon_stiffness")[:, one.tendon] = 0
+    for group in (*all_elements(model, BRANCH), *all_elements(model, SLIDER)):
+        batch.expand("tendon_stiffness")[:, group.tendon] = 0
     return timestep
 
 

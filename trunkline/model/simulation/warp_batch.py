@@ -52,7 +52,7 @@ class WarpBatch(CountingBatch):
         self._outputs = {name for name, shape in _shapes(self._mujoco_warp.Data).items() if shape[:1] == ("nworld",)}
         self._made: Any = None  # for which fields, what is not 0 in them
         self._there: Any = None  # Warp's model, its data, a step of them as a graph
-        self._put(self._own())  # refuses here what it cannot move
+        self._put(self._individual())  # refuses here what it cannot move
 
     def expand(self, name: str) -> np.ndarray:
         if name in MODEL_FIELDS and not self._can_have(name):
@@ -79,7 +79,7 @@ class WarpBatch(CountingBatch):
             every = np.repeat(self.bind("ctrl")[None].astype(np.float32), nstep, axis=0)
             every[:, chosen] = np.broadcast_to(control, (len(chosen), nstep, self.model.nu)).swapaxes(0, 1)
             sent = self._warp.array(every, dtype=floats)
-        seen = {
+        buffers = {
             name: self._warp.empty((nstep, *getattr(data, name).shape), dtype=getattr(data, name).dtype)
             for name in record
         }
@@ -87,14 +87,14 @@ class WarpBatch(CountingBatch):
             if sent is not None:
                 copied(data.ctrl, sent[number])
             self._warp.capture_launch(step)
-            for name, rows in seen.items():
+            for name, rows in buffers.items():
                 copied(rows[number], getattr(data, name))
         self._take(data, chosen)
-        found = {}
-        for name, rows in seen.items():
-            own = rows.numpy()[:, chosen].swapaxes(0, 1).astype(float)
-            found[name] = own.reshape(len(chosen), nstep, *getattr(self._data, name).shape)
-        return found
+        result = {}
+        for name, rows in buffers.items():
+            values = rows.numpy()[:, chosen].swapaxes(0, 1).astype(float)
+            result[name] = values.reshape(len(chosen), nstep, *getattr(self._data, name).shape)
+        return result
 
     def _take(self, data: Any, chosen: np.ndarray) -> None:
         """State and outputs of the simulations `chosen`, and which of them to warn of."""
@@ -108,38 +108,38 @@ class WarpBatch(CountingBatch):
             self.warning[chosen[~good], kind, 1] += 1
             sound &= good
         for name in TAKEN:
-            own = self.bind(name)
-            if own.size:
-                own[chosen[sound]] = getattr(data, name).numpy()[chosen[sound]].reshape(-1, *own.shape[1:])
-        for name, own in self._bound.items():
-            own.flags.writeable = True
-            own[chosen] = getattr(data, name).numpy()[chosen].reshape(-1, *own.shape[1:])
-            own.flags.writeable = False
+            field = self.bind(name)
+            if field.size:
+                field[chosen[sound]] = getattr(data, name).numpy()[chosen[sound]].reshape(-1, *field.shape[1:])
+        for name, field in self._bound.items():
+            field.flags.writeable = True
+            field[chosen] = getattr(data, name).numpy()[chosen].reshape(-1, *field.shape[1:])
+            field.flags.writeable = False
 
     def _can_have(self, name: str) -> bool:
         part, _, option = name.rpartition(".")
         return name in UNREAD or (option in self._options if part == "opt" else name in self._fields)
 
-    def _own(self) -> dict[str, np.ndarray]:
-        """What each simulation has of its own, of what Warp reads.
+    def _individual(self) -> dict[str, np.ndarray]:
+        """Fields with values for each simulation, of those that Warp reads.
 
         Raises:
             InputError: it differs in what Warp has once for all, as may follow from `set_const`.
         """
-        found = {name: self.expanded(name) for name in sorted(set(MODEL_FIELDS) - UNREAD)}
-        own = {name: values for name, values in found.items() if values is not None}
-        for name in [name for name in own if not self._can_have(name)]:
-            if (own.pop(name) != getattr(self.model, name)).any():
+        expanded = {name: self.expanded(name) for name in sorted(set(MODEL_FIELDS) - UNREAD)}
+        individual = {name: values for name, values in expanded.items() if values is not None}
+        for name in [name for name in individual if not self._can_have(name)]:
+            if (individual.pop(name) != getattr(self.model, name)).any():
                 raise unfit(f"{name} for each simulation on its own", "what Warp can have so")
-        return own
+        return individual
 
     def _brought(self) -> tuple[Any, Any, Any]:
         """Model, data and step with the fields and states that simulations have now."""
-        own = self._own()
-        if self._made != _kind(own):
-            self._put(own)
+        individual = self._individual()
+        if self._made != _kind(individual):
+            self._put(individual)
         model, data, step = self._there
-        for name, values in own.items():
+        for name, values in individual.items():
             option = name.removeprefix("opt.")
             _assign(getattr(model, name) if option == name else getattr(model.opt, option), values)
         for name in (*TAKEN, *GIVEN):
@@ -148,15 +148,15 @@ class WarpBatch(CountingBatch):
         data.overflow.zero_()
         return model, data, step
 
-    def _put(self, own: dict[str, np.ndarray]) -> None:
+    def _put(self, individual: dict[str, np.ndarray]) -> None:
         """Make model, data and step for these fields."""
-        template, options = copy.copy(self.model), {name[4:] for name in own if name.startswith("opt.")}
+        template, options = copy.copy(self.model), {name[4:] for name in individual if name.startswith("opt.")}
         template.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)  # Warp never starts one anew
-        for name in [name for name in own if name.endswith(SWITCHES)]:
-            largest = np.abs(own[name]).argmax(axis=0)[None]
-            getattr(template, name)[:] = np.take_along_axis(own[name], largest, axis=0)[0]
+        for name in [name for name in individual if name.endswith(SWITCHES)]:
+            largest = np.abs(individual[name]).argmax(axis=0)[None]
+            getattr(template, name)[:] = np.take_along_axis(individual[name], largest, axis=0)[0]
         rows = WELD * template.neq + template.nv + 3 * template.ntendon + 2 * template.njnt
-        sizes = {name: self.nsim for name in own if not name.startswith("opt.")}
+        sizes = {name: self.nsim for name in individual if not name.startswith("opt.")}
         try:
             model = self._mujoco_warp.put_model(template, sizes)
             data = self._mujoco_warp.make_data(
@@ -171,7 +171,7 @@ class WarpBatch(CountingBatch):
         self._mujoco_warp.step(model, data)  # compiles what a graph takes; states are set before each rollout
         with self._warp.ScopedCapture() as capture:
             self._mujoco_warp.step(model, data)
-        self._made, self._there = _kind(own), (model, data, capture.graph)
+        self._made, self._there = _kind(individual), (model, data, capture.graph)
 
 
 def libraries() -> tuple[Any, Any]:
@@ -189,17 +189,20 @@ def fields_of(kind: type) -> set[str]:
     return {name for name, shape in _shapes(kind).items() if shape[:1] == ("*",)}
 
 
-def unfit(found: str, expected: str) -> InputError:
-    return InputError(f"{BATCHES}: found {found}, expected {expected}; leave {BATCHES} empty to simulate it by MuJoCo")
+def unfit(feature: str, expected: str) -> InputError:
+    remedy = f"leave {BATCHES} empty to simulate it by MuJoCo"
+    return InputError(f"{BATCHES}: found {feature}, expected {expected}; {remedy}")
 
 
 def _shapes(kind: type) -> dict[str, tuple]:
     return {field.name: getattr(field.type, "shape", ()) or () for field in dataclasses.fields(kind)}
 
 
-def _kind(own: dict[str, np.ndarray]) -> tuple:
+def _kind(individual: dict[str, np.ndarray]) -> tuple:
     """What Warp's model depends on beside its values: for which fields, and what is not 0 in any simulation."""
-    return tuple((name, name.endswith(SWITCHES) and values.any(axis=0).tobytes()) for name, values in own.items())
+    return tuple(
+        (name, name.endswith(SWITCHES) and values.any(axis=0).tobytes()) for name, values in individual.items()
+    )
 
 
 def _assign(target: Any, values: np.ndarray) -> None:

@@ -19,9 +19,9 @@ class Winches:
     """Those of `batch`'s simulations, which have stood at the lengths `held` (B, K), m, for long: their cables in the
     middle of the play. Each simulation has the model's numbers, or its own."""
 
-    def __init__(self, batch: Batch, held: np.ndarray) -> None:
+    def __init__(self, batch: Batch, lengths: np.ndarray) -> None:
         self._batch = batch
-        self._drums, self._cables = (np.array(held, dtype=float) for _ in range(2))
+        self._drums, self._cables = (np.array(lengths, dtype=float) for _ in range(2))
         rate, self._play = (_numbers(batch, name) for name in (RATE_LIMIT, BACKLASH))
         self._rate = np.where(rate > 0, rate, np.inf)
         self.idle = not (rate.any() or self._play.any())
@@ -30,8 +30,8 @@ class Winches:
         """What the simulations `ids` (n,) get in the next T steps for `commands`, m. Both of shape (n, T, K)."""
         if self.idle:
             return commands
-        own = self._batch.expanded("opt.timestep")
-        step = self._batch.model.opt.timestep if own is None else own[ids]
+        timesteps = self._batch.expanded("opt.timestep")
+        step = self._batch.model.opt.timestep if timesteps is None else timesteps[ids]
         drums, cables = self._drums[ids], self._cables[ids]
         delivered = wind(commands, drums, cables, self._rate[ids] * step, self._play[ids])
         self._drums[ids], self._cables[ids] = drums, cables

@@ -21,7 +21,7 @@ from trunkline.model.statics.kernel import kernel
 from trunkline.model.statics.vectors import copy
 
 
-class Rub(NamedTuple):
+class CapstanTerms(NamedTuple):
     """What friction adds to the room for one equilibrium, filled in place.
 
     Attributes:
@@ -37,10 +37,10 @@ class Rub(NamedTuple):
 
 
 @kernel
-def new_rub(units, tendons):
+def new_capstan_terms(units, tendons):
     """Empty room for the friction of `tendons` tendons on `units` units."""
     rank, nq = 3 + tendons, 2 * units
-    return Rub(np.zeros((units, 3)), np.zeros((units, tendons, 2)), np.zeros((rank, nq)), np.zeros((rank, nq)))
+    return CapstanTerms(np.zeros((units, 3)), np.zeros((units, tendons, 2)), np.zeros((rank, nq)), np.zeros((rank, nq)))
 
 
 @kernel

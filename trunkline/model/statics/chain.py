@@ -176,10 +176,10 @@ def _unit_inertials(model: mujoco.MjModel, data: mujoco.MjData, units: np.ndarra
 def _diagonals(model: mujoco.MjModel, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """`diagonal` and `slack` of units with the hinges `joints` (n, 2), see `Chain`."""
     stiffness, slack = np.zeros(joints.shape), np.zeros(joints.shape)
-    for column, one in enumerate(all_elements(model, DIAGONAL)):
-        units = np.searchsorted(joints[:, 0], one.hinge)
-        stiffness[units, column] = model.tendon_stiffnesspoly[one.tendon, 1]
-        slack[units, column] = model.tendon_lengthspring[one.tendon, 0]
+    for column, group in enumerate(all_elements(model, DIAGONAL)):
+        units = np.searchsorted(joints[:, 0], group.hinge)
+        stiffness[units, column] = model.tendon_stiffnesspoly[group.tendon, 1]
+        slack[units, column] = model.tendon_lengthspring[group.tendon, 0]
     return stiffness, slack
 
 

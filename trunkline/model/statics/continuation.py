@@ -14,7 +14,7 @@ SLACK = 1e3  # m, a length that no arm's tendon has: it does not pull
 MIN_SHARE = 1 / 4096  # smallest step of the continuation, as a share of the load
 
 
-class Found(NamedTuple):
+class EquilibriumRows(NamedTuple):
     """What the kernels write, a row an equilibrium: as in `equilibria.Equilibrium`, but for the tip the frame of the
     last unit, its rotation (B, 3, 3) and its joint's position (B, 3) in the base frame, m."""
 
@@ -31,7 +31,7 @@ class Found(NamedTuple):
 
 @kernel
 def solve_paths(
-    first, last, chain, all_tensions, all_lengths, gravities, slope, ceiling, torques, all_loose, cables, found
+    first, last, chain, all_tensions, all_lengths, gravities, slope, ceiling, torques, all_loose, cables, rows
 ):  # fmt: skip
     """Paths `first` to `last` (not included) into `found`: weight first, then the pulls one after the other."""
     steps, tendons = all_tensions.shape[1:]
@@ -59,23 +59,23 @@ def solve_paths(
                 copy(goal.tension, here.tension)
                 copy(goal.length, here.length)
             row = path * steps + step
-            copy(q, found.qpos[row])
-            record(found, row, work.state, loss, total, good)
-            found.snapped[row] = jumped
+            copy(q, rows.qpos[row])
+            record(rows, row, work.state, loss, total, good)
+            rows.snapped[row] = jumped
             total = 0
 
 
 @kernel
-def record(found, row, state, residual, iterations, converged):
+def record(rows, row, state, residual, iterations, converged):
     """Write what is known of one equilibrium beside its joint angles into its row."""
     for k in range(3):
-        copy(state.rotation[-1, k], found.rotation[row, k])
-    copy(state.position[-1], found.position[row])
-    copy(state.lengths, found.lengths[row])
-    copy(state.tensions, found.tensions[row])
-    found.residual[row] = residual
-    found.iterations[row] = iterations
-    found.converged[row] = converged
+        copy(state.rotation[-1, k], rows.rotation[row, k])
+    copy(state.position[-1], rows.position[row])
+    copy(state.lengths, rows.lengths[row])
+    copy(state.tensions, rows.tensions[row])
+    rows.residual[row] = residual
+    rows.iterations[row] = iterations
+    rows.converged[row] = converged
 
 
 @kernel
@@ -90,7 +90,7 @@ def _follow(chain, q, start_gravity, gravity, start, pull, cables, work):
     tendons = pull.tension.shape[0]
     tension, length = start.tension.copy(), start.length.copy()
     now = Pull(tension, pull.slope, length, pull.ceiling, pull.torque, pull.friction, pull.loose)
-    begin, known = now.tension.copy(), q.copy()
+    begin, accepted = now.tension.copy(), q.copy()
     loads = start_gravity.copy()
     done, share, total, snapped, residual = 0.0, 1.0, 0, False, 0.0
     while done < 1:
@@ -107,17 +107,17 @@ def _follow(chain, q, start_gravity, gravity, start, pull, cables, work):
         total += iterations
         moved = 0.0
         for j in range(q.shape[0]):
-            moved = max(moved, abs(q[j] - known[j]))
+            moved = max(moved, abs(q[j] - accepted[j]))
         if not converged or moved > BRANCH_STEP:
             if share > MIN_SHARE:
-                copy(known, q)
+                copy(accepted, q)
                 copy(begin, now.tension)
                 share *= 0.5 if converged else 0.25
                 continue
             if not converged:
                 return residual, total, False, snapped
             snapped = True
-        copy(q, known)
+        copy(q, accepted)
         done = target
         share *= 2
     if cables:

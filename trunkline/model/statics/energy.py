@@ -100,13 +100,13 @@ def _add_diagonals(chain, q, state):
     energy, diagonal, slack, gradient = 0.0, chain.diagonal, chain.slack, state.gradient
     for i in range(diagonal.shape[0]):
         both, apart = q[2 * i] + q[2 * i + 1] - slack[i, 0], q[2 * i] - q[2 * i + 1] - slack[i, 1]
-        one, other = diagonal[i, 0] * both * both, diagonal[i, 1] * apart * apart
-        energy += 0.25 * (one * both * both + other * apart * apart)
-        gradient[2 * i] += one * both + other * apart
-        gradient[2 * i + 1] += one * both - other * apart
-        state.stiffness[2 * i] += 3 * (one + other)
-        state.stiffness[2 * i + 1] += 3 * (one + other)
-        state.coupling[i] = 3 * (one - other)
+        torque_both, torque_apart = diagonal[i, 0] * both * both, diagonal[i, 1] * apart * apart
+        energy += 0.25 * (torque_both * both * both + torque_apart * apart * apart)
+        gradient[2 * i] += torque_both * both + torque_apart * apart
+        gradient[2 * i + 1] += torque_both * both - torque_apart * apart
+        state.stiffness[2 * i] += 3 * (torque_both + torque_apart)
+        state.stiffness[2 * i + 1] += 3 * (torque_both + torque_apart)
+        state.coupling[i] = 3 * (torque_both - torque_apart)
     return energy
 
 

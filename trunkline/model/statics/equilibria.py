@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.model.statics.chain import Chain
-from trunkline.model.statics.continuation import Found, solve_paths
+from trunkline.model.statics.continuation import EquilibriumRows, solve_paths
 from trunkline.model.statics.kernel import over_rows
 from trunkline.model.statics.placement import place_chords
 
@@ -137,12 +137,12 @@ def follow(
         raise ValueError(f"found {tendons} tendons, expected {chain.tendons}")
     if torques is None:
         torques = np.zeros((paths, chain.units, 2))
-    found, gravities = room(chain, paths * steps), plain(gravity, (paths, 3))
+    rows, gravities = room(chain, paths * steps), plain(gravity, (paths, 3))
     over_rows(
         solve_paths, paths, chain, plain(tensions), plain(lengths), gravities, plain(slope), plain(ceiling, (tendons,)),
-        plain(torques), loose_chords(chain, gravities), cables, found,
+        plain(torques), loose_chords(chain, gravities), cables, rows,
     )  # fmt: skip
-    return equilibria(chain, found)
+    return equilibria(chain, rows)
 
 
 def loose_chords(chain: Chain, gravities: np.ndarray) -> np.ndarray:
@@ -168,9 +168,9 @@ def plain(values: np.ndarray | float, shape: tuple | None = None) -> np.ndarray:
     return np.array(values if shape is None else np.broadcast_to(values, shape), float, order="C")
 
 
-def room(chain: Chain, count: int) -> Found:
+def room(chain: Chain, count: int) -> EquilibriumRows:
     """Room for `count` equilibria, for a kernel to fill."""
-    return Found(
+    return EquilibriumRows(
         qpos=np.zeros((count, 2 * chain.units)),
         rotation=np.zeros((count, 3, 3)),
         position=np.zeros((count, 3)),
@@ -183,12 +183,12 @@ def room(chain: Chain, count: int) -> Found:
     )
 
 
-def equilibria(chain: Chain, found: Found) -> Equilibrium:
+def equilibria(chain: Chain, rows: EquilibriumRows) -> Equilibrium:
     """What the kernels found, with the pose of the tip in place of the last unit's."""
-    rotation = Rotation.from_matrix(found.rotation, assume_valid=True)
-    values = found._asdict() | {
-        "position": found.position + found.rotation @ chain.tip,
-        "commands": found.lengths - found.tensions / chain.gain,
+    rotation = Rotation.from_matrix(rows.rotation, assume_valid=True)
+    values = rows._asdict() | {
+        "position": rows.position + rows.rotation @ chain.tip,
+        "commands": rows.lengths - rows.tensions / chain.gain,
     }
     del values["rotation"]
     return Equilibrium(quaternion=wxyz_from_rotation(rotation * rotation_from_wxyz(chain.tip_quaternion)), **values)

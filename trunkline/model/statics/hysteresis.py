@@ -76,9 +76,9 @@ def friction_band(
     for side in (1, -1):
         slid = doubled._replace(capstan=side * capstan)
         torques = -side * joint_friction * slides[1]
-        end = _held(slid, commands, side * tendon_friction * slides[0], torques, gravity)
-        found = (here.converged & end.converged)[:, None]
-        ends.append(np.where(found, end.position, np.nan))
+        end = _fixed_commands(slid, commands, side * tendon_friction * slides[0], torques, gravity)
+        solved = (here.converged & end.converged)[:, None]
+        ends.append(np.where(solved, end.position, np.nan))
     return Band(*ends)
 
 
@@ -89,7 +89,7 @@ def with_friction(chain: Chain) -> Chain:
     return chain._replace(**twice)
 
 
-def _held(chain: Chain, commands, friction, torques, gravity) -> Equilibrium:
+def _fixed_commands(chain: Chain, commands, friction, torques, gravity) -> Equilibrium:
     """Equilibria under actuators that hold `commands` (N, K), m, constant tensions `friction` (N, K), N, and torques
     at the joints (N, n, 2), N m."""
     tendons = commands.shape[1]

@@ -9,7 +9,7 @@ from trunkline.model.statics.capstan import factorize_for, solve_for
 from trunkline.model.statics.energy import evaluate, find_hessian, is_elastic
 from trunkline.model.statics.factor import Factor, new_factor
 from trunkline.model.statics.kernel import kernel
-from trunkline.model.statics.placement import State, new_state
+from trunkline.model.statics.placement import ChainState, new_state
 from trunkline.model.statics.vectors import largest
 
 TORQUE_TOLERANCE = 1e-9  # N m; the softest joint of the arm, 0.02 N m/rad, turns by 5e-8 rad under it
@@ -23,7 +23,7 @@ LARGEST_SHIFT = 1e7  # N m/rad
 class Work(NamedTuple):
     """Scratch of one thread. Shapes: step, trial (nq,), columns (K, nq), schur (K, K), rates (K,)."""
 
-    state: State
+    state: ChainState
     factor: Factor
     step: np.ndarray
     trial: np.ndarray

@@ -4,13 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from trunkline.model.statics.capstan import Rub, new_rub
+from trunkline.model.statics.capstan import CapstanTerms, new_capstan_terms
 from trunkline.model.statics.chain import Chain
 from trunkline.model.statics.kernel import kernel
 from trunkline.model.statics.vectors import copy, cross, dot, plus, product, turn_about, turned, vector
 
 
-class State(NamedTuple):
+class ChainState(NamedTuple):
     """Everything that is computed from the joint angles; one per thread, filled in place.
 
     Shapes: rotation (n, 3, 3), position (n, 3), hinge (n, 2, 3), moment (n, 3), lengths (K,), tensions (K,),
@@ -38,14 +38,14 @@ class State(NamedTuple):
     left: np.ndarray
     right: np.ndarray
     block: np.ndarray
-    rub: Rub
+    rub: CapstanTerms
 
 
 @kernel
 def new_state(units, tendons):
     """An empty `State` for a chain of `units` units and `tendons` tendons."""
     nq = 2 * units
-    return State(
+    return ChainState(
         np.zeros((units, 3, 3)),
         np.zeros((units, 3)),
         np.zeros((units, 2, 3)),
@@ -62,7 +62,7 @@ def new_state(units, tendons):
         np.zeros((3 + tendons, nq)),
         np.zeros((3 + tendons, nq)),
         np.zeros((units, 4)),
-        new_rub(units, tendons),
+        new_capstan_terms(units, tendons),
     )
 
 

@@ -47,20 +47,20 @@ def _from(
 ) -> Equilibrium:  # fmt: skip
     """Equilibria from `qpos` with pulls in the words of `energy.Pull`."""
     count = len(qpos)
-    found, gravities = room(chain, count), plain(gravity, (count, 3))
-    found.qpos[:], found.tensions[:] = qpos, tensions
+    rows, gravities = room(chain, count), plain(gravity, (count, 3))
+    rows.qpos[:], rows.tensions[:] = qpos, tensions
     loose = loose_chords(chain, gravities)
-    over_rows(_restart, count, chain, plain(lengths), gravities, slope, ceiling, cables, loose, found)
-    return equilibria(chain, found)
+    over_rows(_restart, count, chain, plain(lengths), gravities, slope, ceiling, cables, loose, rows)
+    return equilibria(chain, rows)
 
 
 @kernel
-def _restart(first, last, chain, all_lengths, gravities, slope, ceiling, cables, all_loose, found):
+def _restart(first, last, chain, all_lengths, gravities, slope, ceiling, cables, all_loose, rows):
     units, tendons = chain.mass.shape[0], all_lengths.shape[1]
     torque = np.zeros((units, 2))
     for row in range(first, last):
         work = new_work(units, tendons)
-        tension, loose = found.tensions[row].copy(), all_loose[row]
+        tension, loose = rows.tensions[row].copy(), all_loose[row]
         pull = Pull(tension, slope, all_lengths[row], ceiling, torque, chain.capstan, loose)
-        residual, _, total, good = find_equilibrium(chain, found.qpos[row], gravities[row], pull, cables, work)
-        record(found, row, work.state, residual, total, good)
+        residual, _, total, good = find_equilibrium(chain, rows.qpos[row], gravities[row], pull, cables, work)
+        record(rows, row, work.state, residual, total, good)

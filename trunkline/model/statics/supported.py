@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 
 from trunkline.errors import InputError
-from trunkline.model.elements import BRANCH, DIAGONAL, SLIDER, all_elements, cables, holes
+from trunkline.model.elements import BRANCH, DIAGONAL, SLIDER, all_elements, cables, hole_tendons
 
 _POSITION_DYNAMICS = (
     mujoco.mjtDyn.mjDYN_NONE,
@@ -59,19 +59,19 @@ def _require_unbranched_hinges(model: mujoco.MjModel) -> None:
         if joints != 2:
             raise InputError(f"model: body {name!r}: found {joints} hinges, expected 2")
         if not np.allclose(model.jnt_pos[first], model.jnt_pos[first + 1], atol=1e-12):
-            found = f"{model.jnt_pos[first]} and {model.jnt_pos[first + 1]}"
-            raise InputError(f"model: body {name!r}: found hinges at {found}, expected one point")
+            actual = f"{model.jnt_pos[first]} and {model.jnt_pos[first + 1]}"
+            raise InputError(f"model: body {name!r}: found hinges at {actual}, expected one point")
         parent = model.body_weldid[model.body_parentid[body]]
         expected = units[index - 1] if index else 0
         if parent != expected:
-            found, wanted = model.body(parent).name, model.body(expected).name
-            raise InputError(f"model: body {name!r}: found parent {found!r}, expected {wanted!r}: no branches")
+            actual, wanted = model.body(parent).name, model.body(expected).name
+            raise InputError(f"model: body {name!r}: found parent {actual!r}, expected {wanted!r}: no branches")
 
 
 def unit_bodies(model: mujoco.MjModel) -> np.ndarray:
     """Bodies that have joints, base first, but those of Maxwell branches, which bear nothing at rest. Bodies without
     joints belong to the unit they are welded to."""
-    branches = [model.jnt_bodyid[one.own] for one in all_elements(model, BRANCH)]
+    branches = [model.jnt_bodyid[group.branch] for group in all_elements(model, BRANCH)]
     return np.setdiff1d(np.flatnonzero(model.body_jntnum > 0), np.concatenate([[], *branches]).astype(int))
 
 
@@ -86,8 +86,9 @@ def _require_no_contacts(model: mujoco.MjModel) -> None:
         )
         meets[model.body_weldid[model.geom_bodyid] == model.body_weldid[model.geom_bodyid[geom]]] = 0
         if np.any(meets):
-            one, other = (_geom_name(model, index) for index in (geom, int(np.flatnonzero(meets)[0])))
-            raise InputError(f"model: {one}: may touch {other}, expected no contacts (contype and conaffinity 0)")
+            first, second = (_geom_name(model, index) for index in (geom, int(np.flatnonzero(meets)[0])))
+            expected = "expected no contacts (contype and conaffinity 0)"
+            raise InputError(f"model: {first}: may touch {second}, {expected}")
 
 
 def _geom_name(model: mujoco.MjModel, geom: int) -> str:
@@ -97,8 +98,8 @@ def _geom_name(model: mujoco.MjModel, geom: int) -> str:
 
 
 def _require_site_tendons(model: mujoco.MjModel) -> None:
-    parts = [one.tendon for kind in (BRANCH, SLIDER, DIAGONAL) for one in all_elements(model, kind)]
-    parts.append(holes(model).ravel())
+    parts = [group.tendon for kind in (BRANCH, SLIDER, DIAGONAL) for group in all_elements(model, kind)]
+    parts.append(hole_tendons(model).ravel())
     for tendon in np.setdiff1d(np.arange(model.ntendon), np.concatenate(parts)):
         name = model.tendon(tendon).name
         path = slice(model.tendon_adr[tendon], model.tendon_adr[tendon] + model.tendon_num[tendon])

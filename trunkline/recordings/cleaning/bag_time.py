@@ -5,13 +5,13 @@ import numpy as np
 from trunkline.recordings.cleaning.motors import by_recorder, dated
 from trunkline.recordings.cleaning.trial_window import Stretch
 from trunkline.recordings.session.session import Session
-from trunkline.recordings.session.source import Source
+from trunkline.recordings.session.source import LogSource
 from trunkline.recordings.signals.clock import LoggedOffset, offset_by_log_times
 
 COPIED = 10_000  # ns; log times that follow the stamps this closely were copied from them, by whatever wrote the log
 
 
-def logged_offset(source: Source, session: Session, stretch: Stretch) -> LoggedOffset | None:
+def logged_offset(source: LogSource, session: Session, stretch: Stretch) -> LoggedOffset | None:
     """The offset of a trial's motors by log times; None where there are no motors or log times carry nothing."""
     poses, recorder = source.poses, by_recorder(source, session)
     streams = [some for some in (source.commands, source.tendon_positions) if some is not None and len(some.stamps)]

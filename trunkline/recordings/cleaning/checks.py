@@ -16,7 +16,7 @@ Item = TypeVar("Item")
 
 
 @dataclass
-class Limits:
+class TrialLimits:
     """What a trial must have. duration: s. coverage: share of frames in which a body is seen.
 
     disorder: s by which a stamp may be behind one before it and still be sorted in.
@@ -65,8 +65,8 @@ def in_order(stamps: np.ndarray, disorder: float, where: str, findings: Findings
     back = np.maximum.accumulate(stamps) - stamps
     if back.max(initial=0) > disorder * 1e9:
         worst = int(np.argmax(back > disorder * 1e9))
-        found = f"time runs backwards by {back[worst] * 1e-9:.3f} s at message {worst}"
-        raise InputError(f"{where}: {found}, expected no step back beyond {disorder:g} s")
+        problem = f"time runs backwards by {back[worst] * 1e-9:.3f} s at message {worst}"
+        raise InputError(f"{where}: {problem}, expected no step back beyond {disorder:g} s")
     rows = np.argsort(stamps, kind="stable")
     if np.any(back > 0):
         findings.repairs.append(f"{int(np.sum(back > 0))} frames out of order sorted by their stamps")

@@ -6,11 +6,11 @@ from typing import Literal
 import numpy as np
 
 from trunkline.recordings.cleaning.checks import Findings, deciding
-from trunkline.recordings.cleaning.gravity_direction import check_levels, check_vertical
+from trunkline.recordings.cleaning.gravity_direction import check_gravity_direction, check_levels
 from trunkline.recordings.session.session import FixedBase, Session
 from trunkline.recordings.signals.clock import agree
 from trunkline.recordings.trials.experiments import EXPERIMENTS
-from trunkline.recordings.trials.raw_trial import Take
+from trunkline.recordings.trials.raw_trial import RawTrial
 
 AHEAD = 0.03  # s, by which a fit of its motion may put an arm ahead of its tendons
 LEAST = 1e-3  # s, by which clocks of trials may differ at least before it is said
@@ -31,86 +31,87 @@ class MotorClock:
     lag: float | None = None
 
 
-def align_clocks(takes: list[Take], findings: list[Findings], longest_lag: float) -> MotorClock:
+def align_clocks(takes: list[RawTrial], findings: list[Findings], longest_lag: float) -> MotorClock:
     """Give every take the offset of its motors' clock.
 
     By log times it is each trial's own. The arm's motion, in whose offset its lag is, checks them: no arm is ahead of
-    its tendons, or far behind them. It decides where log times tell nothing or cannot be true, and it is said that the
-    lag is in it then. What the session's takes agree on is by those for identification alone, so that the others stay
-    unseen until they validate; by all, where those tell nothing, and then it is said.
+    its tendons, or far behind them. It decides where log times are missing or impossible, with a warning that the lag
+    is included. The session's common offset comes from the split `identify` alone, so that other trials stay unused
+    until they validate; from all, with a warning, where `identify` gives none.
 
     Args:
         longest_lag: s, by which the arm may move after its tendons, and lags of trials may differ.
     """
     pairs = list(zip(takes, findings, strict=True))
-    logged = {take.name: found.by_log_times.offset for take, found in pairs if found.by_log_times}
-    moved = {take.name: fit.offset for take, found in pairs if (fit := found.by_motion) and fit.certain}
+    logged = {take.name: record.by_log_times.offset for take, record in pairs if record.by_log_times}
+    moved = {take.name: fit.offset for take, record in pairs if (fit := record.by_motion) and fit.certain}
     lags = {name: moved[name] - offset for name, offset in logged.items() if name in moved}
-    clock, said = _agreed(takes, findings, logged, moved, lags, longest_lag)
-    for take, found in pairs:
+    clock, remarks = _agreed(takes, findings, logged, moved, lags, longest_lag)
+    for take, record in pairs:
         take.clock_offset = clock.offset
-        found.warnings += said
+        record.warnings += remarks
         if clock.by == "log times" and take.name in logged:
-            take.clock_offset = _own(clock, logged[take.name], lags.get(take.name), longest_lag, found)
+            take.clock_offset = _trial_offset(clock, logged[take.name], lags.get(take.name), longest_lag, record)
     return clock
 
 
 def _agreed(
-    takes: list[Take],
+    takes: list[RawTrial],
     findings: list[Findings],
     logged: dict[str, float],
     moved: dict[str, float],
     lags: dict[str, float],
     longest_lag: float,
 ) -> tuple[MotorClock, list[str]]:
-    """What the takes agree on, and what is to be said of it."""
+    """The common offset of the takes, and remarks about it."""
     splits = {take.name: take.split for take in takes}
-    told, others = deciding(logged or moved, splits.__getitem__)
-    if not told:
+    chosen, others = deciding(logged or moved, splits.__getitem__)
+    if not chosen:
         driven = any(len(take.tendons) and not EXPERIMENTS[take.experiment].static for take in takes)
         nothing = "clock: neither log times nor motion tell the motors' offset; it is taken for 0"
         return MotorClock(), [nothing] * driven
-    offset, spread = agree([(logged or moved)[name] for name in told])
-    said = []
+    offset, spread = agree([(logged or moved)[name] for name in chosen])
+    remarks = []
     if others:
         tells = f"clock: no trial of the split identify tells the motors' offset of {offset:.3f} s"
-        said.append(f"{tells}; it is of trials of other splits")
+        remarks.append(f"{tells}; it is of trials of other splits")
     lag = float(np.median([lags[name] for name in deciding(lags, splits.__getitem__)[0]])) if lags else None
     if logged and (lag is None or -AHEAD <= lag <= longest_lag):
-        uncertain = [found.by_log_times.uncertainty for found in findings if found.by_log_times]
-        return MotorClock(offset, spread, float(np.median(uncertain)), "log times", lag), said
+        uncertain = [record.by_log_times.uncertainty for record in findings if record.by_log_times]
+        return MotorClock(offset, spread, float(np.median(uncertain)), "log times", lag), remarks
     why = "log times tell nothing of it"
     if lag is not None:
         offset, spread = agree([moved[name] for name in deciding(moved, splits.__getitem__)[0]])
         expected = f"expected {-AHEAD:g} to {longest_lag:g} s: does one recorder log both topics?"
         why = f"by log times the arm would move {lag:+.3f} s after its tendons, {expected}"
-    said.append(f"clock: the motors' offset of {offset:.3f} s is by the arm's motion, and its lag is in it; {why}")
-    return MotorClock(offset, spread, None, "motion"), said
+    remarks.append(f"clock: the motors' offset of {offset:.3f} s is by the arm's motion, and its lag is in it; {why}")
+    return MotorClock(offset, spread, None, "motion"), remarks
 
 
-def _own(clock: MotorClock, own: float, lag: float | None, longest_lag: float, found: Findings) -> float:
-    """The offset of a trial whose log times say `own`, s, in which the arm then lags by `lag`, s."""
+def _trial_offset(clock: MotorClock, logged: float, lag: float | None, longest_lag: float, record: Findings) -> float:
+    """The offset, s, of a trial that has `logged` by its log times, s, with which the arm lags by `lag`, s."""
     if lag is not None and clock.lag is not None and abs(lag - clock.lag) > longest_lag:
         lags = f"in which the arm would lag by {lag:+.3f} s, in the median by {clock.lag:+.3f} s"
-        found.warnings.append(f"clock: the motors' offset by log times is {own:.3f} s, {lags}; the session's is used")
+        offset = f"the motors' offset by log times is {logged:.3f} s"
+        record.warnings.append(f"clock: {offset}, {lags}; the session's is used")
         return clock.offset
-    if clock.uncertainty is not None and abs(own - clock.offset) > max(clock.uncertainty, LEAST):
+    if clock.uncertainty is not None and abs(logged - clock.offset) > max(clock.uncertainty, LEAST):
         apart = f"more than {1e3 * max(clock.uncertainty, LEAST):.1f} ms from the session's {clock.offset:.3f} s"
-        found.warnings.append(f"clock: the motors' offset is {apart}; each such trial has its own, by its log times")
-    return own
+        record.warnings.append(f"clock: the motors' offset is {apart}; each such trial has its own, by its log times")
+    return logged
 
 
-def settle_vertical(takes: list[Take], findings: list[Findings], session: Session) -> None:
-    """Give every take the vertical that its session's tilts prove, and say so; or say what looks wrong."""
+def set_gravity_direction(takes: list[RawTrial], findings: list[Findings], session: Session) -> None:
+    """Set the gravity direction that the session's tilts prove in every take; or warn of what looks wrong."""
     measured_base = not isinstance(session.base, FixedBase)
-    up, said, fallback = check_vertical(takes, measured_base)
-    for take, found in zip(takes, findings, strict=True):
+    up, remark, fallback = check_gravity_direction(takes, measured_base)
+    for take, record in zip(takes, findings, strict=True):
         if up is not None:
             take.up = up
-        if said is not None:
-            (found.warnings if up is None else found.repairs).append(said)
+        if remark is not None:
+            (record.warnings if up is None else record.repairs).append(remark)
         if fallback:
-            told = "those of the split identify do not tell"
-            found.warnings.append(f"up: the vertical is by the tilts of other splits too, as {told}")
-    if measured_base and (up is not None or said is None):
+            reason = "those of the split identify do not tell"
+            record.warnings.append(f"up: the vertical is by the tilts of other splits too, as {reason}")
+    if measured_base and (up is not None or remark is None):
         check_levels(takes, findings)

@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 
 from trunkline.errors import InputError
-from trunkline.recordings.cleaning.checks import Findings, Limits
+from trunkline.recordings.cleaning.checks import Findings, TrialLimits
 from trunkline.recordings.logs.pose_stream import PoseStream
 from trunkline.recordings.signals.steps import find_step, relative, size_at
 
@@ -15,7 +15,7 @@ DRIFT = 0.01  # by which stamps and log times may differ in rate
 CERTAIN = 10.0  # times the jitter that such a drift has to bring in all
 
 
-def check_clocks(poses: PoseStream, clock: str, limits: Limits, where: str, findings: Findings) -> None:
+def check_clocks(poses: PoseStream, clock: str, limits: TrialLimits, where: str, findings: Findings) -> None:
     """Refuse a log whose time would be bent, by a step of a clock that `clock` uses; warn of a step of another.
 
     Raises:
@@ -36,15 +36,15 @@ def check_clocks(poses: PoseStream, clock: str, limits: Limits, where: str, find
         size = step.size if wrong == late else -step.size
         seconds = clocks[late][step.at - 1] - clocks[late][0]
         place = f"at message {step.at}, after {seconds:.2f} s, against {WORDS[other]}"
-        found = f"{WORDS[wrong]} jump by {size:+.3f} s {place}"
+        jump = f"{WORDS[wrong]} jump by {size:+.3f} s {place}"
         if wrong in USED[clock]:
             others = " or ".join(f"`clock: {name}`" for name, used in USED.items() if wrong not in used)
-            raise InputError(f"{where}: {found}, expected a clock that runs evenly, such as {others} in session.yaml")
-        findings.warnings.append(f"{found}; left so, as `clock: {clock}` does not use them")
+            raise InputError(f"{where}: {jump}, expected a clock that runs evenly, such as {others} in session.yaml")
+        findings.warnings.append(f"{jump}; left so, as `clock: {clock}` does not use them")
     fit = findings.logged
     if fit is not None and abs(fit.rate - 1) > max(DRIFT, CERTAIN * fit.jitter / np.ptp(clocks["log"])):
-        said = f"stamps run {100 * abs(1 / fit.rate - 1):.1f} % {'slower' if fit.rate > 1 else 'faster'} than log times"
-        findings.warnings.append(f"{said}; time is by `clock: {clock}`")
+        rate = f"{100 * abs(1 / fit.rate - 1):.1f} % {'slower' if fit.rate > 1 else 'faster'}"
+        findings.warnings.append(f"stamps run {rate} than log times; time is by `clock: {clock}`")
 
 
 def _clocks(poses: PoseStream) -> dict[str, np.ndarray]:

@@ -13,14 +13,14 @@ EVEN = 0.01  # share of a frame by which stamps differ that were counted and not
 
 
 @dataclass
-class Lost:
+class DroppedFrames:
     """`frames` are missing after frame `after`."""
 
     after: int
     frames: int
 
 
-def find_lost(time: np.ndarray, positions: np.ndarray, noise: float) -> list[Lost]:
+def find_dropped_frames(time: np.ndarray, positions: np.ndarray, noise: float) -> list[DroppedFrames]:
     """Where even stamps hide a loss.
 
     Around every step a parabola is fitted to three frames before and three after it, once as stamped and once with
@@ -34,7 +34,7 @@ def find_lost(time: np.ndarray, positions: np.ndarray, noise: float) -> list[Los
     step = np.median(steps) if len(steps) else 0.0
     even = np.abs(steps - step) < EVEN * step
     window = np.arange(1 - SIDE, SIDE + 1)
-    found = []
+    gaps = []
     fits = [_misfit(np.where(window > 0, window + lost, window)) for lost in range(MOST + 1)]
     shift = np.zeros(len(time), dtype=int)  # frames put in before each frame
     for after in range(SIDE - 1, len(time) - SIDE):
@@ -52,14 +52,14 @@ def find_lost(time: np.ndarray, positions: np.ndarray, noise: float) -> list[Los
         best = int(np.argmin(misfits))
         together = bodies[best, jumped] < bodies[0, jumped] / 2
         if 0 < best < MOST and together.all() and misfits[0] > GAIN * misfits[best]:
-            found.append(Lost(after, best))
+            gaps.append(DroppedFrames(after, best))
             shift[after + 1 :] += best
-    return found
+    return gaps
 
 
 def unbroken(time: np.ndarray, positions: np.ndarray) -> slice:
     """The longest part without a gap that nobody can count: where several bodies are much faster for one step than
-    around it, more was lost than `find_lost` looks for.
+    around it, more was lost than `find_dropped_frames` looks for.
 
     Args:
         time: (T,) s, with what could be counted put back. positions: (T, S, 3) m, NaN where not seen.
@@ -84,7 +84,7 @@ def _misfit(frames: np.ndarray) -> np.ndarray:
     return np.eye(len(frames)) - powers @ np.linalg.pinv(powers)
 
 
-def put_back(time: np.ndarray, lost: list[Lost]) -> np.ndarray:
+def put_back(time: np.ndarray, lost: list[DroppedFrames]) -> np.ndarray:
     """`time` (T,) with every later frame moved by the time of those that are missing before it."""
     step, moved = np.median(np.diff(time)), time.copy()
     for place in lost:

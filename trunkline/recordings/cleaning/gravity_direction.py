@@ -5,7 +5,7 @@ import numpy as np
 from trunkline.recordings.cleaning.checks import Findings
 from trunkline.recordings.signals.base_frame import average_base
 from trunkline.recordings.trials.experiments import EXPERIMENTS, TILT
-from trunkline.recordings.trials.raw_trial import Take
+from trunkline.recordings.trials.raw_trial import RawTrial
 from trunkline.recordings.trials.splits import IDENTIFY
 
 AXES = np.concatenate([np.eye(3), -np.eye(3)])
@@ -15,7 +15,7 @@ SPREAD = 20.0  # degrees between levels, so that not every direction on a cone f
 HANGS, LIES = np.radians(30), np.radians(60)  # from the vertical: an arm that hangs, and one that does not
 
 
-def check_vertical(takes: list[Take], measured_base: bool) -> tuple[np.ndarray | None, str | None, bool]:
+def check_gravity_direction(takes: list[RawTrial], measured_base: bool) -> tuple[np.ndarray | None, str | None, bool]:
     """(the vertical (3,) to take instead, or None; what to tell, or None; whether other splits than identify decided).
 
     It is replaced only where static trials at several tilts fit exactly one other axis of the frame: those of the
@@ -27,15 +27,15 @@ def check_vertical(takes: list[Take], measured_base: bool) -> tuple[np.ndarray |
     tilted = [take for take in takes if EXPERIMENTS[take.experiment].level is TILT and take.level is not None]
     if not tilted or not measured_base:
         return None, _check_hanging(takes), False
-    own = [take for take in tilted if take.split == IDENTIFY]
-    up, said = _by_tilts(own) if own else (None, None)
-    if len(own) == len(tilted) or up is not None or (own and said is None):
-        return up, said, False
+    identifying = [take for take in tilted if take.split == IDENTIFY]
+    up, remark = _by_tilts(identifying) if identifying else (None, None)
+    if len(identifying) == len(tilted) or up is not None or (identifying and remark is None):
+        return up, remark, False
     up, by_all = _by_tilts(tilted)
-    return (None, said, False) if up is None and own else (up, by_all, up is not None)
+    return (None, remark, False) if up is None and identifying else (up, by_all, up is not None)
 
 
-def _by_tilts(static: list[Take]) -> tuple[np.ndarray | None, str | None]:
+def _by_tilts(static: list[RawTrial]) -> tuple[np.ndarray | None, str | None]:
     """(another vertical that these tilts prove, or None; what to tell, or None where the declared one fits)."""
     up, levels = static[0].up, np.radians([take.level for take in static if take.level is not None])
     z = np.array([_axis(take) for take in static])
@@ -44,23 +44,24 @@ def _by_tilts(static: list[Take]) -> tuple[np.ndarray | None, str | None]:
         return None, None
     misfits = np.array([_misfit(z, axis, levels) for axis in AXES])
     best, second = np.argsort(misfits)[:2]
-    found = f"up: the tilts of {len(static)} static trials are {np.degrees(off):.0f}° off their levels with {_show(up)}"
+    difference = f"{np.degrees(off):.0f}° off their levels with {_show(up)}"
+    problem = f"up: the tilts of {len(static)} static trials are {difference}"
     if misfits[best] < FITS and misfits[second] > OFF and np.ptp(np.degrees(levels)) >= SPREAD:
-        return AXES[best], f"{found}, {np.degrees(misfits[best]):.1f}° with {_show(AXES[best])}, which was taken"
-    return None, f"{found}, and no other axis fits: check the levels, `frame.up` and `base` in session.yaml"
+        return AXES[best], f"{problem}, {np.degrees(misfits[best]):.1f}° with {_show(AXES[best])}, which was taken"
+    return None, f"{problem}, and no other axis fits: check the levels, `frame.up` and `base` in session.yaml"
 
 
-def check_levels(takes: list[Take], findings: list[Findings]) -> None:
+def check_levels(takes: list[RawTrial], findings: list[Findings]) -> None:
     """Warn of each tilt whose base is not inclined as its level says, by the vertical that the takes have."""
-    for take, found in zip(takes, findings, strict=True):
+    for take, record in zip(takes, findings, strict=True):
         if EXPERIMENTS[take.experiment].level is TILT and take.level is not None:
             tilt = np.degrees(np.arccos(np.clip(_axis(take) @ take.up, -1, 1)))
             if abs(tilt - take.level) > np.degrees(OFF):
-                expected = f"expected at most {np.degrees(OFF):.0f}° between them"
-                found.warnings.append(f"level: found {take.level:g}, but the base is tilted by {tilt:.0f}°, {expected}")
+                problem = f"level: found {take.level:g}, but the base is tilted by {tilt:.0f}°"
+                record.warnings.append(f"{problem}, expected at most {np.degrees(OFF):.0f}° between them")
 
 
-def _axis(take: Take) -> np.ndarray:
+def _axis(take: RawTrial) -> np.ndarray:
     """The base's z axis (3,) in the motion-capture frame."""
     return average_base(take.base_positions, take.base_quaternions).rotation.apply([0, 0, 1])
 
@@ -70,7 +71,7 @@ def _misfit(z: np.ndarray, up: np.ndarray, levels: np.ndarray) -> float:
     return float(np.median(np.abs(np.arccos(np.clip(z @ up, -1, 1)) - levels)))
 
 
-def _check_hanging(takes: list[Take]) -> str | None:
+def _check_hanging(takes: list[RawTrial]) -> str | None:
     """After a release an arm hangs more or less; told where all releases come to rest along another axis."""
     hanging = [_hang(take) for take in takes if EXPERIMENTS[take.experiment].hangs]
     if not hanging:
@@ -81,11 +82,11 @@ def _check_hanging(takes: list[Take]) -> str | None:
     best = int(np.argmin(others))
     if angle < LIES or others[best] > HANGS:
         return None
-    found = f"released arms come to rest {np.degrees(angle):.0f}° from hanging with {_show(up)}"
-    return f"up: {found}, {np.degrees(others[best]):.0f}° with {_show(AXES[best])}: check `frame.up` in session.yaml"
+    problem = f"released arms come to rest {np.degrees(angle):.0f}° from hanging with {_show(up)}"
+    return f"up: {problem}, {np.degrees(others[best]):.0f}° with {_show(AXES[best])}: check `frame.up` in session.yaml"
 
 
-def _hang(take: Take) -> np.ndarray:
+def _hang(take: RawTrial) -> np.ndarray:
     """The direction (3,) from the base to the farthest segment, over the last fifth of a take."""
     ends = slice(-max(1, len(take.time) // 5), None)
     middle = np.nanmedian(take.positions[ends], axis=0) - np.nanmedian(take.base_positions[ends], axis=0)

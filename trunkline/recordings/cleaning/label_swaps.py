@@ -21,7 +21,7 @@ SAMPLE = 200  # frames of a log that tell the usual distances
 
 
 @dataclass
-class Swap:
+class LabelSwap:
     """bodies: by index, each label on the next one's pose, the last on the first's. frames: (T,) in which they are."""
 
     bodies: tuple[int, ...]
@@ -38,14 +38,14 @@ def usual_distances(logs: list[np.ndarray]) -> np.ndarray:
     together = np.concatenate(samples)
     distances = np.full(together.shape[1:], np.nan)
     for first, second in zip(*np.triu_indices(len(distances), 1), strict=True):
-        seen = together[:, first, second]
-        seen = seen[np.isfinite(seen)]
-        if len(seen):
-            distances[first, second] = distances[second, first] = np.median(seen)
+        apart = together[:, first, second]
+        apart = apart[np.isfinite(apart)]
+        if len(apart):
+            distances[first, second] = distances[second, first] = np.median(apart)
     return distances
 
 
-def find_swaps(positions: np.ndarray, usual: np.ndarray, marked_base: bool = True) -> list[Swap]:
+def find_label_swaps(positions: np.ndarray, usual: np.ndarray, marked_base: bool = True) -> list[LabelSwap]:
     """Labels that changed places, up to `LONGEST` at a time, among the bodies of (T, B, 3) m, the base first.
 
     Args:
@@ -64,7 +64,7 @@ def find_swaps(positions: np.ndarray, usual: np.ndarray, marked_base: bool = Tru
         left = _misfit(distances[flagged], usual, bodies)
         better = left < least[flagged]
         least[flagged[better]], best[flagged[better]] = left[better], place
-    return [Swap(bodies, best == place) for place, bodies in enumerate(candidates) if (best == place).any()]
+    return [LabelSwap(bodies, best == place) for place, bodies in enumerate(candidates) if (best == place).any()]
 
 
 def _candidates(usual: np.ndarray, marked_base: bool) -> list[tuple[int, ...]]:
@@ -100,16 +100,16 @@ def _exchanged(distances: np.ndarray, usual: np.ndarray, bodies: tuple[int, ...]
     others = [b for b in others if np.isfinite(usual[list(bodies), b]).all()][:REFERENCES]
     if len(others) < 2:
         return np.zeros(len(distances), bool)
-    kept, exchanged, contrast, terms, both = (np.zeros(len(distances)) for _ in range(5))
+    as_labelled, exchanged, contrast, terms, both = (np.zeros(len(distances)) for _ in range(5))
     for label, pose in zip(bodies, (*bodies[1:], bodies[0]), strict=True):
-        own, other = usual[label, others], usual[pose, others]
-        found = distances[:, label, others]
-        seen = np.isfinite(found)
-        kept += np.sum(np.where(seen, abs(found - own), 0), axis=1)
-        exchanged += np.sum(np.where(seen, abs(found - other), 0), axis=1)
-        contrast += np.sum(np.where(seen, abs(own - other), 0), axis=1)
-        terms += seen.sum(axis=1)
-        both += seen.any(axis=1)
-    told = ((terms >= 3) | ((terms == 2) & (both == 1))) & (contrast > LEAST_CONTRAST * terms)
-    flagged = told & (kept > 0.5 * contrast) & (exchanged < CLEAR * kept)
+        usual_own, usual_other = usual[label, others], usual[pose, others]
+        measured = distances[:, label, others]
+        visible = np.isfinite(measured)
+        as_labelled += np.sum(np.where(visible, abs(measured - usual_own), 0), axis=1)
+        exchanged += np.sum(np.where(visible, abs(measured - usual_other), 0), axis=1)
+        contrast += np.sum(np.where(visible, abs(usual_own - usual_other), 0), axis=1)
+        terms += visible.sum(axis=1)
+        both += visible.any(axis=1)
+    enough = ((terms >= 3) | ((terms == 2) & (both == 1))) & (contrast > LEAST_CONTRAST * terms)
+    flagged = enough & (as_labelled > 0.5 * contrast) & (exchanged < CLEAR * as_labelled)
     return flagged & ((both == len(bodies)) | lasting(flagged, LONE))

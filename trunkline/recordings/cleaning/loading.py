@@ -7,52 +7,54 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.recordings.cleaning.bag_time import logged_offset
-from trunkline.recordings.cleaning.checks import Findings, Limits
+from trunkline.recordings.cleaning.checks import Findings, TrialLimits
 from trunkline.recordings.cleaning.motors import check_motors, read_motors
 from trunkline.recordings.cleaning.reference import Reference, reference_of
-from trunkline.recordings.cleaning.repairs import drop_frozen, good_samples, longest_part, untangle, with_lost_time
+from trunkline.recordings.cleaning.repairs import drop_frozen, good_samples, longest_part, untangle, with_dropped_time
 from trunkline.recordings.cleaning.trial_window import Stretch, check_seen, columns_of, read_stretch, split_base
 from trunkline.recordings.session.session import Session, TrialEntry
-from trunkline.recordings.session.source import Source, open_log
+from trunkline.recordings.session.source import LogSource, open_log
 from trunkline.recordings.signals.clock import OffsetFit, estimate_offset
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_stepwise
-from trunkline.recordings.trials.raw_trial import Take
+from trunkline.recordings.trials.raw_trial import RawTrial
 
 
-def take_in(folder: Path, session: Session, limits: Limits) -> Iterator[tuple[TrialEntry, Take | InputError, Findings]]:
+def load_raw_trials(
+    folder: Path, session: Session, limits: TrialLimits
+) -> Iterator[tuple[TrialEntry, RawTrial | InputError, Findings]]:
     """Read trial by trial. A trial that cannot be used comes as the error that says why.
 
     Every take has the same segments: those that session.yaml maps, or all that any log shows.
     """
-    logs: dict[str, Source | InputError] = {}
-    read: list[tuple[Source, Stretch] | InputError] = []
+    logs: dict[str, LogSource | InputError] = {}
+    read: list[tuple[LogSource, Stretch] | InputError] = []
     findings = [Findings(warnings=list(session.shared.get(trial.name, []))) for trial in session.trials]
-    for trial, found in zip(session.trials, findings, strict=True):
+    for trial, record in zip(session.trials, findings, strict=True):
         try:
             if trial.file not in logs:
                 logs[trial.file] = _opened(folder / trial.file, session)
             source = logs[trial.file]
             if isinstance(source, InputError):
                 raise source
-            found.where = f"{source.log.path}: trial {trial.name}"
-            found.log = source.log
-            found.repairs += [f"log: {damage}" for damage in source.log.damage]
-            read.append((source, read_stretch(source, trial, session, limits, found)))
+            record.where = f"{source.log.path}: trial {trial.name}"
+            record.log = source.log
+            record.repairs += [f"log: {damage}" for damage in source.log.damage]
+            read.append((source, read_stretch(source, trial, session, limits, record)))
         except InputError as error:
             read.append(error)
     usable = [(trial, *some) for trial, some in zip(session.trials, read, strict=True) if isinstance(some, tuple)]
     reference = reference_of(session, usable)
-    for trial, some, found in zip(session.trials, read, findings, strict=True):
+    for trial, some, record in zip(session.trials, read, findings, strict=True):
         if isinstance(some, InputError):
-            yield trial, some, found
+            yield trial, some, record
             continue
         try:
-            yield trial, _take(*some, trial, session, reference, limits, found), found
+            yield trial, _take(*some, trial, session, reference, limits, record), record
         except InputError as error:
-            yield trial, error, found
+            yield trial, error, record
 
 
-def _opened(path: Path, session: Session) -> Source | InputError:
+def _opened(path: Path, session: Session) -> LogSource | InputError:
     """A log, decoded; or why it cannot be, for all of its trials."""
     try:
         return open_log(path, session)
@@ -61,14 +63,14 @@ def _opened(path: Path, session: Session) -> Source | InputError:
 
 
 def _take(
-    source: Source,
+    source: LogSource,
     stretch: Stretch,
     trial: TrialEntry,
     session: Session,
     reference: Reference,
-    limits: Limits,
+    limits: TrialLimits,
     findings: Findings,
-) -> Take:
+) -> RawTrial:
     """Check and repair one trial.
 
     Raises:
@@ -87,7 +89,7 @@ def _take(
     )
     untangle((base_positions, base_quaternions), positions, quaternions, stretch.time, reference, findings)
     if not is_stepwise(trial.experiment):  # there the arm jumps from frame to frame
-        stretch.time = with_lost_time(stretch.time, positions, bool(source.joint_topics), findings)
+        stretch.time = with_dropped_time(stretch.time, positions, bool(source.joint_topics), findings)
         if not source.joint_topics:
             part = longest_part(stretch.time, positions, findings)
             positions, base_positions, base_quaternions = positions[part], base_positions[part], base_quaternions[part]
@@ -96,7 +98,7 @@ def _take(
     motors = read_motors(source, session, stretch, limits, where, findings)
     if EXPERIMENTS[trial.experiment].needs_motors:
         check_motors(source, session, reference.joint_topics, motors, stretch, limits, where)
-    take = Take(
+    take = RawTrial(
         name=trial.name,
         experiment=trial.experiment,
         split=trial.split,
@@ -115,7 +117,7 @@ def _take(
     return take
 
 
-def _by_motion(take: Take, limits: Limits) -> OffsetFit | None:
+def _by_motion(take: RawTrial, limits: TrialLimits) -> OffsetFit | None:
     """By how much the motors' clock is off, by what was wound, or else by what was commanded, while the arm moves."""
     if EXPERIMENTS[take.experiment].static:
         return None

@@ -5,18 +5,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from trunkline.errors import InputError
-from trunkline.recordings.cleaning.checks import Findings, Limits, in_order
+from trunkline.recordings.cleaning.checks import Findings, TrialLimits, in_order
 from trunkline.recordings.cleaning.trial_window import Stretch
 from trunkline.recordings.logs.joint_stream import JointStream
 from trunkline.recordings.logs.messages import JOINTS
 from trunkline.recordings.session.session import Session
-from trunkline.recordings.session.source import Source
+from trunkline.recordings.session.source import LogSource
 
 ROLES = ("command", "tendon position")
 
 
 @dataclass
-class Motors:
+class MotorSignals:
     """What moves the tendons around a trial, each stream on its own times: as in a take."""
 
     tendons: tuple[str, ...]
@@ -27,8 +27,8 @@ class Motors:
 
 
 def read_motors(
-    source: Source, session: Session, stretch: Stretch, limits: Limits, where: str, findings: Findings
-) -> Motors:
+    source: LogSource, session: Session, stretch: Stretch, limits: TrialLimits, where: str, findings: Findings
+) -> MotorSignals:
     """The messages near enough to the stretch, dated from its first frame.
 
     Raises:
@@ -62,16 +62,16 @@ def read_motors(
         if not finite.all():
             findings.repairs.append(f"{int(np.sum(~finite))} {role} messages that are not finite dropped")
         arrays += [seconds[near & finite], pulls[near & finite]]
-    return Motors(tuple(tendons), *arrays)
+    return MotorSignals(tuple(tendons), *arrays)
 
 
 def check_motors(
-    source: Source,
+    source: LogSource,
     session: Session,
     joint_topics: tuple[str, ...],
-    motors: Motors,
+    motors: MotorSignals,
     stretch: Stretch,
-    limits: Limits,
+    limits: TrialLimits,
     where: str,
 ) -> None:
     """Where nothing pulls within reach of the poses, or a topic's messages are all out of it: raises InputError with
@@ -91,7 +91,7 @@ def check_motors(
     if any(within) and not lost:
         return
     recorder = by_recorder(source, session)
-    found = [
+    streams_found = [
         f"no {role} topic"
         if stream is None
         else f"{len(stream.stamps)} messages on {stream.topic}{'' if some else _distance(stream, recorder, stretch)}"
@@ -100,10 +100,10 @@ def check_motors(
     both = "and" if any(within) else "or"
     expected = f"expected commands {both} tendon positions within {limits.clock_offset:g} s of the poses"
     topics = f" among: {', '.join(source.joint_topics) or 'none'} ({kind})" if not any(streams) else ""
-    raise InputError(f"{where}: found {' and '.join(found)}{topics}, {expected}")
+    raise InputError(f"{where}: found {' and '.join(streams_found)}{topics}, {expected}")
 
 
-def by_recorder(source: Source, session: Session) -> bool:
+def by_recorder(source: LogSource, session: Session) -> bool:
     """Whether the recorder's clock dates commands and positions: where that is meant, or one of them has no other."""
     streams = [stream for stream in (source.commands, source.tendon_positions) if stream is not None]
     return session.clock == "log" or any(not s.timed or not s.stamps.any() for s in streams if len(s.stamps))

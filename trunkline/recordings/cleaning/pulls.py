@@ -5,7 +5,7 @@ import numpy as np
 from trunkline.recordings.signals.clock import MIN_TRAVEL
 from trunkline.recordings.signals.smoothing import noise_level
 from trunkline.recordings.trials.experiments import EXPERIMENTS, PULL
-from trunkline.recordings.trials.raw_trial import Take
+from trunkline.recordings.trials.raw_trial import RawTrial
 
 FOLLOWS, FAILS = 0.9, 0.5  # correlations of a measured tendon with its command's, and with another's
 FITS = 1.25  # factor within which a pull is as its level says, whatever is let out meanwhile
@@ -15,22 +15,22 @@ NOISIER = 5.0  # times the measurements' noise, that no command has
 HELD = MIN_TRAVEL  # m, to either side, by which a tendon that is held may be wound
 
 
-def encoder_zeros(takes: list[Take], idle: float) -> dict[str, float]:
+def encoder_zeros(takes: list[RawTrial], idle: float) -> dict[str, float]:
     """What each tendon's measured position reads where its command is 0, m, by the takes that pull.
 
     None of a tendon of which most of them are off by more than `idle`: its encoder starts anywhere in each trial.
     """
-    found: dict[str, list[float]] = {}
+    readings: dict[str, list[float]] = {}
     for take in takes:
         if EXPERIMENTS[take.experiment].needs_motors and take.commands.size and take.tendon_positions.size:
             ahead = np.median(take.tendon_positions - _commanded(take), axis=0)
             for name, reads in zip(take.tendons, ahead.tolist(), strict=True):
-                found.setdefault(name, []).append(reads)
-    middle = {name: float(np.median(reads)) for name, reads in found.items()}
-    return {name: zero for name, zero in middle.items() if np.median(np.abs(np.array(found[name]) - zero)) <= idle}
+                readings.setdefault(name, []).append(reads)
+    middle = {name: float(np.median(reads)) for name, reads in readings.items()}
+    return {name: zero for name, zero in middle.items() if np.median(np.abs(np.array(readings[name]) - zero)) <= idle}
 
 
-def check_pulls(take: Take, length: float, idle: float, factor: float, zeros: dict[str, float]) -> list[str]:
+def check_pulls(take: RawTrial, length: float, idle: float, factor: float, zeros: dict[str, float]) -> list[str]:
     """What cannot be true of a take's tendons, a sentence each.
 
     Args:
@@ -43,23 +43,23 @@ def check_pulls(take: Take, length: float, idle: float, factor: float, zeros: di
     if kind.needs_motors and kind.level is PULL and take.level is not None:
         for key, pulls in (("commands", take.commands), ("tendon positions", take.tendon_positions)):
             # from the straight arm, or where encoders start anywhere, from the trial's begin
-            said = [_against_level(key, pulls - zero, 1e-3 * take.level, factor) for zero in (0.0, pulls[:1])]
-            if pulls.size and all(said):
-                return said[1]
+            faults = [_against_level(key, pulls - zero, 1e-3 * take.level, factor) for zero in (0.0, pulls[:1])]
+            if pulls.size and all(faults):
+                return faults[1]
     elif kind.needs_motors:
-        said = _held(take) if kind.static and not kind.stepwise else []
-        said += _beyond("commands", take.commands, length)
-        said += _beyond("tendon positions", take.tendon_positions - take.tendon_positions[:1], length)
-        if said:
-            return said
-    elif said := _pulled(take, kind.static, idle, zeros):
-        return said
+        faults = _fixed_commands(take) if kind.static and not kind.stepwise else []
+        faults += _beyond("commands", take.commands, length)
+        faults += _beyond("tendon positions", take.tendon_positions - take.tendon_positions[:1], length)
+        if faults:
+            return faults
+    elif faults := _pulled(take, kind.static, idle, zeros):
+        return faults
     if take.commands.size and take.tendon_positions.size:
         return _against_commands(take, factor)
     return []
 
 
-def _pulled(take: Take, static: bool, idle: float, zeros: dict[str, float]) -> list[str]:
+def _pulled(take: RawTrial, static: bool, idle: float, zeros: dict[str, float]) -> list[str]:
     """In an experiment without motors, commands do not move while the arm does, and most of the time no tendon is drawn
     in. A loose one may well move by itself, and may be let out by any length.
 
@@ -71,8 +71,8 @@ def _pulled(take: Take, static: bool, idle: float, zeros: dict[str, float]) -> l
         wound = np.ptp(take.commands, axis=0)
         most = int(np.argmax(wound))
         if wound[most] > idle:
-            found = f"{take.tendons[most]!r} is wound by {1e3 * wound[most]:.4g} mm"
-            return [f"experiment: commands: {found}, {expected}"]
+            problem = f"{take.tendons[most]!r} is wound by {1e3 * wound[most]:.4g} mm"
+            return [f"experiment: commands: {problem}, {expected}"]
     unknown = np.nan if take.commands.size else 0.0
     zero = np.array([zeros.get(name, unknown) for name in take.tendons])
     for key, time, pulls in (
@@ -82,14 +82,14 @@ def _pulled(take: Take, static: bool, idle: float, zeros: dict[str, float]) -> l
         if not pulls.size:
             continue
         inside = (time >= 0) & (time <= take.time[-1])
-        held = np.nan_to_num(np.median(pulls[inside] if inside.any() else pulls, axis=0))
-        most = int(np.argmax(held))
-        if held[most] > idle:
-            return [f"experiment: {key}: {take.tendons[most]!r} is drawn in by {1e3 * held[most]:.4g} mm, {expected}"]
+        usual = np.nan_to_num(np.median(pulls[inside] if inside.any() else pulls, axis=0))
+        most = int(np.argmax(usual))
+        if usual[most] > idle:
+            return [f"experiment: {key}: {take.tendons[most]!r} is drawn in by {1e3 * usual[most]:.4g} mm, {expected}"]
     return []
 
 
-def _held(take: Take) -> list[str]:
+def _fixed_commands(take: RawTrial) -> list[str]:
     """In an experiment at rest, most of the time every command is about where it is in the middle: windows may touch
     the way to the next pull, the more so as the motors' clock is not set yet."""
     inside = (take.command_time >= 0) & (take.command_time <= take.time[-1])
@@ -99,8 +99,8 @@ def _held(take: Take) -> list[str]:
     most = int(np.argmax(np.mean(off > HELD, axis=0)))
     if np.mean(off[:, most] > HELD) <= 0.5:
         return []
-    found = f"{take.tendons[most]!r} is wound by {1e3 * np.ptp(take.commands[inside, most]):.4g} mm"
-    return [f"experiment: commands: {found}, expected a {take.experiment} to hold them to within {1e3 * HELD:g} mm"]
+    problem = f"{take.tendons[most]!r} is wound by {1e3 * np.ptp(take.commands[inside, most]):.4g} mm"
+    return [f"experiment: commands: {problem}, expected a {take.experiment} to hold them to within {1e3 * HELD:g} mm"]
 
 
 def _beyond(key: str, pulls: np.ndarray, length: float) -> list[str]:
@@ -120,16 +120,16 @@ def _against_level(key: str, wound: np.ndarray, level: float, factor: float) -> 
     mirrored = reverse < off and reverse <= np.log(factor) and off > np.log(FITS)
     if off <= np.log(factor) and not mirrored:
         return []
-    found = f"{key}: found pulls from {0.0 - let_out:.4g} to {pulled:.4g} m"
+    problem = f"{key}: found pulls from {0.0 - let_out:.4g} to {pulled:.4g} m"
     expected = f"expected about {level:.4g} m, as the level says, positive where a tendon is pulled in"
     hint = ": is the sign reversed?" if mirrored else ": are they in mm?" if in_mm <= np.log(factor) else ""
-    return [f"{found}, {expected}{hint}"]
+    return [f"{problem}, {expected}{hint}"]
 
 
-def _against_commands(take: Take, factor: float) -> list[str]:
+def _against_commands(take: RawTrial, factor: float) -> list[str]:
     """Each tendon's measured position follows its own command, forwards, by about as much, and not ahead of it."""
     measured, commanded = take.tendon_positions, _commanded(take)
-    said = []
+    faults = []
     for tendon, name in enumerate(take.tendons):
         if max(np.ptp(measured[:, tendon]), np.ptp(commanded[:, tendon])) < MIN_TRAVEL:
             continue
@@ -137,18 +137,18 @@ def _against_commands(take: Take, factor: float) -> list[str]:
         best = int(np.argmax(alike))
         expected = "expected a tendon to follow its own command"
         if alike[tendon] < -FAILS:
-            said.append(f"tendons: {name!r} moves against its commands, {expected}: is the sign reversed?")
+            faults.append(f"tendons: {name!r} moves against its commands, {expected}: is the sign reversed?")
         elif alike[tendon] < FAILS and alike[best] > FOLLOWS:
-            said.append(f"tendons: {name!r} follows the commands of {take.tendons[best]!r}, {expected}")
+            faults.append(f"tendons: {name!r} follows the commands of {take.tendons[best]!r}, {expected}")
         else:
-            moves, asked = np.ptp(measured[:, tendon]), np.ptp(commanded[:, tendon])
-            if not asked / factor <= moves <= asked * factor:
-                found = f"{name!r} moves by {moves:.4g} m where {asked:.4g} m are commanded"
-                said.append(f"tendons: {found}, {expected}, within a factor of {factor:g}")
-    return said or _exchanged(take, commanded)
+            travel, commanded_travel = np.ptp(measured[:, tendon]), np.ptp(commanded[:, tendon])
+            if not commanded_travel / factor <= travel <= commanded_travel * factor:
+                problem = f"{name!r} moves by {travel:.4g} m where {commanded_travel:.4g} m are commanded"
+                faults.append(f"tendons: {problem}, {expected}, within a factor of {factor:g}")
+    return faults or _exchanged(take, commanded)
 
 
-def _exchanged(take: Take, commanded: np.ndarray) -> list[str]:
+def _exchanged(take: RawTrial, commanded: np.ndarray) -> list[str]:
     """Measurements lag behind commands and have noise; where it is the other way about, topics are exchanged."""
     most = int(np.argmax(np.ptp(commanded, axis=0)))
     if np.ptp(commanded[:, most]) < MIN_TRAVEL or len(take.tendon_time) < 10:
@@ -159,22 +159,22 @@ def _exchanged(take: Take, commanded: np.ndarray) -> list[str]:
     if inside.sum() < 10:
         return []
     shifted = [np.interp(time[inside] - lag, take.command_time, take.commands[:, most]) for lag in lags]
-    lag = float(lags[int(np.argmax([_correlation(measured[inside], one) for one in shifted]))])
+    lag = float(lags[int(np.argmax([_correlation(measured[inside], command) for command in shifted]))])
     noise = [float(noise_level(some)[most]) for some in (take.commands, take.tendon_positions)]
     if lag >= -EARLY and not (lag <= EARLY and noise[0] > NOISIER * noise[1]):
         return []
-    found = f"commands are noisier, by {1e3 * noise[0]:.2g} mm, than what is measured, by {1e3 * noise[1]:.2g} mm"
+    problem = f"commands are noisier, by {1e3 * noise[0]:.2g} mm, than what is measured, by {1e3 * noise[1]:.2g} mm"
     if lag < -EARLY:
-        found = f"what is measured comes {-1e3 * lag:.0f} ms before its command"
-    return [f"topics: {found}: are `commands` and `tendon_positions` exchanged in session.yaml?"]
+        problem = f"what is measured comes {-1e3 * lag:.0f} ms before its command"
+    return [f"topics: {problem}: are `commands` and `tendon_positions` exchanged in session.yaml?"]
 
 
-def _commanded(take: Take) -> np.ndarray:
+def _commanded(take: RawTrial) -> np.ndarray:
     """Commands at the times of the measured positions, m. Shape (Tm, K)."""
-    return np.stack([np.interp(take.tendon_time, take.command_time, one) for one in take.commands.T], axis=1)
+    return np.stack([np.interp(take.tendon_time, take.command_time, command) for command in take.commands.T], axis=1)
 
 
-def _correlation(one: np.ndarray, other: np.ndarray) -> float:
-    one, other = one - one.mean(), other - other.mean()
-    size = np.linalg.norm(one) * np.linalg.norm(other)
-    return float(one @ other / size) if size > 0 else 0.0
+def _correlation(first: np.ndarray, second: np.ndarray) -> float:
+    first, second = first - first.mean(), second - second.mean()
+    size = np.linalg.norm(first) * np.linalg.norm(second)
+    return float(first @ second / size) if size > 0 else 0.0

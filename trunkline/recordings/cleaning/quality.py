@@ -7,10 +7,10 @@ import numpy as np
 
 from trunkline.recordings.cleaning.checks import Findings
 from trunkline.recordings.cleaning.clock_offset import MotorClock
-from trunkline.recordings.cleaning.session_checks import Gathered
+from trunkline.recordings.cleaning.session_checks import CheckedSession
 from trunkline.recordings.logs.log import Log
 from trunkline.recordings.signals.smoothing import noise_level
-from trunkline.recordings.trials.raw_trial import Take
+from trunkline.recordings.trials.raw_trial import RawTrial
 
 
 @dataclass
@@ -22,7 +22,7 @@ class Quality:
     position_noise: (S,) m, angle_noise: (S,) rad or None: per axis, standard deviation.
     """
 
-    take: Take
+    take: RawTrial
     findings: Findings
     interval: float
     dropped: int
@@ -32,12 +32,12 @@ class Quality:
     angle_noise: np.ndarray | None
 
 
-def judge(take: Take, findings: Findings) -> Quality:
+def judge(take: RawTrial, findings: Findings) -> Quality:
     """Measure the quality of a take."""
     steps = np.diff(take.time)
     interval = float(np.median(steps))
-    seen = np.isfinite(take.positions[..., 0])
-    gaps = [np.diff(take.time[good]) for good in seen.T]
+    visible = np.isfinite(take.positions[..., 0])
+    gaps = [np.diff(take.time[good]) for good in visible.T]
     shape = (len(take.time), len(take.segments), -1)
     position_noise = noise_level(take.positions.reshape(len(take.time), -1)).reshape(shape[1:])
     angle_noise = None
@@ -50,25 +50,25 @@ def judge(take: Take, findings: Findings) -> Quality:
         findings,
         interval,
         int(np.sum(np.round(steps / interval) - 1)),
-        seen.mean(axis=0),
+        visible.mean(axis=0),
         np.concatenate([gap[gap > 1.5 * interval] for gap in gaps]),
         np.sqrt(np.mean(position_noise**2, axis=1)),
         angle_noise,
     )
 
 
-def by_sentence(qualities: list[Quality], said: Callable[[Findings], list[str]]) -> list[str]:
+def by_sentence(qualities: list[Quality], sentences_of: Callable[[Findings], list[str]]) -> list[str]:
     """What is said of takes, each sentence once, with the trials of which it is said."""
     names: dict[str, list[str]] = {}
     for quality in qualities:
-        for sentence in said(quality.findings):
+        for sentence in sentences_of(quality.findings):
             names.setdefault(sentence, []).append(quality.take.name)
     every = len(qualities)
     who = ["all trials" if len(trials) == every > 1 else ", ".join(trials) for trials in names.values()]
     return [f"{trials}: {sentence}" for trials, sentence in zip(who, names, strict=True)]
 
 
-def report(qualities: list[Quality], gathered: Gathered) -> dict:
+def report(qualities: list[Quality], gathered: CheckedSession) -> dict:
     """The quality report, per trial and for the session; None where there is nothing to measure."""
     several = len({log.path.parent for log in _logs(qualities)}) > 1
     return {
@@ -100,11 +100,11 @@ def remarks(qualities: list[Quality]) -> list[str]:
     """What whoever runs a stage should know at once, a line each."""
     logs = _logs(qualities)
     bare = [log.path.name for log in logs if log.unchecked]
-    told = f"{len(bare)} of {len(logs)} logs have messages without checksums, such as {bare[0]}" if bare else ""
-    return [f"{told}: bits that flipped there go unseen (quality.json: logs)"] if bare else []
+    unchecked = f"{len(bare)} of {len(logs)} logs have messages without checksums, such as {bare[0]}" if bare else ""
+    return [f"{unchecked}: bits that flipped there go unseen (quality.json: logs)"] if bare else []
 
 
-def summary(qualities: list[Quality], gathered: Gathered) -> dict:
+def summary(qualities: list[Quality], gathered: CheckedSession) -> dict:
     """The session in a few numbers, for metrics.json. repairs: their number by split, and in all."""
     angles = [quality.angle_noise for quality in qualities if quality.angle_noise is not None]
     gaps, clock = np.concatenate([quality.gaps for quality in qualities]), gathered.clock

@@ -8,7 +8,7 @@ from trunkline.recordings.cleaning.checks import deciding
 from trunkline.recordings.cleaning.label_swaps import usual_distances
 from trunkline.recordings.cleaning.trial_window import Stretch
 from trunkline.recordings.session.session import FixedBase, Session, TrialEntry
-from trunkline.recordings.session.source import Source
+from trunkline.recordings.session.source import LogSource
 from trunkline.recordings.signals.units import extent, likely_unit
 
 FARTHEST = 1e6  # m or mm; no camera sees farther, and squares of what is farther overflow at last
@@ -39,7 +39,7 @@ class Reference:
         return list(self.segments) if self.base is None else [self.base, *self.segments]
 
 
-def reference_of(session: Session, trials: list[tuple[TrialEntry, Source, Stretch]]) -> Reference:
+def reference_of(session: Session, trials: list[tuple[TrialEntry, LogSource, Stretch]]) -> Reference:
     """Compare the logs of a session: the trials of the split `identify`, or all where none of those can be read."""
     base = None if isinstance(session.base, FixedBase) else session.base
     segments, sources = session.segments, [source for _, source, _ in trials]
@@ -52,19 +52,19 @@ def reference_of(session: Session, trials: list[tuple[TrialEntry, Source, Stretc
     complete = [some for some in trials if set(bodies) <= set(some[1].poses.names)]
     chosen, fallback = deciding(complete, lambda some: some[0].split)
     if fallback:
-        told = "the unit and the usual distances between bodies are of trials of other splits"
-        reference.warnings.append(f"no trial of the split identify can be read: {told}")
+        consequence = "the unit and the usual distances between bodies are of trials of other splits"
+        reference.warnings.append(f"no trial of the split identify can be read: {consequence}")
     logs = [
         source.poses.positions[np.ix_(stretch.rows, np.array([source.poses.names.index(name) for name in bodies], int))]
         for _, source, stretch in chosen
     ]
     logs = [np.where(np.abs(positions) < FARTHEST, positions, np.nan) for positions in logs]
-    found = likely_unit(logs)
-    if found is not None and found != session.frame.unit:
+    likely = likely_unit(logs)
+    if likely is not None and likely != session.frame.unit:
         apart = np.median([extent(positions) for positions in logs])
-        said = f"bodies {apart:.4g} apart are no arm in {session.frame.unit}, as declared"
-        reference.scale = UNIT[found]
-        reference.repairs.append(f"unit: {said}; taken as {found}")
+        problem = f"bodies {apart:.4g} apart are no arm in {session.frame.unit}, as declared"
+        reference.scale = UNIT[likely]
+        reference.repairs.append(f"unit: {problem}; taken as {likely}")
     if logs and len(bodies) >= 3:
         logs = [reference.scale * positions for positions in logs]
         if isinstance(session.base, FixedBase):

@@ -3,10 +3,10 @@
 import numpy as np
 
 from trunkline.recordings.cleaning.checks import Findings
-from trunkline.recordings.cleaning.dropped_frames import find_lost, put_back, unbroken
-from trunkline.recordings.cleaning.label_swaps import find_swaps
+from trunkline.recordings.cleaning.dropped_frames import find_dropped_frames, put_back, unbroken
+from trunkline.recordings.cleaning.label_swaps import find_label_swaps
 from trunkline.recordings.cleaning.reference import FARTHEST, Reference
-from trunkline.recordings.cleaning.stale_poses import frozen
+from trunkline.recordings.cleaning.stale_poses import stale_samples
 from trunkline.recordings.logs.pose_stream import PoseStream
 from trunkline.recordings.logs.transforms import is_rotation
 from trunkline.recordings.signals.smoothing import noise_level
@@ -56,7 +56,7 @@ def drop_frozen(
     positions: np.ndarray, quaternions: np.ndarray | None, names: list[str], findings: Findings
 ) -> None:
     """Make NaN of the poses that only repeat the one before."""
-    still = frozen(positions)
+    still = stale_samples(positions)
     _tell_dropped(still, "that only repeat the one before, to the last bit,", names, findings)
     positions[still] = np.nan
     if quaternions is not None:
@@ -78,7 +78,7 @@ def untangle(
     names = [reference.base or "base", *reference.segments]
     bodies = np.insert(positions, 0, base[0], axis=1)
     turns = None if quaternions is None else np.insert(quaternions, 0, base[1], axis=1)
-    for swap in find_swaps(bodies, reference.distances, reference.base is not None):
+    for swap in find_label_swaps(bodies, reference.distances, reference.base is not None):
         wrong, right = np.array(swap.bodies), np.array([*swap.bodies[1:], swap.bodies[0]])
         for values in (bodies, turns):
             if values is not None:
@@ -92,19 +92,19 @@ def untangle(
         base[1][:], quaternions[:] = turns[:, 0], turns[:, 1:]
 
 
-def with_lost_time(time: np.ndarray, positions: np.ndarray, motors: bool, findings: Findings) -> np.ndarray:
+def with_dropped_time(time: np.ndarray, positions: np.ndarray, motors: bool, findings: Findings) -> np.ndarray:
     """Time (T,) with what even stamps hide put back, unless motors are dated by a clock that would not move along."""
     noise = float(np.median(noise_level(positions.reshape(len(time), -1))))
-    lost = find_lost(time, positions, noise)
+    lost = find_dropped_frames(time, positions, noise)
     if not lost:
         return time
     count, at = sum(place.frames for place in lost), ", ".join(f"{time[place.after]:.2f}" for place in lost)
     frames = "frame" if count == 1 else "frames"
-    told = f"{count} {frames} lost at {at} s, though the stamps go on evenly: all bodies jump ahead on their ways"
+    sentence = f"{count} {frames} lost at {at} s, though the stamps go on evenly: all bodies jump ahead on their ways"
     if motors:
-        findings.warnings.append(f"{told}; left so, as the motors have a clock of their own")
+        findings.warnings.append(f"{sentence}; left so, as the motors have a clock of their own")
         return time
-    findings.repairs.append(f"{told}; their time put back")
+    findings.repairs.append(f"{sentence}; their time put back")
     return put_back(time, lost)
 
 

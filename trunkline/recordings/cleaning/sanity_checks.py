@@ -18,7 +18,7 @@ from trunkline.recordings.cleaning.label_swaps import usual_distances
 from trunkline.recordings.cleaning.pulls import check_pulls, encoder_zeros
 from trunkline.recordings.signals.smoothing import fill_gaps
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_stepwise
-from trunkline.recordings.trials.raw_trial import Take
+from trunkline.recordings.trials.raw_trial import RawTrial
 
 NEAREST = 4  # other bodies by whose distances a body's place is told
 BLOCK = 12  # frames whose median is a sample of motion: few outliers are left, and a third of the noise
@@ -28,7 +28,7 @@ LONGER = 0.01  # share of the arm's length by which the way along the named orde
 
 
 @dataclass
-class Plausible:
+class SanityLimits:
     """What a trial must be like. Shares are of the arm's length.
 
     still: by how much an arm at rest may move, as a share; an arm in motion moves by more.
@@ -45,7 +45,9 @@ class Plausible:
     otherwise: Literal["refuse", "warn"]
 
 
-def check_plausible(takes: list[Take], findings: list[Findings], base: str | None, settings: Plausible) -> list[str]:
+def check_sanity(
+    takes: list[RawTrial], findings: list[Findings], base: str | None, settings: SanityLimits
+) -> list[str]:
     """Add to each take's findings what cannot be true of it; returned: what cannot be true of the session.
 
     What is usual is what the takes of the split `identify` say, or all where there are none of it.
@@ -57,43 +59,44 @@ def check_plausible(takes: list[Take], findings: list[Findings], base: str | Non
     length = float(np.nanmax(usual[0]))
     names, idle = (base or "base", *takes[0].segments), settings.still * length
     zeros = encoder_zeros(chosen, idle)
-    for take, found in zip(takes, findings, strict=True):
-        found.faults += _misplaced(take, usual, names, settings.distance * length)
-        found.faults += _motion(take, length, settings.still)
-        found.faults += check_pulls(take, length, idle, settings.pull, zeros)
-    said = _order(takes[0].segments, usual) + _loose(chosen, usual, settings, length)
-    return said if base is None else said + _base_at_rest(chosen, base)
+    for take, record in zip(takes, findings, strict=True):
+        record.faults += _misplaced(take, usual, names, settings.distance * length)
+        record.faults += _motion(take, length, settings.still)
+        record.faults += check_pulls(take, length, idle, settings.pull, zeros)
+    faults = _order(takes[0].segments, usual) + _loose(chosen, usual, settings, length)
+    return faults if base is None else faults + _base_at_rest(chosen, base)
 
 
-def _bodies(take: Take) -> np.ndarray:
+def _bodies(take: RawTrial) -> np.ndarray:
     """The base and the segments, (T, 1 + S, 3) m."""
     return np.insert(take.positions, 0, take.base_positions, axis=1)
 
 
-def _misplaced(take: Take, usual: np.ndarray, names: tuple[str, ...], least: float) -> list[str]:
+def _misplaced(take: RawTrial, usual: np.ndarray, names: tuple[str, ...], least: float) -> list[str]:
     """Bodies that are not where the session's other trials have them, by the distances from their neighbours."""
-    found = usual_distances([_bodies(take)])
-    ratio = float(np.nanmedian((found / usual)[~np.eye(len(usual), dtype=bool)]))
+    distances = usual_distances([_bodies(take)])
+    ratio = float(np.nanmedian((distances / usual)[~np.eye(len(usual), dtype=bool)]))
     if not 1 / OTHER_UNIT < ratio < OTHER_UNIT:
-        told = f"bodies are {ratio:.4g} times as far apart as in the session's trials of identify"
-        return [f"unit: {told}, expected all logs of a session in one unit"]
+        place = f"bodies are {ratio:.4g} times as far apart as in the session's trials of identify"
+        return [f"unit: {place}, expected all logs of a session in one unit"]
     if len(names) == 2:  # one point alone comes as near to the base as the arm bends
         return []
-    said = []
+    faults = []
     for body, name in enumerate(names):
         others = np.argsort(usual[body])[:NEAREST]
-        others = others[np.isfinite((found - usual)[body, others])]
-        off = np.abs(found - usual)[body, others]
+        others = others[np.isfinite((distances - usual)[body, others])]
+        off = np.abs(distances - usual)[body, others]
         if len(off) and np.median(off) > least:
             near, worst = others[0], others[int(np.argmax(off))]
-            told = f"{_mm(found[body, worst])} from {names[worst]!r} for the usual {_mm(usual[body, worst])}"
+            place = f"{_mm(distances[body, worst])} from {names[worst]!r} for the usual {_mm(usual[body, worst])}"
             if near != worst:
-                told += f", {_mm(found[body, near])} from {names[near]!r} for {_mm(usual[body, near])}"
-            said.append(f"{name!r} is {told}, expected neighbours at distances that differ by less than {_mm(least)}")
-    return said
+                place += f", {_mm(distances[body, near])} from {names[near]!r} for {_mm(usual[body, near])}"
+            expected = f"expected neighbours at distances that differ by less than {_mm(least)}"
+            faults.append(f"{name!r} is {place}, {expected}")
+    return faults
 
 
-def _motion(take: Take, length: float, still: float) -> list[str]:
+def _motion(take: RawTrial, length: float, still: float) -> list[str]:
     """Whether an experiment at rest rests, and another moves."""
     if is_stepwise(take.experiment):
         return []
@@ -103,10 +106,10 @@ def _motion(take: Take, length: float, still: float) -> list[str]:
     if static == (travel[most] <= still * length):
         return []
     share = 100 * travel[most] / length
-    found = f"{take.segments[most]!r} moves by {_mm(travel[most])}, {share:.2g} % of the arm's length"
+    travelled = f"{take.segments[most]!r} moves by {_mm(travel[most])}, {share:.2g} % of the arm's length"
     expected = f"expected {'at most' if static else 'more than'} {100 * still:g} % in a {take.experiment}"
     others = ", ".join(name for name, kind in EXPERIMENTS.items() if kind.static != static)
-    return [f"experiment: {found}, {expected}: is it another experiment ({others})?"]
+    return [f"experiment: {travelled}, {expected}: is it another experiment ({others})?"]
 
 
 def _order(segments: tuple[str, ...], usual: np.ndarray) -> list[str]:
@@ -132,15 +135,16 @@ def _order(segments: tuple[str, ...], usual: np.ndarray) -> list[str]:
     if _way(usual, order) - _way(usual, along) <= LONGER * length:
         return []
     places = [(segments[a - 1], segments[b - 1]) for a, b in zip(order[1:], along[1:], strict=True) if a != b]
-    told = ", ".join(f"{found!r} where {name!r} is expected" for name, found in places)
-    return [f"segments: along the arm lies {told}, by the distances between them: check `segments` in session.yaml"]
+    exchanged = ", ".join(f"{actual!r} where {name!r} is expected" for name, actual in places)
+    problem = f"along the arm lies {exchanged}, by the distances between them"
+    return [f"segments: {problem}: check `segments` in session.yaml"]
 
 
 def _way(usual: np.ndarray, order: list[int]) -> float:
     return float(sum(usual[a, b] for a, b in pairwise(order)))
 
 
-def _loose(takes: list[Take], usual: np.ndarray, settings: Plausible, length: float) -> list[str]:
+def _loose(takes: list[RawTrial], usual: np.ndarray, settings: SanityLimits, length: float) -> list[str]:
     """Segments that are not fixed to the arm: in most trials in which it moves they keep no distance from any other
     segment, or rest while one nearer to the base moves."""
     least, still, count = settings.distance * length, settings.still * length, len(takes[0].segments)
@@ -155,18 +159,18 @@ def _loose(takes: list[Take], usual: np.ndarray, settings: Plausible, length: fl
         apart.append(np.min(spread + np.where(np.eye(count), np.inf, 0.0), axis=1) > least)
         travel = np.linalg.norm(np.ptp(blocks, axis=0), axis=1)
         rests.append((travel < still) & (farther & (travel > least)).any(axis=1))
-    said = []
-    for flags, told in (
+    faults = []
+    for flags, motion in (
         (apart, f"keeps no distance from any other segment, to within {_mm(least)}, while the arm moves"),
         (rests, f"rests, to within {_mm(still)}, while segments nearer to the base move"),
     ):
         most = np.mean(flags, axis=0) > 0.5 if flags else np.zeros(count, bool)
         hit = [name for name, some in zip(takes[0].segments, most, strict=True) if some]
-        said += [f"{name!r} {told}: is it on the arm?" for name in hit]
-    return said
+        faults += [f"{name!r} {motion}: is it on the arm?" for name in hit]
+    return faults
 
 
-def _base_at_rest(takes: list[Take], base: str) -> list[str]:
+def _base_at_rest(takes: list[RawTrial], base: str) -> list[str]:
     """A base that moves or turns while a segment rests."""
     motion = []
     for take in takes:
@@ -179,9 +183,9 @@ def _base_at_rest(takes: list[Take], base: str) -> list[str]:
     for moved, unit, scale in zip(np.median(motion, axis=0), ("mm", "°"), (1e3, np.degrees(1)), strict=True):
         rests = int(np.argmin(moved[1:])) + 1
         if moved[0] > CLEAR * moved[rests]:
-            found = f"moves by {scale * moved[0]:.2f} {unit} while {takes[0].segments[rests - 1]!r} moves by"
+            problem = f"moves by {scale * moved[0]:.2f} {unit} while {takes[0].segments[rests - 1]!r} moves by"
             expected = "expected the body at the mount, which rests"
-            return [f"base: {base!r} {found} {scale * moved[rests]:.2f} {unit}, {expected}"]
+            return [f"base: {base!r} {problem} {scale * moved[rests]:.2f} {unit}, {expected}"]
     return []
 
 
@@ -189,9 +193,9 @@ def _turns(quaternions: np.ndarray) -> np.ndarray:
     """Rotation vectors (T, B, 3) rad from each body's mean orientation, NaN where not seen."""
     turns = np.full((*quaternions.shape[:2], 3), np.nan)
     for body in range(quaternions.shape[1]):
-        seen = np.isfinite(quaternions[:, body, 0])
-        rotations = rotation_from_wxyz(quaternions[seen, body])
-        turns[seen, body] = (rotations.mean().inv() * rotations).as_rotvec()
+        visible = np.isfinite(quaternions[:, body, 0])
+        rotations = rotation_from_wxyz(quaternions[visible, body])
+        turns[visible, body] = (rotations.mean().inv() * rotations).as_rotvec()
     return turns
 
 

@@ -6,11 +6,11 @@ from typing import Literal
 
 from trunkline.errors import InputError
 from trunkline.recordings.cleaning.checks import Findings
-from trunkline.recordings.cleaning.clock_offset import MotorClock, align_clocks, settle_vertical
-from trunkline.recordings.cleaning.sanity_checks import Plausible, check_plausible
+from trunkline.recordings.cleaning.clock_offset import MotorClock, align_clocks, set_gravity_direction
+from trunkline.recordings.cleaning.sanity_checks import SanityLimits, check_sanity
 from trunkline.recordings.session.session import FixedBase, Session, TrialEntry
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_stepwise
-from trunkline.recordings.trials.raw_trial import Take
+from trunkline.recordings.trials.raw_trial import RawTrial
 from trunkline.recordings.trials.splits import IDENTIFY, SPLITS, TEST, VALIDATE
 
 Refusal = Literal["stop", "leave_out"]
@@ -23,75 +23,76 @@ WITHOUT = {
 
 
 @dataclass
-class Gathered:
+class CheckedSession:
     """takes, findings: of the trials that are used. refused: why a trial is not, by its name. clock: of the motors."""
 
-    takes: list[Take] = field(default_factory=list)
+    takes: list[RawTrial] = field(default_factory=list)
     findings: list[Findings] = field(default_factory=list)
     refused: dict[str, str] = field(default_factory=dict)
     clock: MotorClock = field(default_factory=MotorClock)
 
 
-def gather(
-    taken: Iterable[tuple[TrialEntry, Take | InputError, Findings]],
+def check_session(
+    taken: Iterable[tuple[TrialEntry, RawTrial | InputError, Findings]],
     session: Session,
-    plausible: Plausible,
+    plausible: SanityLimits,
     refused_trials: Refusal,
     where: str,
-) -> Gathered:
-    """Compare a session's takes, as `take_in` gives them, and settle what they have in common.
+) -> CheckedSession:
+    """Compare a session's raw trials, as `load_raw_trials` gives them, and settle what they have in common.
 
     Args: where: the session's folder, for messages.
 
     Raises:
         InputError: a trial is refused and none may be left out, none is left, or the whole session cannot be true.
     """
-    gathered = Gathered()
+    gathered = CheckedSession()
 
     def refuse(name: str, error: InputError) -> None:
         if refused_trials == "stop":
             raise error
         gathered.refused[name] = str(error)
 
-    for trial, take, found in taken:
+    for trial, take, record in taken:
         if isinstance(take, InputError):
             refuse(trial.name, take)
         else:
             gathered.takes.append(take)
-            gathered.findings.append(found)
+            gathered.findings.append(record)
     base = None if isinstance(session.base, FixedBase) else session.base
-    session_faults = check_plausible(gathered.takes, gathered.findings, base, plausible) if gathered.takes else []
+    session_faults = check_sanity(gathered.takes, gathered.findings, base, plausible) if gathered.takes else []
     if plausible.otherwise == "refuse":
-        for take, found in zip(gathered.takes, gathered.findings, strict=True):
-            if found.faults:
-                refuse(take.name, InputError(f"{found.where}: {'; '.join(found.faults)}"))
+        for take, record in zip(gathered.takes, gathered.findings, strict=True):
+            if record.faults:
+                refuse(take.name, InputError(f"{record.where}: {'; '.join(record.faults)}"))
         if session_faults:
             raise InputError(f"{where}: {'; '.join(session_faults)}")
-        used = [not found.faults for found in gathered.findings]
+        used = [not record.faults for record in gathered.findings]
         gathered.takes = [take for take, use in zip(gathered.takes, used, strict=True) if use]
-        gathered.findings = [found for found, use in zip(gathered.findings, used, strict=True) if use]
+        gathered.findings = [record for record, use in zip(gathered.findings, used, strict=True) if use]
     if not gathered.takes:
         first = next(iter(gathered.refused.values()))
         raise InputError(f"{where}: all {len(gathered.refused)} trials refused, the first: {first}")
     missing = _missing(gathered.takes)
-    for found in gathered.findings:
-        found.warnings += found.faults + session_faults + missing
-    settle_vertical(gathered.takes, gathered.findings, session)
+    for record in gathered.findings:
+        record.warnings += record.faults + session_faults + missing
+    set_gravity_direction(gathered.takes, gathered.findings, session)
     gathered.clock = align_clocks(gathered.takes, gathered.findings, plausible.clock)
     return gathered
 
 
-def together(sessions: list[Gathered]) -> Gathered:
+def together(sessions: list[CheckedSession]) -> CheckedSession:
     """Of several sessions of one arm all takes, each with its own offset by now; the clock is the one told least."""
     if len(sessions) == 1:
         return sessions[0]
-    takes = [take for one in sessions for take in one.takes]
-    findings = [found for one in sessions for found in one.findings]
-    refused = {name: why for one in sessions for name, why in one.refused.items()}
-    return Gathered(takes, findings, refused, max((one.clock for one in sessions), key=lambda c: c.uncertainty or 0.0))
+    takes = [take for session in sessions for take in session.takes]
+    findings = [record for session in sessions for record in session.findings]
+    refused = {name: why for session in sessions for name, why in session.refused.items()}
+    clock = max((session.clock for session in sessions), key=lambda clock: clock.uncertainty or 0.0)
+    return CheckedSession(takes, findings, refused, clock)
 
 
-def require_enough(gathered: Gathered, planned: list[TrialEntry]) -> None:
+def require_enough(gathered: CheckedSession, planned: list[TrialEntry]) -> None:
     """Refuse what is left of a session that had trials of an experiment in a split, all of which were refused."""
     left = {(take.experiment, take.split) for take in gathered.takes}
     for trial in planned:
@@ -100,18 +101,18 @@ def require_enough(gathered: Gathered, planned: list[TrialEntry]) -> None:
             raise InputError(f"{gathered.refused[trial.name]}; {expected}")
 
 
-def _missing(takes: list[Take]) -> list[str]:
+def _missing(takes: list[RawTrial]) -> list[str]:
     """Splits and experiments that the session lacks, and experiments that one of its splits lacks, a sentence each."""
     splits, kinds = ({getattr(take, key) for take in takes} for key in ("split", "experiment"))
     done = {(take.experiment, take.split) for take in takes}
-    said = [f"splits: no trial of the split {split}: {WITHOUT[split]}" for split in SPLITS if split not in splits]
+    sentences = [f"splits: no trial of the split {split}: {WITHOUT[split]}" for split in SPLITS if split not in splits]
     lacking = [name for name, kind in EXPERIMENTS.items() if name not in kinds and not kind.stepwise]
     if lacking and not any(map(is_stepwise, kinds)):  # an arm that rests throughout needs no other
-        told = "data/raw/README.md tells which settings do without"
+        remedy = "data/raw/README.md tells which settings do without"
         if len(lacking) == 1 and (way_out := EXPERIMENTS[lacking[0]].without):  # two that are missing need another
-            told = f"in params.yaml {way_out}: data/raw/README.md"
-        said.append(f"experiments: no {', '.join(lacking)} in the session: {told}")
-    return said + [
+            remedy = f"in params.yaml {way_out}: data/raw/README.md"
+        sentences.append(f"experiments: no {', '.join(lacking)} in the session: {remedy}")
+    return sentences + [
         f"splits: no {experiment} of the split {split}, which the session has"
         for experiment in EXPERIMENTS
         for split in SPLITS

@@ -7,11 +7,11 @@ from scipy.spatial.transform import Rotation
 
 from trunkline.errors import InputError
 from trunkline.frames import wxyz_from_rotation
-from trunkline.recordings.cleaning.checks import Findings, Limits, in_order
+from trunkline.recordings.cleaning.checks import Findings, TrialLimits, in_order
 from trunkline.recordings.cleaning.clocks import check_clocks
 from trunkline.recordings.logs.pose_stream import PoseStream
 from trunkline.recordings.session.session import FixedBase, Session, TrialEntry
-from trunkline.recordings.session.source import Source
+from trunkline.recordings.session.source import LogSource
 from trunkline.recordings.signals.clock import FrameFit, fit_frames
 
 
@@ -36,7 +36,7 @@ class Stretch:
 
 
 def read_stretch(
-    source: Source, trial: TrialEntry, session: Session, limits: Limits, findings: Findings
+    source: LogSource, trial: TrialEntry, session: Session, limits: TrialLimits, findings: Findings
 ) -> Stretch:
     """Date a log's frames by the clock that the session names, and cut out the trial.
 
@@ -66,13 +66,13 @@ def read_stretch(
     return Stretch(rows, time, epoch, int(poses.log_times[rows[0]]))
 
 
-def columns_of(source: Source, names: list[str], where: str) -> list[int]:
+def columns_of(source: LogSource, names: list[str], where: str) -> list[int]:
     """Where each of `names` is among the bodies of the log. Raises InputError where one is not."""
     poses = source.poses
     for name in names:
         if name not in poses.names:
-            found = f"{name!r} never appears in {source.pose_topic}, found {', '.join(poses.names)}"
-            raise InputError(f"{where}: {found}, expected it, or `segments` in session.yaml that leaves it out")
+            problem = f"{name!r} never appears in {source.pose_topic}, found {', '.join(poses.names)}"
+            raise InputError(f"{where}: {problem}, expected it, or `segments` in session.yaml that leaves it out")
     return [poses.names.index(name) for name in names]
 
 
@@ -81,17 +81,17 @@ def check_seen(positions: np.ndarray, names: list[str], least: float, where: str
 
     Or never in four frames in a row, which is what noise is measured by.
     """
-    seen = np.isfinite(positions[..., 0]).mean(axis=0)
+    shares = np.isfinite(positions[..., 0]).mean(axis=0)
     in_a_row = np.isfinite(np.diff(positions[..., 0], n=3, axis=0)).mean(axis=0) > 0
-    for name, share, enough in zip(names, seen, in_a_row, strict=True):
+    for name, share, enough in zip(names, shares, in_a_row, strict=True):
         if share < least:
-            dropped = [said for said in findings.repairs if " samples " in said and name in said]
+            dropped = [repair for repair in findings.repairs if " samples " in repair and name in repair]
             why = f" ({'; '.join(dropped)})" if dropped else ""
-            found = f"{name!r} is seen in {100 * share:.1f} % of {len(positions)} frames{why}"
-            raise InputError(f"{where}: {found}, expected at least {100 * least:g} %")
+            problem = f"{name!r} is seen in {100 * share:.1f} % of {len(positions)} frames{why}"
+            raise InputError(f"{where}: {problem}, expected at least {100 * least:g} %")
         if not enough:
-            found = f"{name!r} is seen in {100 * share:.1f} % of {len(positions)} frames, but never in four in a row"
-            raise InputError(f"{where}: {found}, expected messages that hold all bodies, one after the other")
+            problem = f"{name!r} is seen in {100 * share:.1f} % of {len(positions)} frames, but never in four in a row"
+            raise InputError(f"{where}: {problem}, expected messages that hold all bodies, one after the other")
 
 
 def split_base(session: Session, positions: np.ndarray, quaternions: np.ndarray | None, where: str):

@@ -13,8 +13,8 @@ from trunkline.frames import make_continuous, tilt_of_gravity
 from trunkline.recordings.filtering.effect import Effect
 from trunkline.recordings.signals.base_frame import BasePose, average_base, gravity_from_up, to_base_frame
 from trunkline.recordings.signals.smoothing import bridged, fill_gaps, low_pass, outliers, resample
-from trunkline.recordings.trials.experiments import EXPERIMENTS, Kind
-from trunkline.recordings.trials.raw_trial import Take
+from trunkline.recordings.trials.experiments import EXPERIMENTS, ExperimentKind
+from trunkline.recordings.trials.raw_trial import RawTrial
 from trunkline.recordings.trials.trial import Trial
 
 
@@ -39,7 +39,7 @@ class Filter:
             raise ValueError(f"cutoff: found {self.cutoff} Hz, expected less than half the rate of {self.rate} Hz")
 
 
-def filter_take(take: Take, settings: Filter) -> tuple[Trial, Effect]:
+def filter_raw_trial(take: RawTrial, settings: Filter) -> tuple[Trial, Effect]:
     """Filter one take.
 
     Quaternions are filtered by component and normalised again: they are continuous in sign, and within the
@@ -62,10 +62,10 @@ def filter_take(take: Take, settings: Filter) -> tuple[Trial, Effect]:
         samples = positions[:, index]
         if quaternions is not None:
             samples = np.hstack([samples, quaternions[:, index]])
-        found = _segment(take.time, samples, grid, settings, f"trial {take.name}: {name!r}")
-        columns[:, index], measured[:, index] = found.columns, found.measured
-        filled, dropped = filled + found.filled, dropped + found.dropped
-        removed.append(found.removed)
+        filtered = _segment(take.time, samples, grid, settings, f"trial {take.name}: {name!r}")
+        columns[:, index], measured[:, index] = filtered.columns, filtered.measured
+        filled, dropped = filled + filtered.filled, dropped + filtered.dropped
+        removed.append(filtered.removed)
     noise = np.sqrt(np.mean(removed, axis=0))
     if width == 7:
         columns[..., 3:] /= np.linalg.norm(columns[..., 3:], axis=-1, keepdims=True)
@@ -95,7 +95,7 @@ def filter_take(take: Take, settings: Filter) -> tuple[Trial, Effect]:
 
 
 def _trial(
-    take: Take, gravity: np.ndarray, time: np.ndarray, positions: np.ndarray, quaternions: np.ndarray | None,
+    take: RawTrial, gravity: np.ndarray, time: np.ndarray, positions: np.ndarray, quaternions: np.ndarray | None,
     measured: np.ndarray, commands: np.ndarray, wound: np.ndarray,
 ) -> Trial:  # fmt: skip
     """What the take was planned as, with these samples, shapes as in `Trial`."""
@@ -119,20 +119,20 @@ def _trial(
     )
 
 
-def start_of(trial: Trial, kind: Kind, settings: Filter) -> dict:
+def start_of(trial: Trial, kind: ExperimentKind, settings: Filter) -> dict:
     """When a trial that went through the low-pass begins: its start and start_sigma, s, in_motion and swaying."""
     if kind.start is None:
         return {}
     smooth = partial(low_pass, rate=1 / (trial.time[1] - trial.time[0]), cutoff=settings.cutoff, order=settings.order)
     begun = kind.start(trial, smooth)
-    found = {"start": begun.time, "start_sigma": begun.sigma, "in_motion": begun.in_motion, "swaying": begun.swaying}
+    fields = {"start": begun.time, "start_sigma": begun.sigma, "in_motion": begun.in_motion, "swaying": begun.swaying}
     if kind.free is not None and settings.release == "free":
-        found |= {"start": kind.free(trial, begun.time), "in_motion": True, "swaying": False}
-    return found
+        fields |= {"start": kind.free(trial, begun.time), "in_motion": True, "swaying": False}
+    return fields
 
 
 def _settled(
-    take: Take, positions: np.ndarray, quaternions: np.ndarray | None, base: BasePose
+    take: RawTrial, positions: np.ndarray, quaternions: np.ndarray | None, base: BasePose
 ) -> tuple[Trial, Effect]:
     """A trial whose every frame is a shape at rest of its own: nothing to filter, and no clock but the frames' own."""
     columns = positions if quaternions is None else np.concatenate([positions, quaternions], axis=2)
@@ -201,7 +201,7 @@ def average_static(trial: Trial) -> Trial:
     )
 
 
-def _on_pose_clock(take: Take, grid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _on_pose_clock(take: RawTrial, grid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Commands and tendon positions (G, K) m at the frames' times; a lacking one is the other, or 0."""
     streams = []
     for time, pulls in ((take.command_time, take.commands), (take.tendon_time, take.tendon_positions)):

@@ -142,7 +142,7 @@ def _lay_out(data: bytes, schema: str, definitions: Definitions) -> Layout:
         position += count
         return data[position - count : position].rstrip(b"\0").decode()
 
-    def one(kind: str):
+    def read_value(kind: str):
         return string() if kind == "string" else walk(kind)
 
     def walk(kind: str) -> dict:
@@ -162,7 +162,7 @@ def _lay_out(data: bytes, schema: str, definitions: Definitions) -> Layout:
                     raise ValueError("numbers beyond the message's end")
             else:
                 tree[part.name] = (
-                    one(part.kind) if count is None else [one(part.kind) for _ in range(count)]
+                    read_value(part.kind) if count is None else [read_value(part.kind) for _ in range(count)]
                 )
         if not definitions[kind]:
             position += 1  # an empty message takes one byte

@@ -50,19 +50,19 @@ def joint_stream(topic: Topic) -> JointStream:
             batches.append((np.atleast_1d(rows), list(names), positions, joints.time))
     names = union([(rows, names) for rows, names, *_ in batches])
     positions = np.full((len(topic.messages), len(names)), np.nan)
-    stamps, kept = topic.log_times.copy(), np.zeros(len(topic.messages), bool)
+    stamps, readable = topic.log_times.copy(), np.zeros(len(topic.messages), bool)
     for rows, some, values, time in batches:
-        kept[rows] = True
+        readable[rows] = True
         positions[np.ix_(rows, [names.index(name) for name in some])] = values
         if timed:
             stamps[rows] = time
     return JointStream(
         topic=topic.name,
-        stamps=stamps[kept],
-        log_times=topic.log_times[kept],
+        stamps=stamps[readable],
+        log_times=topic.log_times[readable],
         names=names,
-        positions=positions[kept],
-        undecodable=len(topic.messages) - int(kept.sum()),
+        positions=positions[readable],
+        undecodable=len(topic.messages) - int(readable.sum()),
         timed=timed,
         unnamed=unnamed,
     )

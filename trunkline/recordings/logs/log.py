@@ -94,8 +94,8 @@ def _by_topic(contents: Contents, damage: list[str]) -> dict[str, Topic]:
         if channel is None:
             continue
         schema = contents.schemas.get(channel.schema_id)
-        said = (schema.name, schema.encoding, schema.data) if schema else ("", "", b"")
-        kind = (*said, channel.message_encoding)
+        definition_of = (schema.name, schema.encoding, schema.data) if schema else ("", "", b"")
+        kind = (*definition_of, channel.message_encoding)
         by_topic.setdefault(channel.topic, {}).setdefault(kind, []).append((log_time, data))
     topics = {}
     for name, kinds in by_topic.items():

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 
-class Poses(NamedTuple):
+class DecodedPoses(NamedTuple):
     """positions: (..., S, 3) in the log's unit. orientations: (..., S, 4) wxyz, or None.
 
     time: ns, (...) or, where every body has its own, (..., S); None where only the recorder's clock tells.
@@ -28,7 +28,7 @@ class Poses(NamedTuple):
     parents: list[str] | None = None
 
 
-class Joints(NamedTuple):
+class DecodedJoints(NamedTuple):
     """positions: (..., K) m. time: (...) ns, names: K; None where the recorder's clock and the session tell."""
 
     time: np.ndarray | None
@@ -36,28 +36,30 @@ class Joints(NamedTuple):
     positions: np.ndarray
 
 
-POSES: dict[str, Callable[..., Poses]] = {}
-JOINTS: dict[str, Callable[..., Joints]] = {}
+POSES: dict[str, Callable[..., DecodedPoses]] = {}
+JOINTS: dict[str, Callable[..., DecodedJoints]] = {}
 TOPIC_PER_BODY: set[str] = set()  # schemas of one pose, which the topic names
 # what a reader raises where a message is not as expected
 READING = (AttributeError, TypeError, ValueError, IndexError, OverflowError)
 
 
-def poses(*schemas: str, topic_per_body: bool = False) -> Callable[[Callable[..., Poses]], Callable[..., Poses]]:
+def poses(
+    *schemas: str, topic_per_body: bool = False
+) -> Callable[[Callable[..., DecodedPoses]], Callable[..., DecodedPoses]]:
     """Register the decorated function as the reader of pose schemas."""
     TOPIC_PER_BODY.update(schemas if topic_per_body else ())
     return lambda function: POSES.update({schema: function for schema in schemas}) or function
 
 
-def joints(*schemas: str) -> Callable[[Callable[..., Joints]], Callable[..., Joints]]:
+def joints(*schemas: str) -> Callable[[Callable[..., DecodedJoints]], Callable[..., DecodedJoints]]:
     """Register the decorated function as the reader of joint schemas."""
     return lambda function: JOINTS.update({schema: function for schema in schemas}) or function
 
 
 @poses("mocap4r2_msgs/RigidBodies")
-def rigid_bodies(message) -> Poses:
+def rigid_bodies(message) -> DecodedPoses:
     bodies = message.rigidbodies
-    return Poses(
+    return DecodedPoses(
         moment(message.header.stamp),
         [body.rigid_body_name for body in bodies],
         vectors([body.pose.position for body in bodies]),
@@ -67,8 +69,8 @@ def rigid_bodies(message) -> Poses:
 
 
 @poses("interfaces/TrunkRigidBodies")
-def trunk_rigid_bodies(message) -> Poses:
-    return Poses(
+def trunk_rigid_bodies(message) -> DecodedPoses:
+    return DecodedPoses(
         moment(message.header.stamp),
         message.rigid_body_names,
         vectors(message.positions),
@@ -78,9 +80,9 @@ def trunk_rigid_bodies(message) -> Poses:
 
 
 @poses("motion_capture_tracking_interfaces/NamedPoseArray")
-def named_pose_array(message) -> Poses:
+def named_pose_array(message) -> DecodedPoses:
     named = message.poses
-    return Poses(
+    return DecodedPoses(
         moment(message.header.stamp),
         [body.name for body in named],
         vectors([body.pose.position for body in named]),
@@ -89,44 +91,44 @@ def named_pose_array(message) -> Poses:
 
 
 @poses("geometry_msgs/PoseStamped", topic_per_body=True)
-def pose_stamped(message) -> Poses:
+def pose_stamped(message) -> DecodedPoses:
     return _unnamed(moment(message.header.stamp)[..., None], [message.pose])
 
 
 @poses("foxglove.PoseInFrame", "foxglove_msgs/PoseInFrame", topic_per_body=True)
-def pose_in_frame(message) -> Poses:
+def pose_in_frame(message) -> DecodedPoses:
     return _unnamed(moment(message.timestamp)[..., None], [message.pose])
 
 
 @poses("geometry_msgs/PoseArray")
-def pose_array(message) -> Poses:
+def pose_array(message) -> DecodedPoses:
     return _unnamed(moment(message.header.stamp), message.poses)
 
 
 @poses("foxglove.PosesInFrame", "foxglove_msgs/PosesInFrame")
-def poses_in_frame(message) -> Poses:
+def poses_in_frame(message) -> DecodedPoses:
     return _unnamed(moment(message.timestamp), message.poses)
 
 
 @poses("foxglove.FrameTransforms", "foxglove_msgs/FrameTransforms")
-def frame_transforms(message) -> Poses:
+def frame_transforms(message) -> DecodedPoses:
     return _transforms([(t.timestamp, t.parent_frame_id, t.child_frame_id, t) for t in message.transforms])
 
 
 @poses("foxglove.FrameTransform", "foxglove_msgs/FrameTransform")
-def frame_transform(message) -> Poses:
+def frame_transform(message) -> DecodedPoses:
     return _transforms([(message.timestamp, message.parent_frame_id, message.child_frame_id, message)])
 
 
 @poses("tf2_msgs/TFMessage")
-def tf_message(message) -> Poses:
+def tf_message(message) -> DecodedPoses:
     return _transforms(
         [(t.header.stamp, t.header.frame_id, t.child_frame_id, t.transform) for t in message.transforms]
     )
 
 
 @poses("mocap4r2_msgs/Markers")
-def markers(message) -> Poses:
+def markers(message) -> DecodedPoses:
     """Markers have no orientation; one without a name goes by its index."""
     names = [marker.marker_name for marker in message.markers]
     if not all(names):
@@ -134,17 +136,17 @@ def markers(message) -> Poses:
         pairs = zip(names, indices, strict=True)
         names = np.stack([np.full(index.shape, name) if name else index for name, index in pairs], axis=-1)
     positions = vectors([marker.translation for marker in message.markers])
-    return Poses(moment(message.header.stamp), names, positions, None, np.asarray(message.frame_number))
+    return DecodedPoses(moment(message.header.stamp), names, positions, None, np.asarray(message.frame_number))
 
 
 @joints("sensor_msgs/JointState")
-def joint_state(message) -> Joints:
-    return Joints(moment(message.header.stamp), message.name, np.asarray(message.position, dtype=float))
+def joint_state(message) -> DecodedJoints:
+    return DecodedJoints(moment(message.header.stamp), message.name, np.asarray(message.position, dtype=float))
 
 
 @joints("std_msgs/Float64MultiArray", "std_msgs/Float32MultiArray")
-def float_array(message) -> Joints:
-    return Joints(None, None, np.asarray(message.data, dtype=float))
+def float_array(message) -> DecodedJoints:
+    return DecodedJoints(None, None, np.asarray(message.data, dtype=float))
 
 
 def moment(time) -> np.ndarray:
@@ -168,16 +170,16 @@ def quaternions(rotations: list) -> np.ndarray:
     return _stack(rotations, "wxyz")
 
 
-def _unnamed(time: np.ndarray, bodies) -> Poses:
+def _unnamed(time: np.ndarray, bodies) -> DecodedPoses:
     """geometry_msgs/Pose, or foxglove.Pose, list."""
-    return Poses(
+    return DecodedPoses(
         time, None, vectors([b.position for b in bodies]), quaternions([b.orientation for b in bodies])
     )
 
 
-def _transforms(items: list) -> Poses:
+def _transforms(items: list) -> DecodedPoses:
     """(time, parent, child, transform) of each body."""
-    return Poses(
+    return DecodedPoses(
         np.stack([moment(time) for time, *_ in items], axis=-1) if items else np.empty(0, np.int64),
         [child for _, _, child, _ in items],
         vectors([transform.translation for *_, transform in items]),

@@ -9,8 +9,8 @@ import numpy as np
 from trunkline.recordings.logs.cdr import short_name
 from trunkline.recordings.logs.encodings import decode
 from trunkline.recordings.logs.log import Topic
-from trunkline.recordings.logs.messages import POSES, READING, Poses
-from trunkline.recordings.logs.samples import Samples, union
+from trunkline.recordings.logs.messages import POSES, READING, DecodedPoses
+from trunkline.recordings.logs.samples import PoseSamples, union
 from trunkline.recordings.logs.transforms import in_one_frame
 
 
@@ -74,14 +74,14 @@ def pose_stream(
     unnamed, twice, read = None, None, []
     for name, topic in topics.items():
         batches = list(_read_poses(topic))
-        given = bodies if name is None else [name]
-        if given is None and any(poses.names is None for _, poses in batches):
+        declared = bodies if name is None else [name]
+        if declared is None and any(poses.names is None for _, poses in batches):
             unnamed = max(poses.positions.shape[-2] for _, poses in batches)
-            given = [str(number + 1) for number in range(unnamed)]
+            declared = [str(number + 1) for number in range(unnamed)]
         twice = next((repeated for _, poses in batches if (repeated := _repeated(poses.names))), twice)
-        read.append((topic, [part for batch in batches for part in _batches(*batch, topic, given)]))
+        read.append((topic, [part for batch in batches for part in _batches(*batch, topic, declared)]))
     parents = {frame: None for _, batches in read for batch in batches for frame in batch.parents or ()}
-    kept = sum(len(batch.rows) for _, batches in read for batch in batches)
+    readable = sum(len(batch.rows) for _, batches in read for batch in batches)
     own_times = any(batch.time.ndim == 2 for _, batches in read for batch in batches)
     if not own_times and len(read) == 1:
         stream = _by_message(*read[0])
@@ -91,7 +91,7 @@ def pose_stream(
             fixed = [(t, [part for batch in _read_poses(t) for part in _batches(*batch, t, ())]) for t in statics]
             samples, parents = in_one_frame(samples, _samples(fixed), list(parents), frame)
         stream = _gather(samples)
-    stream.undecodable = sum(len(topic.messages) for topic in topics.values()) - kept
+    stream.undecodable = sum(len(topic.messages) for topic in topics.values()) - readable
     stream.unnamed, stream.parents, stream.twice = unnamed, tuple(parents), twice
     return stream
 
@@ -104,7 +104,7 @@ def _repeated(names: list[str] | np.ndarray | None) -> str | None:
     return None
 
 
-def _read_poses(topic: Topic) -> Iterator[tuple[np.ndarray, Poses]]:
+def _read_poses(topic: Topic) -> Iterator[tuple[np.ndarray, DecodedPoses]]:
     reader = POSES[short_name(topic.schema)]
     for rows, message in decode(topic):
         try:
@@ -116,7 +116,7 @@ def _read_poses(topic: Topic) -> Iterator[tuple[np.ndarray, Poses]]:
         yield rows, poses._replace(names=named)
 
 
-def _batches(rows: np.ndarray, poses: Poses, topic: Topic, given: Sequence[str] | None) -> Iterator[Batch]:
+def _batches(rows: np.ndarray, poses: DecodedPoses, topic: Topic, declared: Sequence[str] | None) -> Iterator[Batch]:
     """What a reader returned as batches, one a set of names; none if they do not fit."""
     count, size = rows.size, poses.positions.shape[-2]
     time = topic.log_times[rows] if poses.time is None else poses.time
@@ -125,7 +125,7 @@ def _batches(rows: np.ndarray, poses: Poses, topic: Topic, given: Sequence[str] 
     positions = np.broadcast_to(poses.positions, (count, size, 3))
     orientations = None if poses.orientations is None else np.broadcast_to(poses.orientations, (count, size, 4))
     frame = None if poses.frame is None else np.broadcast_to(poses.frame, (count,))
-    rows, names = np.atleast_1d(rows), poses.names if poses.names is not None else given
+    rows, names = np.atleast_1d(rows), poses.names if poses.names is not None else declared
     if isinstance(names, np.ndarray):
         sets, which = np.unique(names.reshape(count, size), axis=0, return_inverse=True)
         parts = [(list(map(str, some)), np.flatnonzero(which.ravel() == i)) for i, some in enumerate(sets)]
@@ -145,11 +145,11 @@ def _by_message(topic: Topic, batches: list[Batch]) -> PoseStream:
     names, count = union([(batch.rows, batch.names) for batch in batches]), len(topic.messages)
     positions = np.full((count, len(names), 3), np.nan)
     quaternions = np.full((count, len(names), 4), np.nan)
-    present, kept = np.zeros((count, len(names)), bool), np.zeros(count, bool)
+    present, readable = np.zeros((count, len(names)), bool), np.zeros(count, bool)
     stamps, frames = np.zeros(count, np.int64), np.zeros(count, np.int64)
     for batch in batches:
         columns = np.ix_(batch.rows, np.array([names.index(name) for name in batch.names], int))
-        stamps[batch.rows], kept[batch.rows] = batch.time, True
+        stamps[batch.rows], readable[batch.rows] = batch.time, True
         present[columns], positions[columns] = True, batch.positions
         if batch.orientations is not None:
             quaternions[columns] = batch.orientations
@@ -157,17 +157,17 @@ def _by_message(topic: Topic, batches: list[Batch]) -> PoseStream:
             frames[batch.rows] = batch.frame
     oriented = any(batch.orientations is not None for batch in batches)
     return PoseStream(
-        stamps=stamps[kept],
-        log_times=topic.log_times[kept],
-        frames=frames[kept] if all(batch.frame is not None for batch in batches) else None,
+        stamps=stamps[readable],
+        log_times=topic.log_times[readable],
+        frames=frames[readable] if all(batch.frame is not None for batch in batches) else None,
         names=names,
-        present=present[kept],
-        positions=positions[kept],
-        quaternions=quaternions[kept] if oriented else None,
+        present=present[readable],
+        positions=positions[readable],
+        quaternions=quaternions[readable] if oriented else None,
     )
 
 
-def _gather(samples: Samples) -> PoseStream:
+def _gather(samples: PoseSamples) -> PoseStream:
     """Frames from bodies that have times of their own, in the order in which their first sample was logged, so that a
     clock that runs back shows."""
     names, body = samples.bodies()
@@ -189,15 +189,15 @@ def _gather(samples: Samples) -> PoseStream:
     )
 
 
-def _samples(read: list[tuple[Topic, list[Batch]]]) -> Samples:
+def _samples(read: list[tuple[Topic, list[Batch]]]) -> PoseSamples:
     """What batches hold, body by body."""
-    parts = [Samples.none()]
+    parts = [PoseSamples.none()]
     for topic, batches in read:
         for batch in batches:
             shape = (len(batch.rows), len(batch.names))
             time = batch.time if batch.time.ndim == 2 else batch.time[:, None]
             turned = np.full((*shape, 4), np.nan) if batch.orientations is None else batch.orientations
-            parts.append(Samples(
+            parts.append(PoseSamples(
                 np.broadcast_to(time, shape).ravel(),
                 np.repeat(topic.log_times[batch.rows], shape[1]),
                 np.tile(np.array(batch.names, dtype=str), shape[0]),
@@ -205,5 +205,5 @@ def _samples(read: list[tuple[Topic, list[Batch]]]) -> Samples:
                 batch.positions.reshape(-1, 3),
                 turned.reshape(-1, 4),
             ))  # fmt: skip
-    samples = Samples(*(np.concatenate(values) for values in zip(*parts, strict=True)))
+    samples = PoseSamples(*(np.concatenate(values) for values in zip(*parts, strict=True)))
     return samples.take(np.argsort(samples.logged, kind="stable"))

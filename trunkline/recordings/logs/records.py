@@ -84,8 +84,8 @@ def read_all(file: BinaryIO, contents: Contents, damage: list[str], path: Path) 
                     contents.unchecked = 0
                 elif crc:
                     if unchunked:
-                        found = "wrong checksum over messages outside chunks"
-                        raise InputError(f"{path}: {found}, none can be trusted")
+                        problem = "wrong checksum over messages outside chunks"
+                        raise InputError(f"{path}: {problem}, none can be trusted")
                     if not damage:
                         damage.append("the data section's checksum is wrong though every chunk's is right")
             elif opcode == Opcode.STATISTICS:

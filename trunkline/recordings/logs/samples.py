@@ -7,7 +7,7 @@ import numpy as np
 FRAMES_OPEN = 16  # frames back to which a body's late sample may still belong
 
 
-class Samples(NamedTuple):
+class PoseSamples(NamedTuple):
     """M poses, in the order in which they were logged.
 
     stamps, logged: ns, of the header and the recorder. Shape (M,). names: the bodies. Shape (M,). parents: names of
@@ -23,12 +23,12 @@ class Samples(NamedTuple):
     quaternions: np.ndarray
 
     @classmethod
-    def none(cls) -> "Samples":
+    def none(cls) -> "PoseSamples":
         time, names = np.empty(0, np.int64), np.empty(0, str)
         return cls(time, time, names, names, np.empty((0, 3)), np.empty((0, 4)))
 
-    def take(self, rows: np.ndarray) -> "Samples":
-        return Samples(*(values[rows] for values in self))
+    def take(self, rows: np.ndarray) -> "PoseSamples":
+        return PoseSamples(*(values[rows] for values in self))
 
     @property
     def clock(self) -> np.ndarray:

@@ -5,15 +5,15 @@ from collections import Counter
 import numpy as np
 
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
-from trunkline.recordings.logs.samples import Samples
+from trunkline.recordings.logs.samples import PoseSamples
 
 NORM_TOLERANCE = 0.01  # of a quaternion's length; float32 rounding is far below, anything above is no rotation
 ALWAYS = np.iinfo(np.int64).min  # ns, since when a static transform holds
 
 
 def in_one_frame(
-    moving: Samples, static: Samples, parents: list[str], wanted: str | None
-) -> tuple[Samples, list[str]]:
+    moving: PoseSamples, static: PoseSamples, parents: list[str], wanted: str | None
+) -> tuple[PoseSamples, list[str]]:
     """The poses of `moving` in one frame, and its name.
 
     A parent is where its latest transform at or before the child's time puts it. A pose is NaN where there was none
@@ -37,8 +37,8 @@ def in_one_frame(
     if target is None:
         return moving, [root for root, _ in Counter(path[-1] for path in paths.values()).most_common()]
     if target not in above.values():
-        found = ", ".join(sorted(set(above.values())))
-        raise ValueError(f"found poses in the frames {found}, expected {target!r}, as in session.yaml: frame.name")
+        frames = ", ".join(sorted(set(above.values())))
+        raise ValueError(f"found poses in the frames {frames}, expected {target!r}, as in session.yaml: frame.name")
     moving = moving.take(np.isin(moving.names, [name for name, path in paths.items() if target in path[1:]]))
     time = np.concatenate([np.full(len(static.names), ALWAYS), moving.clock])
     names = np.concatenate([static.names, moving.names])
@@ -48,10 +48,10 @@ def in_one_frame(
     for name in np.unique(moving.names).tolist():
         rows = np.flatnonzero(moving.names == name)
         for parent in paths[name][1 : paths[name].index(target)]:
-            known = np.flatnonzero(names == parent)
-            known = known[np.argsort(time[known], kind="stable")]
-            latest = np.searchsorted(time[known], moving.clock[rows], side="right") - 1
-            outer = known[np.maximum(latest, 0)]
+            transforms = np.flatnonzero(names == parent)
+            transforms = transforms[np.argsort(time[transforms], kind="stable")]
+            latest = np.searchsorted(time[transforms], moving.clock[rows], side="right") - 1
+            outer = transforms[np.maximum(latest, 0)]
             there = np.where(latest[:, None] < 0, np.nan, turns[outer])
             positions[rows], quaternions[rows] = _product(places[outer], there, positions[rows], quaternions[rows])
     return moving._replace(positions=positions, quaternions=quaternions), [target]
@@ -62,7 +62,7 @@ def is_rotation(quaternions: np.ndarray) -> np.ndarray:
     return np.abs(np.linalg.norm(quaternions, axis=-1) - 1) < NORM_TOLERANCE
 
 
-def _tree(*transforms: Samples) -> dict[str, str]:
+def _tree(*transforms: PoseSamples) -> dict[str, str]:
     """Frame to its parent."""
     above: dict[str, str] = {}
     for samples in transforms:

@@ -37,15 +37,15 @@ def read_export(path: Path) -> PoseStream:
     kind = "Rigid Body" if any(key[0] == "Rigid Body" for key in columns) else "Marker"
     names = tuple(dict.fromkeys(key[1] for key in columns if key[0] == kind and key[2] == "Position"))
     if not names:
-        found = ", ".join(sorted({key[0] for key in columns})) or "nothing"
-        raise InputError(f"{path}: found columns of {found}, expected positions of rigid bodies or markers")
+        problem = ", ".join(sorted({key[0] for key in columns})) or "nothing"
+        raise InputError(f"{path}: found columns of {problem}, expected positions of rigid bodies or markers")
     numbers = _numbers(path, rows, first + 1)
     if not len(numbers):
         raise InputError(f"{path}: found no frame below the header")
-    said = about.get("Total Exported Frames", "")
-    if said.isdigit() and len(numbers) < int(said):
-        found = f"found {len(numbers)} frames, the header says {said} (Total Exported Frames): the file is cut off"
-        raise InputError(f"{path}: {found}, expected a whole export")
+    total = about.get("Total Exported Frames", "")
+    if total.isdigit() and len(numbers) < int(total):
+        problem = f"found {len(numbers)} frames, the header says {total} (Total Exported Frames): the file is cut off"
+        raise InputError(f"{path}: {problem}, expected a whole export")
 
     def gather(component: str, axes: str) -> np.ndarray | None:
         wanted = [(kind, name, component, axis) for name in names for axis in axes]
@@ -83,8 +83,8 @@ def _text(path: Path) -> str:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         row = 1 + data.count(b"\n", 0, error.start)
-        found = f"row {row} holds the byte 0x{data[error.start]:02x}, as in Latin-1"
-        raise InputError(f"{path}: {found}, expected a CSV export of Motive in UTF-8") from error
+        problem = f"row {row} holds the byte 0x{data[error.start]:02x}, as in Latin-1"
+        raise InputError(f"{path}: {problem}, expected a CSV export of Motive in UTF-8") from error
 
 
 def _rows(lines: list[str]) -> list[list[str]]:
@@ -115,16 +115,16 @@ def _columns(path: Path, above: list[list[str]], axes: list[str]) -> dict[tuple[
     if names >= components:
         raise InputError(f"{path}: header: found no row of names between those of types and of Position")
     keys = zip(above[kinds], above[names], above[components], axes, strict=False)  # the shortest row ends them
-    found: dict[tuple[str, str, str, str], int] = {}
+    columns: dict[tuple[str, str, str, str], int] = {}
     for column, key in enumerate(keys):
         kind, name, component, axis = (part.strip() for part in key)
         if column < 2 or not component:
             continue
-        if (kind, name, component, axis) in found and component == "Position" and kind in ("Rigid Body", "Marker"):
+        if (kind, name, component, axis) in columns and component == "Position" and kind in ("Rigid Body", "Marker"):
             twice = f"found {component} {axis} of the {kind.lower()} {name!r} twice"
             raise InputError(f"{path}: header: {twice}, expected a name of its own for each")
-        found[kind, name, component, axis] = column
-    return found
+        columns[kind, name, component, axis] = column
+    return columns
 
 
 def _numbers(path: Path, rows: list[list[str]], first: int) -> np.ndarray:

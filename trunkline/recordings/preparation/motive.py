@@ -64,8 +64,8 @@ def main(arguments: list[str] | None = None) -> int:
     for path in chosen.exports:
         poses, log = read_export(path), chosen.session / f"{path.stem}.mcap"
         write_log(log, poses)
-        seen = 100 * poses.present.mean()
-        print(f"{log}: {len(poses.stamps)} frames of {len(poses.names)} bodies, {seen:.1f} % seen")
+        visible = 100 * poses.present.mean()
+        print(f"{log}: {len(poses.stamps)} frames of {len(poses.names)} bodies, {visible:.1f} % seen")
     target = chosen.session / "session.yaml"
     if not target.exists():
         target.write_text(propose([survey(log) for log in sorted(chosen.session.glob("*.mcap"))], UP))

@@ -5,7 +5,7 @@ import re
 import numpy as np
 
 from trunkline.recordings.logs.pose_stream import PoseStream
-from trunkline.recordings.preparation.survey import Survey
+from trunkline.recordings.preparation.survey import LogSurvey
 from trunkline.recordings.signals.clock import MIN_TRAVEL
 from trunkline.recordings.signals.units import likely_unit
 from trunkline.recordings.trials.experiments import EXPERIMENTS, PULL, TILT
@@ -16,7 +16,7 @@ GUESSED = "  # up as if the arm hangs: no log tells it of a mount that is turned
 RESTING = 5e-3  # m; a trial whose every body stays within this, but for its worst hundredth, is at rest
 
 
-def propose(surveys: list[Survey], up: tuple[int, int, int] | None = None) -> str:
+def propose(surveys: list[LogSurvey], up: tuple[int, int, int] | None = None) -> str:
     """The text of a session.yaml for logs of one folder; empty where none of them holds poses.
 
     up: the axis against gravity, where the logs' maker says it.
@@ -59,8 +59,8 @@ def propose(surveys: list[Survey], up: tuple[int, int, int] | None = None) -> st
         later = [other for _, other, _ in trials[index + 1 :]]
         earlier = [other for _, other, _ in trials[:index]]
         split = VALIDATE if experiment in earlier and experiment not in later else IDENTIFY
-        told = "" if level is None else f", level: {level:g}"
-        lines.append(f"  - {{file: {_quoted(path.name)}, experiment: {experiment}{told}, split: {split}}}")
+        level_text = "" if level is None else f", level: {level:g}"
+        lines.append(f"  - {{file: {_quoted(path.name)}, experiment: {experiment}{level_text}, split: {split}}}")
     return "\n".join(lines) + "\n"
 
 
@@ -87,7 +87,7 @@ def _clock(streams: list[PoseStream]) -> str:
     return "frame" if numbered else "stamp"
 
 
-def _topics(survey: Survey) -> list[str]:
+def _topics(survey: LogSurvey) -> list[str]:
     by_body = {body: topic.name for body, topic in survey.pose_topics.items() if body is not None}
     if by_body:
         poses = "{" + ", ".join(f"{_quoted(body)}: {name}" for body, name in by_body.items()) + "}"
@@ -98,7 +98,7 @@ def _topics(survey: Survey) -> list[str]:
 
 
 def _experiment(
-    survey: Survey, poses: PoseStream, base: str | None, up: np.ndarray, scale: float
+    survey: LogSurvey, poses: PoseStream, base: str | None, up: np.ndarray, scale: float
 ) -> tuple[str, float | None]:
     """(experiment, level) by the file's name, or else by what moves."""
     names = {word: name for name, kind in EXPERIMENTS.items() for word in kind.words}
@@ -111,10 +111,10 @@ def _experiment(
         experiment = names[word[1]]
     else:
         rests = pull <= MIN_TRAVEL and travel < RESTING
-        asked = survey.commands or survey.tendon_positions  # encoders may start anywhere
-        held = asked is not None and np.nan_to_num(asked.positions).max(initial=0.0) > MIN_TRAVEL
-        seen = (pull > MIN_TRAVEL or (rests and held), rests)
-        experiment = next(name for name, kind in EXPERIMENTS.items() if (kind.needs_motors, kind.static) == seen)
+        motors = survey.commands or survey.tendon_positions  # encoders may start anywhere
+        pulled = motors is not None and np.nan_to_num(motors.positions).max(initial=0.0) > MIN_TRAVEL
+        signs = (pull > MIN_TRAVEL or (rests and pulled), rests)
+        experiment = next(name for name, kind in EXPERIMENTS.items() if (kind.needs_motors, kind.static) == signs)
     level = EXPERIMENTS[experiment].level
     if level is PULL:
         return experiment, round(1e3 * pull)

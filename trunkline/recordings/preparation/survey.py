@@ -20,7 +20,7 @@ GAP = 1.5  # median intervals between frames that make a gap
 
 
 @dataclass
-class Survey:
+class LogSurvey:
     """A log and what could be read in it. notes: why something could not. pose_topics: as in `source`."""
 
     log: Log
@@ -33,30 +33,30 @@ class Survey:
     tendon_positions: JointStream | None = None
 
 
-def survey(path: Path) -> Survey:
+def survey(path: Path) -> LogSurvey:
     """Look through a log.
 
     Raises:
         InputError: it cannot be read at all.
     """
-    found = Survey(read_log(path, POSES.keys() | JOINTS.keys()))
-    arms = _of_the_arm(found.log)
+    result = LogSurvey(read_log(path, POSES.keys() | JOINTS.keys()))
+    arms = _of_the_arm(result.log)
     try:
-        found.pose_topics = pose_topics(arms, None)
-        if found.pose_topics:
-            found.poses = pose_stream(found.pose_topics, statics=static_topics(found.log))
+        result.pose_topics = pose_topics(arms, None)
+        if result.pose_topics:
+            result.poses = pose_stream(result.pose_topics, statics=static_topics(result.log))
     except (InputError, ValueError) as error:
-        found.notes.append(f"poses: {error}")
+        result.notes.append(f"poses: {error}")
     for role, words in (("command", COMMAND_WORDS), ("position", POSITION_WORDS)):
         try:
             topic = choose(arms, None, JOINTS, role, words)
             if topic is not None:
                 stream = joint_stream(topic)
-                setattr(found, f"{role}_topic", topic.name)
-                setattr(found, "commands" if role == "command" else "tendon_positions", stream)
+                setattr(result, f"{role}_topic", topic.name)
+                setattr(result, "commands" if role == "command" else "tendon_positions", stream)
         except (InputError, ValueError) as error:
-            found.notes.append(f"{role}: {error}")
-    return found
+            result.notes.append(f"{role}: {error}")
+    return result
 
 
 def _of_the_arm(log: Log) -> Log:
@@ -66,9 +66,9 @@ def _of_the_arm(log: Log) -> Log:
     return replace(log, topics={name: topic for name, topic in log.topics.items() if not OTHERS.match(name)})
 
 
-def describe(found: Survey) -> list[str]:
+def describe(result: LogSurvey) -> list[str]:
     """Lines for people to read."""
-    log = found.log
+    log = result.log
     lines = [f"{log.path}"] + [f"  damaged: {damage}" for damage in log.damage]
     if log.unchecked:
         lines.append(f"  {log.unchecked} of {log.count} messages without a checksum: bits that flipped there go unseen")
@@ -81,9 +81,9 @@ def describe(found: Survey) -> list[str]:
             f"  {topic.name:{width}}  {topic.schema or 'no schema'} ({topic.encoding}), {use}: "
             f"{len(topic.log_times)} messages{_pace(topic.log_times)}"
         )
-    lines += [f"  {note}" for note in found.notes]
-    if found.poses is not None and len(found.poses.stamps):
-        lines += _bodies(found.poses)
+    lines += [f"  {note}" for note in result.notes]
+    if result.poses is not None and len(result.poses.stamps):
+        lines += _bodies(result.poses)
     return lines
 
 
@@ -108,9 +108,9 @@ def _bodies(poses: PoseStream) -> list[str]:
     ]
     width = max(map(len, poses.names), default=0)
     for index, name in enumerate(poses.names):
-        seen = time[poses.present[order, index]]
-        gaps = np.diff(seen)
+        visible = time[poses.present[order, index]]
+        gaps = np.diff(visible)
         gaps = gaps[gaps > GAP * interval]
         longest = f", {len(gaps)} gaps, the longest {1e3 * gaps.max():.0f} ms" if len(gaps) else ""
-        lines.append(f"    {name:{width}}  seen in {100 * len(seen) / len(time):.1f} %{longest}")
+        lines.append(f"    {name:{width}}  seen in {100 * len(visible) / len(time):.1f} %{longest}")
     return lines

@@ -36,14 +36,14 @@ def _folder_name(name: str) -> str:
 SessionName = Annotated[str, AfterValidator(_folder_name)]
 
 
-def _no_list(found):
-    if isinstance(found, list):
-        names = ", ".join(map(str, found))
+def _no_list(value):
+    if isinstance(value, list):
+        names = ", ".join(map(str, value))
         raise ValueError(
             f"found a list, expected one folder: move these sessions into one, such as data/raw/arm_7, and write "
             f"session: arm_7, only: [{names}]"
         )
-    return found
+    return value
 
 
 def _each_once(names: list[str]) -> list[str]:
@@ -112,7 +112,7 @@ class Topics(Entry):
 UNITS = {"m": 1.0, "mm": 1e-3, "rad": 1.0, "deg": np.pi / 180}
 
 
-class Motor(Entry):
+class MotorEntry(Entry):
     """What a motor's name in the log stands for, where that is not the pull of one tendon in metres.
 
     unit: of its numbers. spool_radius: m, of the drum of one that turns. tendons: name in the model to how far the
@@ -191,7 +191,7 @@ class Session(Entry):
     base: str | FixedBase
     segments: dict[str, str] | None = Field(default=None, min_length=1)
     tendons: dict[str, str] | None = Field(default=None, min_length=1)
-    motors: dict[str, Motor] | None = Field(default=None, min_length=1)
+    motors: dict[str, MotorEntry] | None = Field(default=None, min_length=1)
     topics: Topics = Topics()
     bodies: list[str] | None = Field(default=None, min_length=1)
     clock: Literal["stamp", "log", "frame"] = "stamp"

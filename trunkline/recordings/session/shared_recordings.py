@@ -12,33 +12,34 @@ if TYPE_CHECKING:
 
 
 def check_shared(folder: Path, trials: list["TrialEntry"]) -> dict[str, list[str]]:
-    """What is to be said of trials of one split that share data, by trial; a sentence each.
+    """Remarks on trials of one split that share data, by trial.
 
     Raises:
         InputError: trials of different splits share data, so that one split would score what the other fitted.
     """
     content = _contents(folder, sorted({trial.file for trial in trials}))
-    said: dict[str, list[str]] = {}
+    remarks: dict[str, list[str]] = {}
     for first, second in combinations(trials, 2):
         if content[first.file] != content[second.file]:
             continue
         whole = (float("-inf"), float("inf"))
-        one, other = first.window or whole, second.window or whole
-        if max(one[0], other[0]) >= min(one[1], other[1]):
+        interval, other_interval = first.window or whole, second.window or whole
+        if max(interval[0], other_interval[0]) >= min(interval[1], other_interval[1]):
             continue
-        one_name = first.file == second.file
-        files = "one file" if one_name else f"{first.file} and {second.file}, which hold the same bytes"
-        windows = "" if first.window is second.window is None else f" in {_window(one)} and {_window(other)}"
-        found = f"trials {first.name} and {second.name} share data: {files}{windows}"
+        same_file = first.file == second.file
+        files = "one file" if same_file else f"{first.file} and {second.file}, which hold the same bytes"
+        windows = f" in {_window(interval)} and {_window(other_interval)}" if first.window or second.window else ""
+        overlap = f"trials {first.name} and {second.name} share data: {files}{windows}"
         if first.split != second.split:
             expected = "expected no data in two splits"
             raise InputError(
-                f"{folder / 'session.yaml'}: trials.{trials.index(second)}: {found}; {first.name} is of the split "
+                f"{folder / 'session.yaml'}: trials.{trials.index(second)}: {overlap}; {first.name} is of the split "
                 f"{first.split}, {second.name} of {second.split}, {expected}"
             )
         for trial in (first, second):
-            said.setdefault(trial.name, []).append(f"{found}; what they share counts twice in the split {first.split}")
-    return said
+            remark = f"{overlap}; what they share counts twice in the split {first.split}"
+            remarks.setdefault(trial.name, []).append(remark)
+    return remarks
 
 
 def _window(window: tuple[float, float]) -> str:

@@ -20,7 +20,7 @@ COMMAND_WORDS, POSITION_WORDS = ("command", "cmd", "target"), ("state", "positio
 
 
 @dataclass
-class Source:
+class LogSource:
     """One log, decoded. log: without its messages, which are decoded. pose_topic: for people to read.
 
     joint_topics: all whose schema is in `JOINTS`.
@@ -34,7 +34,7 @@ class Source:
     joint_topics: tuple[str, ...]
 
 
-def open_log(path: Path, session: Session) -> Source:
+def open_log(path: Path, session: Session) -> LogSource:
     """Read and decode a log.
 
     Raises:
@@ -43,32 +43,32 @@ def open_log(path: Path, session: Session) -> Source:
     log = read_log(path, POSES.keys() | JOINTS.keys())
     topics = pose_topics(log, session.topics.poses)
     if not topics:
-        found = ", ".join(f"{t.name} ({t.schema})" for t in log.topics.values()) or "no readable message"
+        problem = ", ".join(f"{t.name} ({t.schema})" for t in log.topics.values()) or "no readable message"
         wanted = session.topics.poses
         named = "" if wanted is None else f"{wanted!r} of session.yaml with "
         damage = f"; the log is damaged: {'; '.join(log.damage)}" if log.damage else ""
-        raise InputError(f"{path}: no pose topic, found {found}{damage}, expected {named}one of {', '.join(POSES)}")
+        raise InputError(f"{path}: no pose topic, found {problem}{damage}, expected {named}one of {', '.join(POSES)}")
     name = ", ".join(topic.name for topic in topics.values())
     where = f"{path}: {name}"
     poses = _understood(where, pose_stream, topics, session.bodies, session.frame.name, static_topics(log))
     if poses.unnamed is not None:
-        found = f"found {poses.unnamed} poses without names"
-        raise InputError(f"{where}: {found}, expected `bodies` in session.yaml to name them, in order")
+        problem = f"found {poses.unnamed} poses without names"
+        raise InputError(f"{where}: {problem}, expected `bodies` in session.yaml to name them, in order")
     if not len(poses.stamps):
         schema = next(iter(topics.values())).schema
         names = f" with {len(session.bodies)} `bodies`, as in session.yaml" if session.bodies else ""
-        found = f"no message fits its schema {schema}{names}"
+        problem = f"no message fits its schema {schema}{names}"
         if poses.twice is not None:
-            found = f"found {poses.twice!r} twice in a message, expected each body once"
-        raise InputError(f"{where}: {found}")
+            problem = f"found {poses.twice!r} twice in a message, expected each body once"
+        raise InputError(f"{where}: {problem}")
     if len(poses.parents) > 1 and session.frame.name is None:
-        found = f"found poses in the frames {', '.join(poses.parents)}, which nothing connects"
-        raise InputError(f"{where}: {found}, expected one, or its name in session.yaml: frame.name")
+        problem = f"found poses in the frames {', '.join(poses.parents)}, which nothing connects"
+        raise InputError(f"{where}: {problem}, expected one, or its name in session.yaml: frame.name")
     commands = _joints(log, session.topics.commands, "command", COMMAND_WORDS, session)
     tendon_positions = _joints(log, session.topics.tendon_positions, "tendon position", POSITION_WORDS, session)
     joint_topics = tuple(name for name, t in log.topics.items() if short_name(t.schema) in JOINTS)
     log.topics = {}  # decoded: the raw messages can go
-    return Source(log, name, poses, commands, tendon_positions, joint_topics)
+    return LogSource(log, name, poses, commands, tendon_positions, joint_topics)
 
 
 def _joints(log: Log, wanted: str | None, role: str, words: tuple[str, ...], session: Session) -> JointStream | None:
@@ -78,8 +78,8 @@ def _joints(log: Log, wanted: str | None, role: str, words: tuple[str, ...], ses
     where = f"{log.path}: {topic.name}"
     stream = _understood(where, joint_stream, topic)
     if stream.unnamed is not None and session.tendons is None:
-        found = f"found {stream.unnamed} numbers without names"
-        raise InputError(f"{where}: {found}, expected `tendons` in session.yaml to name them, in order")
+        problem = f"found {stream.unnamed} numbers without names"
+        raise InputError(f"{where}: {problem}, expected `tendons` in session.yaml to name them, in order")
     return stream
 
 
@@ -113,17 +113,17 @@ def choose(
             expected = ", ".join(registry)
             raise InputError(f"{log.path}: {name}: found {topic.schema}, expected a {role} schema: {expected}")
         return topic
-    told = _best(log, registry, wanted)
-    if len(told) > 1:
-        found = ", ".join(topic.name for topic in told)
-        raise InputError(f"{log.path}: {role} topic: found {found}, expected one, or its name in session.yaml: topics")
-    return told[0] if told else None
+    candidates = _best(log, registry, wanted)
+    if len(candidates) > 1:
+        names = ", ".join(topic.name for topic in candidates)
+        raise InputError(f"{log.path}: {role} topic: found {names}, expected one, or its name in session.yaml: topics")
+    return candidates[0] if candidates else None
 
 
 def _best(log: Log, registry: dict, words: tuple[str, ...] = ("",)) -> list[Topic]:
     """The topics with one of `words` in their names whose schema is registered first; not what never moves, nor what
     a model drew."""
-    told = [
+    candidates = [
         topic
         for topic in log.topics.values()
         if short_name(topic.schema) in registry
@@ -131,8 +131,8 @@ def _best(log: Log, registry: dict, words: tuple[str, ...] = ("",)) -> list[Topi
         and not topic.name.endswith((STATIC, TWIN))
     ]
     rank = list(registry).index
-    first = min((rank(short_name(topic.schema)) for topic in told), default=None)
-    return [topic for topic in told if rank(short_name(topic.schema)) == first]
+    first = min((rank(short_name(topic.schema)) for topic in candidates), default=None)
+    return [topic for topic in candidates if rank(short_name(topic.schema)) == first]
 
 
 def _names_in(topics: list[Topic]) -> list[str]:

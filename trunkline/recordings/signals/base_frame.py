@@ -21,8 +21,8 @@ class BasePose:
 
 def average_base(positions: np.ndarray, quaternions: np.ndarray) -> BasePose:
     """Robust mean of the base body's poses (T, 3) m and (T, 4) wxyz, NaN where it was not seen."""
-    seen = np.isfinite(positions[:, 0]) & np.isfinite(quaternions[:, 0])
-    positions, rotations = positions[seen], rotation_from_wxyz(quaternions[seen])
+    visible = np.isfinite(positions[:, 0]) & np.isfinite(quaternions[:, 0])
+    positions, rotations = positions[visible], rotation_from_wxyz(quaternions[visible])
     keep = np.ones(len(positions), bool)
     for _ in range(3):
         position, rotation = positions[keep].mean(axis=0), rotations[keep].mean()
@@ -51,6 +51,6 @@ def to_base_frame(
     if quaternions is None:
         return moved, None
     turned = np.full(quaternions.shape, np.nan)
-    seen = np.isfinite(quaternions[..., 0])
-    turned[seen] = wxyz_from_rotation(inverse * rotation_from_wxyz(quaternions[seen]))
+    visible = np.isfinite(quaternions[..., 0])
+    turned[visible] = wxyz_from_rotation(inverse * rotation_from_wxyz(quaternions[visible]))
     return moved, turned

@@ -109,16 +109,16 @@ def offset_by_log_times(
         motor_time (M,), motor_logged (M,): s, the same of the motors' messages, by their own and by the same recorder.
     """
     order = np.argsort(logged, kind="stable")
-    delay, motor_delay, found = logged - time, motor_logged - motor_time, []
+    delay, motor_delay, estimates = logged - time, motor_logged - motor_time, []
     for rows in np.array_split(order, max(round(float(np.ptp(time)) / WINDOW), 1)):
         within = (motor_logged >= logged[rows[0]]) & (motor_logged <= logged[rows[-1]])
         if within.any():
             quickest = delay[rows].min(), motor_delay[within].min()
             beyond = np.median(delay[rows]) - quickest[0], np.median(motor_delay[within]) - quickest[1]
-            found.append((quickest[1] - quickest[0], max(beyond)))
-    if not found:
+            estimates.append((quickest[1] - quickest[0], max(beyond)))
+    if not estimates:
         return None
-    offset, uncertainty = np.median(found, axis=0)
+    offset, uncertainty = np.median(estimates, axis=0)
     return LoggedOffset(float(offset), float(uncertainty))
 
 

@@ -23,16 +23,16 @@ def outliers(time: np.ndarray, columns: np.ndarray, deviations: float) -> np.nda
         time: (T,) s, increasing.
         deviations: allowed disagreement, in medians of it.
     """
-    kept = np.arange(len(time))
+    rows = np.arange(len(time))
     for _ in range(ROUNDS):
-        off = _disagreement(time[kept], columns[kept])
+        off = _disagreement(time[rows], columns[rows])
         around = median_filter(off, NEIGHBOURHOOD, mode="mirror")
         good = off <= np.maximum(deviations * np.median(off), STAND_OUT * around)
         if good.all():
             break
-        kept = kept[good]
+        rows = rows[good]
     bad = np.ones(len(time), bool)
-    bad[kept] = False
+    bad[rows] = False
     return bad
 
 

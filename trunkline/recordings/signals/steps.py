@@ -12,14 +12,14 @@ SOON = 0.1  # quantile of the delays in a stretch: what is late for a while does
 
 
 @dataclass
-class Step:
+class ClockStep:
     """at: the first event after it. size: s, by which the later clock goes ahead there."""
 
     at: int
     size: float
 
 
-def find_step(late: np.ndarray, early: np.ndarray) -> Step | None:
+def find_step(late: np.ndarray, early: np.ndarray) -> ClockStep | None:
     """The largest step between two clocks that date the same T events; None if there is none.
 
     A message that is late raises `late` for a while, and then it comes back. A step stays.
@@ -35,7 +35,7 @@ def find_step(late: np.ndarray, early: np.ndarray) -> Step | None:
     least = max(FRAMES * interval, JITTERS * 1.4826 * np.median(np.abs(jumps - np.median(jumps))))
     candidates = np.flatnonzero(np.abs(jumps) > least) + 1
     candidates = candidates[np.argsort(-np.abs(jumps[candidates - 1]), kind="stable")][:MOST]
-    steps = [Step(int(at), size_at(ahead, int(at), interval)) for at in candidates]
+    steps = [ClockStep(int(at), size_at(ahead, int(at), interval)) for at in candidates]
     return max((step for step in steps if abs(step.size) > least), key=lambda step: abs(step.size), default=None)
 
 

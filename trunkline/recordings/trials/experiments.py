@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from trunkline.recordings.trials.recording import Recording
+from trunkline.recordings.trials.recording import TrialRecording
 from trunkline.recordings.trials.start import Smooth, Start, cycle_time, free_time, release_time
 
 
@@ -29,7 +29,7 @@ LOAD = Level("kg at the tip", "kg", 0.0, 5.0)  # above, grams were meant; of a t
 
 
 @dataclass(frozen=True)
-class Kind:
+class ExperimentKind:
     """level: of a trial, None where it has none.
 
     what: is done in a trial, in a few words. plural: what several trials are called.
@@ -50,15 +50,15 @@ class Kind:
     static: bool
     needs_motors: bool
     words: tuple[str, ...]
-    start: Callable[[Recording, Smooth], Start] | None = None
-    free: Callable[[Recording, float], float] | None = None
+    start: Callable[[TrialRecording, Smooth], Start] | None = None
+    free: Callable[[TrialRecording, float], float] | None = None
     stepwise: bool = False
     hangs: bool = False
     without: str = ""
 
 
-EXPERIMENTS: dict[str, Kind] = {
-    "static_tilt": Kind(
+EXPERIMENTS: dict[str, ExperimentKind] = {
+    "static_tilt": ExperimentKind(
         what="at rest, the mount tilted",
         plural="static tilts",
         level=TILT,
@@ -67,7 +67,7 @@ EXPERIMENTS: dict[str, Kind] = {
         words=("static", "tilt"),
         without="`source: releases` under identify_stiffness, with `stiffness` and `damping` alone to identify",
     ),
-    "release": Kind(
+    "release": ExperimentKind(
         what="held bent, then let go, no pull",
         plural="releases",
         level=None,
@@ -78,7 +78,7 @@ EXPERIMENTS: dict[str, Kind] = {
         free=lambda trial, begin: free_time(trial.time, trial.positions, begin),
         hangs=True,
     ),
-    "curl": Kind(
+    "curl": ExperimentKind(
         what="tendons drawn in and paid out",
         plural="curls",
         level=PULL,
@@ -87,7 +87,7 @@ EXPERIMENTS: dict[str, Kind] = {
         words=("curl",),
         start=lambda trial, smooth: cycle_time(trial.time, trial.commands),
     ),
-    "static_pull": Kind(
+    "static_pull": ExperimentKind(
         what="at rest, tendons held at their commands",
         plural="static pulls",
         level=None,
@@ -96,7 +96,7 @@ EXPERIMENTS: dict[str, Kind] = {
         words=("pull",),
         without="`source: tilts` under identify_stiffness, and no `kp` there",
     ),
-    "static_path": Kind(
+    "static_path": ExperimentKind(
         what="at rest in every frame, tendons moved a step in between",
         plural="static paths",
         level=None,
@@ -105,7 +105,7 @@ EXPERIMENTS: dict[str, Kind] = {
         words=("path", "steps"),
         stepwise=True,
     ),
-    "motion": Kind(
+    "motion": ExperimentKind(
         what="anything else that is commanded",
         plural="motions",
         level=None,

@@ -17,11 +17,12 @@ ONE_LINE = 20.0  # deg, within which directions lie in one plane
 def recorded_lines(trials: list[Trial], splits: tuple[str, ...] = SPLITS) -> list[str]:
     """A line a kind of experiment: trials of `splits` by split, and over which range, but for those of `test`."""
     lines = []
-    for kind, told in EXPERIMENTS.items():
-        own = [trial for trial in trials if trial.experiment == kind]
-        if own:
-            counts = [f"{sum(t.split == split for t in own)} {split}" for split in splits]
-            lines.append(f"{told.plural}: {', '.join(counts)}{_range([t for t in own if t.split in DECIDING])}")
+    for kind, experiment in EXPERIMENTS.items():
+        chosen = [trial for trial in trials if trial.experiment == kind]
+        if chosen:
+            counts = [f"{sum(t.split == split for t in chosen)} {split}" for split in splits]
+            covered = _range([t for t in chosen if t.split in DECIDING])
+            lines.append(f"{experiment.plural}: {', '.join(counts)}{covered}")
     return lines
 
 
@@ -37,32 +38,32 @@ def recorded_of_each(trials: list[Trial], splits: tuple[str, ...] = SPLITS) -> l
     ]
 
 
-def _range(own: list[Trial]) -> str:
+def _range(trials: list[Trial]) -> str:
     """Over which tilts, pulls and loads."""
-    if not own:
+    if not trials:
         return ""
-    said = ""
-    tilts = [np.degrees(tilt_of_gravity(trial.gravity)) for trial in own if trial.gravity.any()]
+    text = ""
+    tilts = [np.degrees(tilt_of_gravity(trial.gravity)) for trial in trials if trial.gravity.any()]
     if tilts and max(tilts) > np.degrees(UPRIGHT):
-        found = dict.fromkeys(f"{tilt:.0f}" for tilt in (min(tilts), max(tilts)))
-        said += f"; tilted by {' to '.join(found)}°"
-    pulls = [float(_drawn(trial).max(initial=0)) for trial in own]
+        ends = dict.fromkeys(f"{tilt:.0f}" for tilt in (min(tilts), max(tilts)))
+        text += f"; tilted by {' to '.join(ends)}°"
+    pulls = [float(_drawn(trial).max(initial=0)) for trial in trials]
     if max(pulls) > PULLED:
-        said += f"; pulls of up to {1e3 * max(pulls):.0f} mm"
-    loads = sorted({trial.load for trial in own})
+        text += f"; pulls of up to {1e3 * max(pulls):.0f} mm"
+    loads = sorted({trial.load for trial in trials})
     if loads != [0.0]:
-        said += f"; loads of {', '.join(f'{1e3 * load:.0f}' for load in loads)} g"
-    return said
+        text += f"; loads of {', '.join(f'{1e3 * load:.0f}' for load in loads)} g"
+    return text
 
 
 def missing_lines(trials: list[Trial]) -> list[str]:
     """What the trials to identify from leave out: directions of tilts and releases, tendons, pulls of several."""
-    own = [trial for trial in trials if trial.split == IDENTIFY]
-    tilts = [t.gravity for t in own if t.gravity.any() and tilt_of_gravity(t.gravity) > UPRIGHT]
+    identifying = [trial for trial in trials if trial.split == IDENTIFY]
+    tilts = [t.gravity for t in identifying if t.gravity.any() and tilt_of_gravity(t.gravity) > UPRIGHT]
     lines = _sides("tilts", np.array([np.arctan2(g[1], g[0]) for g in tilts]), "gravity pulls the arm")
-    releases = [trial for trial in own if EXPERIMENTS[trial.experiment].hangs]
+    releases = [trial for trial in identifying if EXPERIMENTS[trial.experiment].hangs]
     lines += _sides("releases", np.array([_bent(trial) for trial in releases]), "the arm is held")
-    return lines + _pulls([trial for trial in own if EXPERIMENTS[trial.experiment].needs_motors])
+    return lines + _pulls([trial for trial in identifying if EXPERIMENTS[trial.experiment].needs_motors])
 
 
 def _sides(what: str, azimuths: np.ndarray, word: str) -> list[str]:
@@ -96,18 +97,18 @@ def _drawn(trial: Trial) -> np.ndarray:
     return np.maximum(trial.commands, 0).max(axis=0, initial=0)
 
 
-def _pulls(own: list[Trial]) -> list[str]:
-    if not own:
+def _pulls(trials: list[Trial]) -> list[str]:
+    if not trials:
         return []
-    lines, most = [], np.max([_drawn(trial) for trial in own], axis=0)
-    idle = [name for name, pull in zip(own[0].tendons, most, strict=True) if pull < PULLED]
+    lines, most = [], np.max([_drawn(trial) for trial in trials], axis=0)
+    idle = [name for name, pull in zip(trials[0].tendons, most, strict=True) if pull < PULLED]
     if len(idle) == len(most):
         if not (pull := most.max(initial=0)):
             return ["no tendon is pulled; if some were, their sign in session.yaml is wrong"]
         return [f"no tendon is pulled by more than {1e3 * pull:.2g} mm: is the unit in session.yaml right?"]
     if idle:
         lines.append(f"never pulled: {', '.join(idle)}")
-    if max(_at_once(trial) for trial in own) == 1:
+    if max(_at_once(trial) for trial in trials) == 1:
         lines.append("only one tendon is pulled at a time: how several share the load is not seen")
     return lines
 

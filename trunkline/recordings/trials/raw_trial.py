@@ -7,14 +7,14 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from trunkline.recordings.trials.recording import Recording
+from trunkline.recordings.trials.recording import TrialRecording
 from trunkline.recordings.trials.tables import long_table, pose_table, read_tables, stack, with_sessions
 
 BASE = "base"  # the base body's name in poses.parquet
 
 
 @dataclass(kw_only=True)
-class Take(Recording):
+class RawTrial(TrialRecording):
     """T frames, S segments, K tendons; the motors have Tc commands and Tm measured positions.
 
     name, experiment, split, level, load: as planned, see `Planned`. segments: S names, tendons: K names, as in the
@@ -56,7 +56,7 @@ SCHEMA = pa.schema(
 )
 
 
-def write_takes(folder: Path, takes: list[Take]) -> None:
+def write_takes(folder: Path, takes: list[RawTrial]) -> None:
     """Write trials.parquet (a row a trial), poses.parquet (a row a frame and body, the base first) and
     commands.parquet (a row a tendon and time; `stream` is "command" or "position")."""
     rows, poses, commands = [], [], []
@@ -99,7 +99,7 @@ def write_takes(folder: Path, takes: list[Take]) -> None:
     pq.write_table(pa.concat_tables(commands), folder / "commands.parquet")
 
 
-def read_takes(folder: Path, splits: tuple[str, ...]) -> list[Take]:
+def read_takes(folder: Path, splits: tuple[str, ...]) -> list[RawTrial]:
     """The takes of `splits` that `write_takes` wrote into `folder`, in the same order; InputError as `read_tables`."""
     rows, poses, pulls = read_tables(folder, "ingest")
     takes, pose_row, pull_row = [], 0, 0
@@ -117,7 +117,7 @@ def read_takes(folder: Path, splits: tuple[str, ...]) -> list[Take]:
         positions = stack(pose, ("x", "y", "z"), shape)
         quaternions = stack(pose, ("qw", "qx", "qy", "qz"), shape)
         takes.append(
-            Take(
+            RawTrial(
                 name=row["trial"],
                 experiment=row["experiment"],
                 split=row["split"],

@@ -6,7 +6,7 @@ import numpy as np
 
 
 @dataclass(kw_only=True)
-class Planned:
+class PlannedTrial:
     """What the experimenter says of a trial.
 
     name: unique within the session. experiment: one of `experiments.EXPERIMENTS`. split: what the trial may be used
@@ -23,7 +23,7 @@ class Planned:
 
 
 @dataclass(kw_only=True)
-class Recording(Planned):
+class TrialRecording(PlannedTrial):
     """A trial of T frames, S segments and K tendons.
 
     time: (T,) s from the first frame. positions (T, S, 3) m, quaternions (T, S, 4) wxyz or None: of the segments.

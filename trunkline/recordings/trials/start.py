@@ -71,23 +71,23 @@ def _let_go(
     speed, m/s, that the hand had given the arm by then."""
     step = float(time[1] - time[0])
     window = (time >= guess - HOLD) & (time <= guess + FREE)
-    seen = positions[window].reshape(window.sum(), -1)
-    held = np.vander((time[window] - guess) / HOLD, DEGREE + 1)
+    measured = positions[window].reshape(window.sum(), -1)
+    before_release = np.vander((time[window] - guess) / HOLD, DEGREE + 1)
     instants = np.arange(max(guess - SEARCHED, time[window][0]), guess + min(SEARCHED, FREE / 2), step / TRIES)
 
     def explain(instant: float, powers: tuple[float, ...]) -> tuple[float, np.ndarray]:
         since = np.maximum(time - instant, 0)[:, None] / FREE
-        design = np.hstack([held, smooth(since ** np.array(powers))[window]])
-        fit = np.linalg.lstsq(design, seen)[0]
-        return float(np.square(seen - design @ fit).sum()), fit
+        design = np.hstack([before_release, smooth(since ** np.array(powers))[window]])
+        fit = np.linalg.lstsq(design, measured)[0]
+        return float(np.square(measured - design @ fit).sum()), fit
 
     residuals, fits = np.full(len(instants), np.inf), []
     for powers in LEAVING:
-        found, tried = zip(*(explain(instant, powers) for instant in instants), strict=True)
-        if min(found) < PLAINLY * residuals.min():
-            residuals, fits = np.array(found), tried
+        errors, tried = zip(*(explain(instant, powers) for instant in instants), strict=True)
+        if min(errors) < PLAINLY * residuals.min():
+            residuals, fits = np.array(errors), tried
     best = int(np.argmin(residuals))
-    spare = max(seen.size / 3 - fits[best].size, 1)  # of three frames, the low-pass leaves about one
+    spare = max(measured.size / 3 - fits[best].size, 1)  # of three frames, the low-pass leaves about one
     inner = int(np.clip(best, 1, len(instants) - 2))
     curvature = (residuals[inner - 1] - 2 * residuals[inner] + residuals[inner + 1]) / (step / TRIES) ** 2
     variance = 2 * residuals[best] / spare / curvature if curvature > 0 else SEARCHED**2
@@ -122,14 +122,14 @@ def departures(positions: np.ndarray, behind: int, ahead: int, shortest: int) ->
     Returns:
         From frame `shortest` on, as far as others are `ahead`. Shape (T - shortest - ahead,), if that is positive.
     """
-    found = []
+    distances = []
     for frame in range(shortest, len(positions) - ahead):
         past = min(behind, frame)
         powers = np.vander(np.arange(-past, 1) / past, 3)
         weights = np.vander([ahead / past], 3) @ np.linalg.pinv(powers)
         led = np.tensordot(weights, positions[frame - past : frame + 1], 1)
-        found.append(robust_length(positions[frame + ahead] - led)[0])
-    return np.array(found)
+        distances.append(robust_length(positions[frame + ahead] - led)[0])
+    return np.array(distances)
 
 
 def _frames(seconds: float, step: float) -> int:

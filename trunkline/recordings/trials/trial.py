@@ -11,12 +11,12 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from trunkline.recordings.trials.recording import Recording
+from trunkline.recordings.trials.recording import TrialRecording
 from trunkline.recordings.trials.tables import long_table, pose_table, read_tables, stack, with_sessions
 
 
 @dataclass(kw_only=True)
-class Trial(Recording):
+class Trial(TrialRecording):
     """One experiment of T frames, S segments and K tendons.
 
     name, experiment, split, level, load: as planned, see `Planned`. segments: S names, tendons: K names, as in the

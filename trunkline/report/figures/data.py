@@ -13,11 +13,11 @@ from matplotlib.ticker import MaxNLocator
 
 from trunkline.recordings.cleaning.clock_offset import MotorClock
 from trunkline.recordings.cleaning.quality import Quality, by_sentence
-from trunkline.recordings.cleaning.session_checks import Gathered
+from trunkline.recordings.cleaning.session_checks import CheckedSession
 from trunkline.recordings.signals.base_frame import average_base, to_base_frame
 from trunkline.recordings.signals.runs import stretches
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_stepwise
-from trunkline.recordings.trials.raw_trial import Take
+from trunkline.recordings.trials.raw_trial import RawTrial
 from trunkline.recordings.trials.trial import Trial
 from trunkline.report.figures.style import IDENTIFIED, INITIAL, MEASURED, PARTLY, SEEN, UNSEEN, VALIDATE
 
@@ -27,7 +27,7 @@ SHADES = (MEASURED, IDENTIFIED, VALIDATE, INITIAL, "#cc79a7", "#009e73")  # the 
 COLORS = dict(zip(EXPERIMENTS, SHADES, strict=True))
 
 
-def quality_figure(qualities: list[Quality], gathered: Gathered) -> Figure:
+def quality_figure(qualities: list[Quality], gathered: CheckedSession) -> Figure:
     """The quality page: coverage over time, gaps, noise, rates, clock fit, repairs and refusals; panels with something
     to show. Of poses in steps, the time between them says nothing: they are counted."""
     numbered = dict(enumerate(qualities))
@@ -164,7 +164,7 @@ def _coverage(axes: Axes, qualities: list[Quality]) -> None:
     axes.grid(False)
 
 
-def filter_figure(take: Take, trial: Trial) -> Figure:
+def filter_figure(take: RawTrial, trial: Trial) -> Figure:
     """One moving trial before and after the filter, at the segment that moves most."""
     base = average_base(take.base_positions, take.base_quaternions)
     moved, _ = to_base_frame(base, take.positions, None)

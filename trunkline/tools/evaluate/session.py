@@ -8,13 +8,13 @@ from typing import Any
 from trunkline.compute.progress import progress
 from trunkline.errors import InputError
 from trunkline.pipeline.config import settings_of
-from trunkline.recordings.cleaning.loading import take_in
+from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.cleaning.quality import by_sentence, judge
-from trunkline.recordings.cleaning.same_arm import gather_each
-from trunkline.recordings.cleaning.session_checks import Gathered, gather, together
-from trunkline.recordings.filtering.filter import filter_take
+from trunkline.recordings.cleaning.same_arm import check_each_session
+from trunkline.recordings.cleaning.session_checks import CheckedSession, check_session, together
+from trunkline.recordings.filtering.filter import filter_raw_trial
 from trunkline.recordings.session.session import Session, session_folders
-from trunkline.recordings.trials.raw_trial import Take
+from trunkline.recordings.trials.raw_trial import RawTrial
 from trunkline.recordings.trials.splits import SPLITS
 from trunkline.recordings.trials.trial import Trial, read_trials
 
@@ -27,7 +27,7 @@ def trials_of(folder: Path, root: Path, caller: str) -> list[Trial]:
     return read_trials_of(folder, root, caller)[0]
 
 
-def read_trials_of(folder: Path, root: Path, caller: str) -> tuple[list[Trial], list[Take]]:
+def read_trials_of(folder: Path, root: Path, caller: str) -> tuple[list[Trial], list[RawTrial]]:
     """`trials_of`, and the takes that they were filtered from, in the same order; none where they came filtered.
 
     Args:
@@ -54,10 +54,10 @@ def read_trials_of(folder: Path, root: Path, caller: str) -> tuple[list[Trial], 
     return trials, []
 
 
-def _from_logs(folder: Path, root: Path, caller: str) -> tuple[list[Trial], list[Take]]:
+def _from_logs(folder: Path, root: Path, caller: str) -> tuple[list[Trial], list[RawTrial]]:
     ingest, settings = settings_of("ingest", root), settings_of("filter", root)
     take = partial(_gathered, ingest=ingest, caller=caller)
-    quality = gather_each(session_folders(folder), take, ingest.plausible.distance)
+    quality = check_each_session(session_folders(folder), take, ingest.plausible.distance)
     gathered = together(list(quality.values()))
     for name, reason in gathered.refused.items():
         print(f"{caller}: left out {name}: {reason}", file=sys.stderr)
@@ -69,15 +69,15 @@ def _from_logs(folder: Path, root: Path, caller: str) -> tuple[list[Trial], list
     trials = []
     for take, quality in zip(gathered.takes, gathered.findings, strict=True):
         take.repairs = len(quality.repairs)
-        trials.append(filter_take(take, settings)[0])
+        trials.append(filter_raw_trial(take, settings)[0])
     return trials, gathered.takes
 
 
-def _gathered(folder: Path, session: Session, ingest: Any, caller: str) -> Gathered:
+def _gathered(folder: Path, session: Session, ingest: Any, caller: str) -> CheckedSession:
     """ingest: settings of the stage."""
     taken = []
     with progress(len(session.trials), caller, "trials") as bar:
-        for entry in take_in(folder, session, ingest.limits):
+        for entry in load_raw_trials(folder, session, ingest.limits):
             taken.append(entry)
             bar.update(1, trial=entry[0].name)
-    return gather(taken, session, ingest.plausible, "leave_out", f"{folder}")
+    return check_session(taken, session, ingest.plausible, "leave_out", f"{folder}")

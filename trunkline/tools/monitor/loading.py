@@ -11,9 +11,9 @@ from omegaconf import OmegaConf
 
 from trunkline.errors import InputError
 from trunkline.pipeline.config import settings_of
-from trunkline.recordings.cleaning.loading import take_in
-from trunkline.recordings.cleaning.session_checks import gather
-from trunkline.recordings.filtering.filter import filter_take
+from trunkline.recordings.cleaning.loading import load_raw_trials
+from trunkline.recordings.cleaning.session_checks import check_session
+from trunkline.recordings.filtering.filter import filter_raw_trial
 from trunkline.recordings.session.session import Session, read_session
 from trunkline.recordings.trials.trial import Trial
 from trunkline.settings import read_yaml
@@ -38,16 +38,16 @@ def load_logs(session: Path, files: set[str], root: Path) -> LoadedTrials:
     """
     with _so_far(session, files) as (folder, read):
         ingest, settings = settings_of("ingest", root), settings_of("filter", root)
-        taken = list(take_in(folder, read, ingest.limits))
+        taken = list(load_raw_trials(folder, read, ingest.limits))
         unreadable = {trial.name: str(result) for trial, result, _ in taken if isinstance(result, InputError)}
         loaded = LoadedTrials(refused=unreadable)
         if len(loaded.refused) < len(taken):
-            gathered = gather(taken, read, ingest.plausible, "leave_out", f"{session}")
+            gathered = check_session(taken, read, ingest.plausible, "leave_out", f"{session}")
             loaded.refused |= gathered.refused
             for raw, findings in zip(gathered.takes, gathered.findings, strict=True):
                 raw.repairs = len(findings.repairs)
                 try:
-                    loaded.trials[raw.name] = filter_take(raw, settings)[0]
+                    loaded.trials[raw.name] = filter_raw_trial(raw, settings)[0]
                 except InputError as error:
                     loaded.refused[raw.name] = str(error)
         loaded.refused = {name: reason.replace(f"{folder}", f"{session}") for name, reason in loaded.refused.items()}

@@ -10,14 +10,14 @@ from trunkline.identification.evaluation.evaluation import Prediction, replay
 from trunkline.identification.simulate.experiment import Experiment
 from trunkline.recordings.cleaning.gravity_direction import AXES
 from trunkline.recordings.signals.base_frame import average_base, gravity_from_up
-from trunkline.recordings.trials.raw_trial import Take
+from trunkline.recordings.trials.raw_trial import RawTrial
 
 Z = np.array([0.0, 0.0, 1.0])
 TRIED = 6  # trials, at most
 BETTER = 2.0  # times that the described arm must fit with another axis up before that is said
 
 
-def other_ups(takes: list[Take]) -> dict[str, np.ndarray]:
+def other_ups(takes: list[RawTrial]) -> dict[str, np.ndarray]:
     """Gravity in the base frame (6, 3), m/s², by trial, as it is with each of `AXES` up; none of trials that have no
     gravity, or whose base is upright by its very declaration, and none of several sessions, which each have an `up`."""
     if len({take.session for take in takes}) > 1:

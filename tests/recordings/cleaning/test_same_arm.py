@@ -56,8 +56,8 @@ def test_each_session_has_its_names_and_its_clock(two):
     filtering.main(load_config(filtering.Config, "filter", two))
     trials = read_trials(two / "data/processed/filter", SPLITS)
     assert [trial.session for trial in trials] == [take.session for take in takes]
-    seen = {trial.name: trial.positions.tobytes() for trial in trials_of(two / "data/raw/arm_7", two, "evaluate")}
-    assert seen == {trial.name: trial.positions.tobytes() for trial in trials}  # as `check` and `evaluate` read them
+    checked = {trial.name: trial.positions.tobytes() for trial in trials_of(two / "data/raw/arm_7", two, "evaluate")}
+    assert checked == {trial.name: trial.positions.tobytes() for trial in trials}  # as `check` and `evaluate` read them
 
 
 def test_without_only_all_sessions_of_the_folder_are_read_by_name(two):
@@ -79,12 +79,12 @@ def test_one_of_several_sessions_by_itself_is_as_if_it_were_alone(two):
         run_ingest(two)
         files[lines] = {f.name: f.read_bytes() for f in (two / "data/processed/ingest").iterdir()}
         assert not any(take.session for take in read_takes(two / "data/processed/ingest", SPLITS))
-    one, other = files.values()
-    assert one == other
+    first, second = files.values()
+    assert first == second
 
 
 @pytest.mark.parametrize(
-    ("lines", "said"),
+    ("lines", "message"),
     [
         ("session: [monday, friday]", "ingest.session: found a list, expected one folder: move these sessions into "
          "one, such as data/raw/arm_7, and write session: arm_7, only: [monday, friday]"),
@@ -95,12 +95,12 @@ def test_one_of_several_sessions_by_itself_is_as_if_it_were_alone(two):
         ("session: monday\n  only: [monday]", "ingest.only: found 'monday', expected none, as data/raw/monday holds"),
     ],
 )  # fmt: skip
-def test_what_names_no_sessions_is_refused_in_one_line(two, lines, said):
+def test_what_names_no_sessions_is_refused_in_one_line(two, lines, message):
     shutil.copytree(two / "data/raw/arm_7/monday", two / "data/raw/monday")
     set_session(two, lines)
     with pytest.raises(InputError) as caught:
         run_ingest(two)
-    assert said in str(caught.value)
+    assert message in str(caught.value)
     assert "\n" not in str(caught.value)
     assert not (two / "data/processed").exists()
 
@@ -110,11 +110,11 @@ def test_another_arm_is_refused(two):
     renamed = [replace(t, segments=tuple(f"part_{name[-2:]}" for name in t.segments)) for t in all_truths()]
     threads = ("thread_1", "thread_2", "thread_3")
     cables = [release_truth(), replace(curl_truth(split="identify"), tendons=threads)]
-    for truths, said in ((longer, "from the body before it, expected about"), (renamed, "found segments part_02"),
+    for truths, message in ((longer, "from the body before it, expected about"), (renamed, "found segments part_02"),
                          (cables, "found tendons thread_1")):  # fmt: skip
         shutil.rmtree(two / "data/raw/arm_7/friday")
         record(two / "data/raw/arm_7/friday", truths, instruments(), 7)
-        with pytest.raises(InputError, match=f"session friday: .*{said}"):
+        with pytest.raises(InputError, match=f"session friday: .*{message}"):
             run_ingest(two)
         assert not (two / "data/processed/ingest").exists()
 

@@ -21,14 +21,14 @@ from tests.support.sessions import (
     static_truth,
 )
 from trunkline.errors import InputError
-from trunkline.recordings.cleaning.checks import Findings, Limits
-from trunkline.recordings.cleaning.loading import take_in
-from trunkline.recordings.cleaning.sanity_checks import Plausible, check_plausible
-from trunkline.recordings.cleaning.session_checks import gather
+from trunkline.recordings.cleaning.checks import Findings, TrialLimits
+from trunkline.recordings.cleaning.loading import load_raw_trials
+from trunkline.recordings.cleaning.sanity_checks import SanityLimits, check_sanity
+from trunkline.recordings.cleaning.session_checks import check_session
 from trunkline.recordings.session.session import read_session
 
-LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
-PLAUSIBLE = Plausible(still=0.02, distance=0.1, pull=3.0, clock=0.1, otherwise="refuse")
+LIMITS = TrialLimits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
+PLAUSIBLE = SanityLimits(still=0.02, distance=0.1, pull=3.0, clock=0.1, otherwise="refuse")
 NO_TEST = "splits: no trial of the split test: no error is of trials that nothing was decided on"
 
 
@@ -58,16 +58,17 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def sound(folder):
-    """What `take_in` gives of a sound session; by trial."""
-    return {trial.name: (trial, take, found) for trial, take, found in take_in(folder, read_session(folder), LIMITS)}
+    """What `load_raw_trials` gives of a sound session; by trial."""
+    loaded = load_raw_trials(folder, read_session(folder), LIMITS)
+    return {trial.name: (trial, raw, findings) for trial, raw, findings in loaded}
 
 
 def judged(sound, base="base", **changed):
     """(what is said of each trial, of the session) after `changed` takes, by trial."""
     takes = [changed.get(name, take) for name, (_, take, _) in sound.items()]
     findings = [Findings() for _ in takes]
-    session = check_plausible(takes, findings, base, PLAUSIBLE)
-    return {take.name: found.faults for take, found in zip(takes, findings, strict=True) if found.faults}, session
+    session = check_sanity(takes, findings, base, PLAUSIBLE)
+    return {take.name: remarks.faults for take, remarks in zip(takes, findings, strict=True) if remarks.faults}, session
 
 
 def take_of(sound, name):
@@ -86,8 +87,8 @@ def moved(take, body, offset):
 
 def test_a_sound_session_has_no_fault_and_no_warning(folder, sound):
     assert judged(sound) == ({}, [])
-    gathered = gather(sound.values(), read_session(folder), PLAUSIBLE, "stop", "sound")
-    assert [found.repairs + found.warnings for found in gathered.findings] == [[NO_TEST]] * len(sound)
+    gathered = check_session(sound.values(), read_session(folder), PLAUSIBLE, "stop", "sound")
+    assert [remarks.repairs + remarks.warnings for remarks in gathered.findings] == [[NO_TEST]] * len(sound)
 
 
 @with_recordings
@@ -99,10 +100,10 @@ def test_real_recordings_have_no_fault(tmp_path):
     head = ["frame: {up: [0, 1, 0]}", "base: {position: [0.1015, 0.0, 0.105]}", "trials:"]
     (tmp_path / "session.yaml").write_text("\n".join(head + lines) + "\n")
     session = read_session(tmp_path)
-    gathered = gather(take_in(tmp_path, session, LIMITS), session, PLAUSIBLE, "stop", "real")
+    gathered = check_session(load_raw_trials(tmp_path, session, LIMITS), session, PLAUSIBLE, "stop", "real")
     assert len(gathered.takes) == 13
-    for found in gathered.findings:
-        no_validate, no_test, no_others = found.warnings
+    for remarks in gathered.findings:
+        no_validate, no_test, no_others = remarks.warnings
         assert no_validate == "splits: no trial of the split validate: no error is of trials that were not fitted"
         assert no_test == NO_TEST
         assert no_others.startswith("experiments: no static_tilt, curl, static_pull, motion in the session: data/raw")
@@ -113,8 +114,8 @@ def test_real_recordings_have_no_fault(tmp_path):
 def test_a_body_that_is_off_is_named(sound, name, body):
     trials, session = judged(sound, **{name: moved(take_of(sound, name), body, [0.0, 0.3, 0.4])})
     assert list(trials) == [name]
-    (said,) = [said for said in trials[name] if "expected neighbours at distances" in said]
-    assert said.startswith(f"{SEGMENTS[body]!r} is ")
+    (fault,) = [fault for fault in trials[name] if "expected neighbours at distances" in fault]
+    assert fault.startswith(f"{SEGMENTS[body]!r} is ")
     assert session == []
 
 
@@ -129,7 +130,7 @@ def test_a_body_that_stands_still_beside_the_arm_is_named(sound):
         return replace(take, positions=positions)
 
     _, session = judged(sound, **every(sound, stands))
-    assert any(said.startswith("'unit_06' ") and said.endswith("is it on the arm?") for said in session), session
+    assert any(fault.startswith("'unit_06' ") and fault.endswith("is it on the arm?") for fault in session), session
 
 
 @pytest.mark.parametrize("factor", [1e3, 1e-3])
@@ -138,9 +139,9 @@ def test_one_log_in_another_unit_is_named(sound, factor):
     other = replace(take, positions=factor * take.positions, base_positions=factor * take.base_positions)
     trials, _ = judged(sound, release_b=other)
     assert list(trials) == ["release_b"]
-    found = re.match(r"unit: bodies are ([\d.]+) times as far apart as", trials["release_b"][0])
-    assert found
-    assert float(found[1]) == pytest.approx(factor, rel=0.05)
+    match = re.match(r"unit: bodies are ([\d.]+) times as far apart as", trials["release_b"][0])
+    assert match
+    assert float(match[1]) == pytest.approx(factor, rel=0.05)
 
 
 @pytest.mark.parametrize("order", [(1, 0, 2, 3), (0, 2, 1, 3), (0, 1, 3, 2), (2, 1, 0, 3)])
@@ -150,8 +151,8 @@ def test_exchanged_segments_of_the_whole_session_are_named(sound, order):
     assert trials == {}
     assert len(session) == 1
     assert "check `segments` in session.yaml" in session[0]
-    for found, name in zip(SEGMENTS, names, strict=True):
-        assert (found == name) or repr(name) in session[0]
+    for segment, name in zip(SEGMENTS, names, strict=True):
+        assert (segment == name) or repr(name) in session[0]
 
 
 @pytest.mark.parametrize("names", [SEGMENTS[::-1], ("root", "a", "b", "tip"), ("7", "b8", "c9", "1")])
@@ -195,7 +196,7 @@ def test_a_base_that_moves_while_a_segment_rests_is_named(sound):
 def test_a_trial_labelled_as_another_experiment_is_named(sound, name, experiment, level, message):
     trials, _ = judged(sound, **{name: replace(take_of(sound, name), experiment=experiment, level=level)})
     assert list(trials) == [name]
-    assert any(re.search(message, said) for said in trials[name]), trials
+    assert any(re.search(message, fault) for fault in trials[name]), trials
 
 
 def with_tendons(take, commands_mm, positions_mm):
@@ -226,9 +227,9 @@ SLACK, PULLED = (-300.0, -300.0, -300.0), (-300.0, 40.0, -300.0)
 def test_a_pull_that_is_held_where_nothing_is_to_pull_is_named(sound, name, commands, positions, key):
     trials, _ = judged(sound, **{name: with_tendons(take_of(sound, name), commands, positions)})
     assert list(trials) == [name]
-    (said,) = trials[name]
-    found = rf"experiment: {key}: 'tendon_2' is drawn in by 40\.?\d* mm, expected a \w+ without actuation"
-    assert re.fullmatch(found, said), said
+    (fault,) = trials[name]
+    pattern = rf"experiment: {key}: 'tendon_2' is drawn in by 40\.?\d* mm, expected a \w+ without actuation"
+    assert re.fullmatch(pattern, fault), fault
 
 
 @pytest.mark.parametrize("name", ["tilt_30", "release_a"])
@@ -250,8 +251,8 @@ def test_loose_tendons_of_encoders_that_start_anywhere_are_left(sound):
     anywhere = {name: shifted(name, 100.0 * index) for index, name in enumerate(driven)}
     assert judged(sound, tilt_30=loose, **anywhere) == ({}, [])
     drawn_in = with_tendons(take_of(sound, "tilt_30"), SLACK, (200.0, 540.0, 200.0))
-    (said,) = judged(sound, tilt_30=drawn_in, **same)[0]["tilt_30"]
-    assert said.startswith("experiment: tendon positions: 'tendon_2' is drawn in by 40")
+    (fault,) = judged(sound, tilt_30=drawn_in, **same)[0]["tilt_30"]
+    assert fault.startswith("experiment: tendon positions: 'tendon_2' is drawn in by 40")
 
 
 def test_a_static_tilt_in_which_the_arm_swings_is_named(sound):
@@ -293,7 +294,7 @@ def test_tendons_that_cannot_be_are_named(sound, commands, positions, message):
     take = replace(take, commands=take.commands - take.commands[0])
     trials, _ = judged(sound, curl_40=pulls(take, commands, positions))
     assert list(trials) == ["curl_40"]
-    assert any(re.search(message, said) for said in trials["curl_40"]), trials
+    assert any(re.search(message, fault) for fault in trials["curl_40"]), trials
 
 
 def test_pulls_from_an_encoder_that_starts_anywhere_are_left(sound):
@@ -311,12 +312,12 @@ def test_pulls_without_a_level_that_are_in_mm_are_named(sound, name):
     take = take_of(sound, name)
     trials, _ = judged(sound, **{name: replace(take, commands=1e3 * take.commands)})
     assert list(trials) == [name]
-    (said,) = trials[name]
-    found = r"commands: found pulls up to \d+.* m, expected less than the arm's length of 0\.\d+ m: are they in mm"
-    assert re.match(found, said)
+    (fault,) = trials[name]
+    pattern = r"commands: found pulls up to \d+.* m, expected less than the arm's length of 0\.\d+ m: are they in mm"
+    assert re.match(pattern, fault)
     both = pulls(take, lambda c: 1e3 * c, lambda p: 1e3 * p)
     if name.startswith("motion"):
-        assert any("tendon positions: found pulls up to" in said for said in judged(sound, **{name: both})[0][name])
+        assert any("tendon positions: found pulls up to" in fault for fault in judged(sound, **{name: both})[0][name])
 
 
 def test_a_static_pull_whose_window_touches_the_way_to_the_next_is_left(sound):
@@ -324,22 +325,22 @@ def test_a_static_pull_whose_window_touches_the_way_to_the_next_is_left(sound):
     next_time = take.command_time[-1] + np.arange(1, 80) / 100
     ramp = take.commands[-1] + np.linspace(0, 0.02, 79)[:, None]
     commanded = np.concatenate([take.command_time, next_time]), np.concatenate([take.commands, ramp])
-    seen = np.concatenate([take.tendon_time, next_time]), np.concatenate([take.tendon_positions, ramp])
+    measured = np.concatenate([take.tendon_time, next_time]), np.concatenate([take.tendon_positions, ramp])
     for ahead in (0.0, 0.5):  # s, of the motors' clock
-        later = {"command_time": commanded[0] - ahead, "tendon_time": seen[0] - ahead}
-        later = replace(take, commands=commanded[1], tendon_positions=seen[1], **later)
+        later = {"command_time": commanded[0] - ahead, "tendon_time": measured[0] - ahead}
+        later = replace(take, commands=commanded[1], tendon_positions=measured[1], **later)
         assert judged(sound, **{take.name: later}) == ({}, [])
 
 
 def test_static_pulls_have_no_say_in_the_clocks(tmp_path):
     """A ramp beside the window would fit any offset at which it is not seen."""
     truth = pull_truth()
-    held = truth.commands.copy()
-    truth.commands = held * np.clip(np.arange(len(held)) / 40, 0, 1)[:, None]
+    commands = truth.commands.copy()
+    truth.commands = commands * np.clip(np.arange(len(commands)) / 40, 0, 1)[:, None]
     truth.tendon_positions = truth.tendon_positions * np.clip(np.arange(len(truth.time)) / 200, 0, 1)[:, None]
     record(tmp_path, [truth], instruments())
-    ((_, _, found),) = take_in(tmp_path, read_session(tmp_path), LIMITS)
-    assert found.by_motion is None
+    ((_, _, findings),) = load_raw_trials(tmp_path, read_session(tmp_path), LIMITS)
+    assert findings.by_motion is None
 
 
 def test_exchanged_topics_are_named(sound):
@@ -349,20 +350,20 @@ def test_exchanged_topics_are_named(sound):
     noisy = replace(take, commands=take.tendon_positions, tendon_positions=take.commands, **time)
     assert "commands are noisier" in judged(sound, curl_40=noisy)[0]["curl_40"][0]
     early = replace(take, tendon_time=take.tendon_time - 0.05)
-    (said,) = judged(sound, curl_40=early)[0]["curl_40"]
-    assert said.startswith("topics: what is measured comes 50 ms before its command: are `commands` and")
+    (fault,) = judged(sound, curl_40=early)[0]["curl_40"]
+    assert fault.startswith("topics: what is measured comes 50 ms before its command: are `commands` and")
     late = replace(take, tendon_time=take.tendon_time + 0.05)
     assert judged(sound, curl_40=late) == ({}, [])
 
 
 def test_what_is_not_plausible_is_refused_left_out_or_said(folder, sound):
-    trial, take, found = sound["release_a"]
+    trial, take, findings = sound["release_a"]
     session = read_session(folder)
 
     def gathered(otherwise, refused_trials):
         taken = {name: (t, some, replace(f, warnings=[], faults=[])) for name, (t, some, f) in sound.items()}
-        taken["release_a"] = trial, moved(take, 2, 0.5), replace(found, warnings=[], faults=[])
-        return gather(taken.values(), session, replace(PLAUSIBLE, otherwise=otherwise), refused_trials, "here")
+        taken["release_a"] = trial, moved(take, 2, 0.5), replace(findings, warnings=[], faults=[])
+        return check_session(taken.values(), session, replace(PLAUSIBLE, otherwise=otherwise), refused_trials, "here")
 
     with pytest.raises(InputError, match=r"release_a\.mcap: trial release_a: 'unit_06' is "):
         gathered("refuse", "stop")
@@ -370,31 +371,32 @@ def test_what_is_not_plausible_is_refused_left_out_or_said(folder, sound):
     assert list(left.refused) == ["release_a"]
     assert "'unit_06' is " in left.refused["release_a"]
     assert "release_a" not in [take.name for take in left.takes]
-    kept = gathered("warn", "stop")
-    said = {take.name: found.warnings for take, found in zip(kept.takes, kept.findings, strict=True)}["release_a"]
-    assert said[0].startswith("'unit_06' is ")
+    checked = gathered("warn", "stop")
+    names = [take.name for take in checked.takes]
+    warnings = checked.findings[names.index("release_a")].warnings
+    assert warnings[0].startswith("'unit_06' is ")
 
 
 def test_a_level_that_the_base_contradicts_is_said(folder, sound):
     trial, take, _ = sound["tilt_60"]
     taken = {name: (t, some, replace(f, warnings=[], faults=[])) for name, (t, some, f) in sound.items()}
     taken["tilt_60"] = trial, replace(take, level=10.0), taken["tilt_60"][2]
-    gathered = gather(taken.values(), read_session(folder), PLAUSIBLE, "stop", "here")
-    said = {take.name: found.warnings for take, found in zip(gathered.takes, gathered.findings, strict=True)}
-    assert said["tilt_60"][1].startswith("level: found 10, but the base is tilted by 60°")
-    assert all(said[name] == [NO_TEST] for name in said if name != "tilt_60")
+    gathered = check_session(taken.values(), read_session(folder), PLAUSIBLE, "stop", "here")
+    warnings = {take.name: remarks.warnings for take, remarks in zip(gathered.takes, gathered.findings, strict=True)}
+    assert warnings["tilt_60"][1].startswith("level: found 10, but the base is tilted by 60°")
+    assert all(warnings[name] == [NO_TEST] for name in warnings if name != "tilt_60")
 
 
 def test_an_experiment_that_a_split_lacks_is_said(folder, sound):
-    kept = [trial for name, trial in sound.items() if name != "curl_60"]
-    taken = [(t, some, replace(f, warnings=[], faults=[])) for t, some, f in kept]
-    gathered = gather(taken, read_session(folder), PLAUSIBLE, "stop", "here")
-    said = [NO_TEST, "splits: no curl of the split validate, which the session has"]
-    assert all(found.warnings == said for found in gathered.findings)
+    others = [trial for name, trial in sound.items() if name != "curl_60"]
+    taken = [(t, some, replace(f, warnings=[], faults=[])) for t, some, f in others]
+    gathered = check_session(taken, read_session(folder), PLAUSIBLE, "stop", "here")
+    expected = [NO_TEST, "splits: no curl of the split validate, which the session has"]
+    assert all(remarks.warnings == expected for remarks in gathered.findings)
 
 
 @pytest.mark.parametrize(
-    ("kept", "said"),
+    ("chosen", "expected"),
     [
         (
             lambda take: take.split == "identify",
@@ -419,16 +421,16 @@ def test_an_experiment_that_a_split_lacks_is_said(folder, sound):
     ],
     ids=["identify alone", "validate alone", "no curl", "no motion"],
 )
-def test_a_split_or_an_experiment_that_the_session_lacks_is_said(folder, sound, kept, said):
-    taken = [(t, some, replace(f, warnings=[], faults=[])) for t, some, f in sound.values() if kept(some)]
-    for found in gather(taken, read_session(folder), PLAUSIBLE, "stop", "here").findings:
-        assert [one for one in found.warnings if one.startswith(("splits:", "experiments:"))] == said
+def test_a_split_or_an_experiment_that_the_session_lacks_is_said(folder, sound, chosen, expected):
+    taken = [(t, some, replace(f, warnings=[], faults=[])) for t, some, f in sound.values() if chosen(some)]
+    for remarks in check_session(taken, read_session(folder), PLAUSIBLE, "stop", "here").findings:
+        assert [warning for warning in remarks.warnings if warning.startswith(("splits:", "experiments:"))] == expected
 
 
 def test_usual_distances_of_other_splits_are_said(tmp_path):
     record(tmp_path, [release_truth("validate"), static_truth(0.0, "validate")], instruments())
-    for _, _, found in take_in(tmp_path, read_session(tmp_path), LIMITS):
-        assert "no trial of the split identify can be read: the unit and the usual" in found.warnings[0]
+    for _, _, findings in load_raw_trials(tmp_path, read_session(tmp_path), LIMITS):
+        assert "no trial of the split identify can be read: the unit and the usual" in findings.warnings[0]
 
 
 @pytest.mark.parametrize("value", [0.0, 1e300])
@@ -437,7 +439,7 @@ def test_a_body_nowhere_is_not_taken_for_seen(tmp_path, value):
     m.positions[:, 3] = value
     write_log(tmp_path / f"{m.name}.mcap", m)
     write_session(tmp_path, [m], instruments())
-    ((_, error, found),) = take_in(tmp_path, read_session(tmp_path), LIMITS)
+    ((_, error, findings),) = load_raw_trials(tmp_path, read_session(tmp_path), LIMITS)
     assert isinstance(error, InputError)
     assert "trial release_a: 'unit_06' is seen in 0.0 %" in str(error)
-    assert any("(unit_06)" in said for said in found.repairs)
+    assert any("(unit_06)" in repair for repair in findings.repairs)

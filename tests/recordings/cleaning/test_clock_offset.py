@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.recordings.cleaning.test_intake import edit_session, one_trial, taken
+from tests.recordings.cleaning.test_loading import edit_session, one_trial, taken
 from tests.support.sessions import bent_truth, curl_truth, pull_truth, static_truth
 from trunkline.recordings.cleaning.checks import Findings
 from trunkline.recordings.cleaning.clock_offset import align_clocks
@@ -40,20 +40,20 @@ def test_an_arm_that_lags_does_not_move_the_offset(tmp_path, clock):
     one_trial(tmp_path, lambda m: None, lagging())
     if clock != "frame":
         edit_session(tmp_path, "clock: frame", f"clock: {clock}")
-    found, take, findings = clock_of(taken(tmp_path)[0])
-    assert found.by == "log times"
-    assert abs(found.offset + 0.137) < found.uncertainty < 5e-3
-    assert take.clock_offset == found.offset
-    assert found.lag == pytest.approx(0.02, abs=4e-3)
+    result, take, findings = clock_of(taken(tmp_path)[0])
+    assert result.by == "log times"
+    assert abs(result.offset + 0.137) < result.uncertainty < 5e-3
+    assert take.clock_offset == result.offset
+    assert result.lag == pytest.approx(0.02, abs=4e-3)
     assert findings.warnings == []
 
 
 def test_motion_decides_where_log_times_were_copied_and_its_lag_is_named(tmp_path):
-    found, take, findings = clock_of(one_trial(tmp_path, copied, lagging()))
-    assert (found.by, found.uncertainty, found.lag) == ("motion", None, None)
-    assert take.clock_offset == found.offset == pytest.approx(-0.137 + 0.02, abs=4e-3)
-    (said,) = findings.warnings
-    assert "is by the arm's motion, and its lag is in it; log times tell nothing" in said
+    result, take, findings = clock_of(one_trial(tmp_path, copied, lagging()))
+    assert (result.by, result.uncertainty, result.lag) == ("motion", None, None)
+    assert take.clock_offset == result.offset == pytest.approx(-0.137 + 0.02, abs=4e-3)
+    (warning,) = findings.warnings
+    assert "is by the arm's motion, and its lag is in it; log times tell nothing" in warning
 
 
 @pytest.mark.parametrize("late_ms", [-200, 200])
@@ -64,72 +64,73 @@ def test_log_times_that_cannot_be_true_of_an_arm_are_not_used(tmp_path, late_ms)
         m.command_logged[:] += late_ms * 1_000_000
         m.tendon_logged[:] += late_ms * 1_000_000
 
-    found, _, findings = clock_of(one_trial(tmp_path, shifted, lagging()))
-    assert found.by == "motion"
-    assert found.offset == pytest.approx(-0.117, abs=4e-3)
-    assert any("after its tendons, expected -0.03 to 0.1 s" in said for said in findings.warnings)
+    result, _, findings = clock_of(one_trial(tmp_path, shifted, lagging()))
+    assert result.by == "motion"
+    assert result.offset == pytest.approx(-0.117, abs=4e-3)
+    assert any("after its tendons, expected -0.03 to 0.1 s" in warning for warning in findings.warnings)
 
 
 def test_motors_that_the_recorder_dates_need_no_motion(tmp_path):
     def unstamped(m):
         m.command_stamps[:] = m.tendon_stamps[:] = 0
 
-    found, take, _ = clock_of(one_trial(tmp_path, unstamped, lagging(0.0)))
-    assert found.by == "log times"
-    truth = np.interp(take.tendon_time + found.offset - 0.3, [0, 0.9, 1.8], [0, 1, 0])
+    result, take, _ = clock_of(one_trial(tmp_path, unstamped, lagging(0.0)))
+    assert result.by == "log times"
+    truth = np.interp(take.tendon_time + result.offset - 0.3, [0, 0.9, 1.8], [0, 1, 0])
     assert np.corrcoef(truth, take.tendon_positions[:, 0])[0, 1] > 0.9
-    assert found.lag == pytest.approx(0.0, abs=5e-3), "within the delays of messages"
+    assert result.lag == pytest.approx(0.0, abs=5e-3), "within the delays of messages"
     edit_session(tmp_path, "clock: frame", "clock: log")
-    found, take, _ = clock_of(taken(tmp_path)[0])
-    assert (found.by, found.offset, take.clock_offset) == ("log times", 0.0, 0.0)
-    assert 1e-3 < found.uncertainty < 6e-3
+    result, take, _ = clock_of(taken(tmp_path)[0])
+    assert (result.by, result.offset, take.clock_offset) == ("log times", 0.0, 0.0)
+    assert 1e-3 < result.uncertainty < 6e-3
 
 
 def test_a_trial_without_motion_tells_too_and_one_without_motors_has_nothing_to_say(tmp_path):
-    found, _, findings = clock_of(one_trial(tmp_path, lambda m: None, pull_truth()))
-    assert (found.by, found.lag) == ("log times", None)
-    assert abs(found.offset + 0.137) < found.uncertainty
-    found, _, findings = clock_of(one_trial(tmp_path, silent, static_truth(0.0)))
-    assert found.by is None
+    result, _, findings = clock_of(one_trial(tmp_path, lambda m: None, pull_truth()))
+    assert (result.by, result.lag) == ("log times", None)
+    assert abs(result.offset + 0.137) < result.uncertainty
+    result, _, findings = clock_of(one_trial(tmp_path, silent, static_truth(0.0)))
+    assert result.by is None
     assert findings.warnings == []
 
 
-def session(tmp_path, *said):
+def session(tmp_path, *rows):
     """Takes a, b, … with their findings, of (split, offset by log times, offset by motion)."""
     take, _ = one_trial(tmp_path, lambda m: None, curl_truth())
-    takes = [replace(take, name="abcdefgh"[i], split=split) for i, (split, *_) in enumerate(said)]
+    takes = [replace(take, name="abcdefgh"[i], split=split) for i, (split, *_) in enumerate(rows)]
     findings = [
         Findings(
             by_log_times=None if logged is None else LoggedOffset(logged, 2e-3),
             by_motion=None if moved is None else OffsetFit(moved, 0.01),
         )
-        for _, logged, moved in said
+        for _, logged, moved in rows
     ]
     return align_clocks(takes, findings, LONGEST), [t.clock_offset for t in takes], [f.warnings for f in findings]
 
 
 def test_only_takes_for_identification_agree_on_the_clock(tmp_path):
-    clock, used, said = session(tmp_path, ("identify", 0.1, 0.11), ("validate", 0.1015, 0.3), ("validate", None, 0.3))
+    rows = ("identify", 0.1, 0.11), ("validate", 0.1015, 0.3), ("validate", None, 0.3)
+    clock, used, remarks = session(tmp_path, *rows)
     assert (clock.offset, clock.lag) == (0.1, pytest.approx(0.01))
     assert used == [0.1, 0.1, 0.1], "one whose lag is not that of the others goes by them"
-    assert ["in which the arm would lag" in " ".join(some) for some in said] == [False, True, False]
-    clock, used, said = session(tmp_path, ("identify", None, None), ("validate", 0.3, None), ("validate", 0.3, None))
+    assert ["in which the arm would lag" in " ".join(some) for some in remarks] == [False, True, False]
+    clock, used, remarks = session(tmp_path, ("identify", None, None), ("validate", 0.3, None), ("validate", 0.3, None))
     assert (clock.offset, used) == (0.3, [0.3] * 3)
-    assert all("no trial of the split identify tells" in some[0] for some in said)
-    clock, used, said = session(tmp_path, ("identify", None, 0.1), ("validate", None, 0.3))
+    assert all("no trial of the split identify tells" in some[0] for some in remarks)
+    clock, used, remarks = session(tmp_path, ("identify", None, 0.1), ("validate", None, 0.3))
     assert (clock.by, clock.offset, used) == ("motion", 0.1, [0.1] * 2)
 
 
 def test_clocks_that_drift_are_followed_and_trials_that_disagree_are_named(tmp_path):
     drift = [("identify", 0.1 + 0.004 * i, 0.11 + 0.004 * i) for i in range(5)]
-    clock, used, said = session(tmp_path, *drift)
+    clock, used, remarks = session(tmp_path, *drift)
     assert used == pytest.approx([0.1, 0.104, 0.108, 0.112, 0.116])
-    assert [bool(some) for some in said] == [True, True, False, True, True]
-    assert len({some[0] for some in said if some}) == 1, "one sentence, which names all of them"
-    clock, used, said = session(tmp_path, *[("identify", 0.1, 0.11)] * 4, ("identify", 0.5, 0.112))
+    assert [bool(some) for some in remarks] == [True, True, False, True, True]
+    assert len({some[0] for some in remarks if some}) == 1, "one sentence, which names all of them"
+    clock, used, remarks = session(tmp_path, *[("identify", 0.1, 0.11)] * 4, ("identify", 0.5, 0.112))
     assert used == [0.1] * 5
-    assert [bool(some) for some in said] == [False] * 4 + [True]
-    assert "the motors' offset by log times is 0.500 s, in which the arm would lag by -0.388 s" in said[4][0]
+    assert [bool(some) for some in remarks] == [False] * 4 + [True]
+    assert "the motors' offset by log times is 0.500 s, in which the arm would lag by -0.388 s" in remarks[4][0]
 
 
 def test_an_uncertain_fit_of_the_motion_has_no_say(tmp_path):

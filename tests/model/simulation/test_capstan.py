@@ -7,8 +7,8 @@ import pytest
 from tests.support.small_arm import small_spec
 from trunkline.identification.parameters.parameters import candidate_fields
 from trunkline.identification.parameters.saving import save_model
-from trunkline.model.arm.guide_holes import Holes, add_holes
-from trunkline.model.elements import cables, capstan_friction, holes, let_slide
+from trunkline.model.arm.guide_holes import GuideHoles, add_holes
+from trunkline.model.elements import cables, capstan_friction, hole_tendons, switch_off_capstan_friction
 from trunkline.model.simulation.drive import drive
 from trunkline.model.simulation.motion import batch_of, hold, move
 from trunkline.model.simulation.rest import settle
@@ -23,7 +23,7 @@ def rubbing_arm(stretches: int = 8, friction: float = FRICTION) -> mujoco.MjMode
     spec = small_spec(UNITS)
     for cable in spec.tendons:
         cable.frictionloss = 0.0
-    add_holes(spec, Holes(friction, stretches))
+    add_holes(spec, GuideHoles(friction, stretches))
     return spec.compile()
 
 
@@ -39,17 +39,17 @@ def shares(speed: float, stretches: int) -> np.ndarray:
     controls = np.tile(model.tendon_length0[cables(model)] + 0.3, (1, STEPS, 1))
     controls[:, :, 0] = 0.0
     hold(batch, model, controls[:, 0])
-    pulled, held = batch.bind("qfrc_actuator")[0], batch.bind("qfrc_constraint")[0]
+    pulled, friction = batch.bind("qfrc_actuator")[0], batch.bind("qfrc_constraint")[0]
     move(batch, controls, ())
-    return 1 + held[about_y] / pulled[about_y]
+    return 1 + friction[about_y] / pulled[about_y]
 
 
 @pytest.mark.parametrize("speed", [0.5, -0.5])
 def test_tension_falls_as_the_capstan_equation_says(speed):
-    found = shares(speed, 8)
+    result = shares(speed, 8)
     bend = BEND + speed * 0.001 * (STEPS - 1)
     turned = bend * (np.arange(UNITS) + 0.5)  # at the holes up to the chord across each unit's joint
-    np.testing.assert_allclose(found, np.exp(-np.sign(speed) * FRICTION * turned), rtol=0.03)
+    np.testing.assert_allclose(result, np.exp(-np.sign(speed) * FRICTION * turned), rtol=0.03)
 
 
 def test_friction_taken_together_bends_as_much():
@@ -64,7 +64,7 @@ def test_friction_acts_where_the_cable_does():
     hold(batch, model, controls[:, 0])
     slope = batch.bind("ten_J")
     move(batch, controls, ())
-    last = model.tendon_adr[holes(model)] + model.tendon_num[holes(model)] - 1  # of the hinge y
+    last = model.tendon_adr[hole_tendons(model)] + model.tendon_num[hole_tendons(model)] - 1  # of the hinge y
     for cable, entries in zip(cables(model), last, strict=True):
         row = model.ten_J_rowadr[cable] + model.ten_J_rownnz[cable] - 1
         assert abs(model.wrap_prm[entries[0]] / slope[0, row] - 1) > 0.02, "or the arm is straight"
@@ -84,7 +84,7 @@ def test_a_cable_without_tension_does_not_rub():
 def test_without_friction_holes_change_nothing():
     plain, smooth = rubbing_arm(0), rubbing_arm(4, 0.0)
     slid = rubbing_arm(4)
-    let_slide(slid)
+    switch_off_capstan_friction(slid)
     controls = np.tile(plain.tendon_length0[:3], (2, 200, 1))
     controls[1, :, 0] -= 0.03
     moved = [move(batch_of(model, 2), controls, ("qpos",))["qpos"] for model in (plain, smooth, slid, rubbing_arm(4))]
@@ -100,8 +100,8 @@ def test_rest_is_the_middle_of_what_friction_holds():
     np.testing.assert_allclose(rests[1].position, rests[0].position, atol=1e-8)
     chain = read_chain(rubbing)
     assert chain.capstan == FRICTION
-    for one, other in zip(read_chain(plain), chain._replace(capstan=0.0), strict=True):
-        np.testing.assert_array_equal(one, other)
+    for expected, actual in zip(read_chain(plain), chain._replace(capstan=0.0), strict=True):
+        np.testing.assert_array_equal(expected, actual)
     middle = rests[0].position[0]
     rubbing.dof_damping *= 20  # led so slowly, it does not swing
     way_in = np.tile(commands, (200, 1)) + np.linspace(0.05, 0, 200)[:, None] * [1, 0, 0]
@@ -128,9 +128,9 @@ def test_candidates_of_a_batch_rub_each_with_its_own_coefficient():
 
 def test_the_coefficient_survives_its_file():
     spec = small_spec(UNITS)
-    add_holes(spec, Holes(0.2, 4))
+    add_holes(spec, GuideHoles(0.2, 4))
     model = spec.compile()
-    assert holes(model).shape == (3, 4)
+    assert hole_tendons(model).shape == (3, 4)
     model.numeric_data[:] = 0.35
     again = mujoco.MjModel.from_xml_string(save_model(spec, model))
     assert capstan_friction(again) == pytest.approx(0.35)

@@ -11,20 +11,20 @@ from demo.recorder import write_log, write_session
 from tests.support.folders import SHARED, with_recordings
 from tests.support.sessions import SEGMENTS, curl_truth, instruments, record, release_truth, static_truth
 from trunkline.errors import InputError
-from trunkline.recordings.cleaning.checks import Limits
+from trunkline.recordings.cleaning.checks import TrialLimits
 from trunkline.recordings.cleaning.clock_offset import align_clocks
-from trunkline.recordings.cleaning.loading import take_in
-from trunkline.recordings.filtering.filter import Filter, filter_take
+from trunkline.recordings.cleaning.loading import load_raw_trials
+from trunkline.recordings.filtering.filter import Filter, filter_raw_trial
 from trunkline.recordings.session.session import read_session
 
-LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
+LIMITS = TrialLimits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
 FILTER = Filter(120.0, 20.0, 4, 0.06, 8.0, "onset")
 REAL = SHARED / "asl_trunk"
 
 
 def taken(folder):
     """[(take or error, findings)] of the session in `folder`."""
-    return [(take, findings) for _, take, findings in take_in(folder, read_session(folder), LIMITS)]
+    return [(take, findings) for _, take, findings in load_raw_trials(folder, read_session(folder), LIMITS)]
 
 
 def one_trial(folder, change, truth=None):
@@ -251,7 +251,7 @@ def test_real_recordings_without_orientations_or_base_body(tmp_path):
     assert len(takes) == 13
     for take in takes:
         assert take.segments == ("1", "2", "3")
-        trial, _ = filter_take(take, FILTER)
+        trial, _ = filter_raw_trial(take, FILTER)
         assert trial.quaternions is None
         np.testing.assert_allclose(trial.gravity, [0, 0, -9.80665], atol=1e-9)
         rest = trial.positions[-1] - [[0, 0, -0.106], [0, 0, -0.203], [0, 0, -0.322]]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trunkline.recordings.cleaning.dropped_frames import Lost, find_lost, put_back, unbroken
+from trunkline.recordings.cleaning.dropped_frames import DroppedFrames, find_dropped_frames, put_back, unbroken
 
 RATE = 100.0
 TIME = np.arange(300) / RATE
@@ -19,7 +19,7 @@ def swing(time: np.ndarray, seed: int = 0, noise: float = 1e-5) -> np.ndarray:
     return positions + rng.normal(scale=noise, size=positions.shape)
 
 
-def lose(lost: list[Lost]) -> tuple[np.ndarray, np.ndarray]:
+def lose(lost: list[DroppedFrames]) -> tuple[np.ndarray, np.ndarray]:
     """True times and positions of 300 frames out of a longer recording."""
     true = put_back(TIME, lost)
     return true, swing(true)
@@ -27,15 +27,15 @@ def lose(lost: list[Lost]) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("seed", range(10))
 def test_nothing_is_found_where_nothing_is_lost(seed):
-    assert find_lost(TIME, swing(TIME, seed), 1e-5) == []
-    assert find_lost(TIME, swing(TIME, seed, 3e-4), 3e-4) == []
+    assert find_dropped_frames(TIME, swing(TIME, seed), 1e-5) == []
+    assert find_dropped_frames(TIME, swing(TIME, seed, 3e-4), 3e-4) == []
 
 
 def test_losses_are_found_and_counted_even_close_together():
-    lost = [Lost(40, 4), Lost(44, 3), Lost(49, 6), Lost(120, 1)]
+    lost = [DroppedFrames(40, 4), DroppedFrames(44, 3), DroppedFrames(49, 6), DroppedFrames(120, 1)]
     true, positions = lose(lost)
-    assert find_lost(TIME, positions, 1e-5) == lost
-    np.testing.assert_allclose(put_back(TIME, find_lost(TIME, positions, 1e-5)), true)
+    assert find_dropped_frames(TIME, positions, 1e-5) == lost
+    np.testing.assert_allclose(put_back(TIME, find_dropped_frames(TIME, positions, 1e-5)), true)
 
 
 def test_outliers_swaps_and_hidden_bodies_are_no_loss():
@@ -44,7 +44,7 @@ def test_outliers_swaps_and_hidden_bodies_are_no_loss():
     positions[80:95, [0, 1]] = positions[80:95, [1, 0]]
     positions[130:133, 1] = np.nan
     positions[160:, :] += 0.004  # a knock against the mount
-    assert find_lost(TIME, positions, 1e-5) == []
+    assert find_dropped_frames(TIME, positions, 1e-5) == []
 
 
 def test_a_gap_that_cannot_be_counted_parts_a_recording():
@@ -54,7 +54,7 @@ def test_a_gap_that_cannot_be_counted_parts_a_recording():
     part = np.r_[np.zeros((20, 3, 3)) + positions[0], positions[150::10]]  # held, then let go 150 ms before it is seen
     even = np.arange(len(part)) / RATE
     assert unbroken(even, part) == slice(20, len(part))
-    lost = [Lost(40, 6)]
+    lost = [DroppedFrames(40, 6)]
     true, positions = lose(lost)
     assert unbroken(true, positions) == slice(0, 300), "what was counted is no gap any more"
     outlying = swing(TIME)
@@ -64,12 +64,12 @@ def test_a_gap_that_cannot_be_counted_parts_a_recording():
 
 
 def test_a_gap_that_the_stamps_show_is_not_found_again():
-    lost = [Lost(40, 4)]
+    lost = [DroppedFrames(40, 4)]
     true, positions = lose(lost)
-    assert find_lost(true, positions, 1e-5) == []
+    assert find_dropped_frames(true, positions, 1e-5) == []
 
 
 def test_an_arm_at_rest_tells_nothing():
     positions = np.zeros((300, 3, 3)) + np.random.default_rng(1).normal(scale=1e-4, size=(300, 3, 3))
-    assert find_lost(TIME, positions, 1e-4) == []
-    assert find_lost(TIME[:4], positions[:4], 1e-4) == []
+    assert find_dropped_frames(TIME, positions, 1e-4) == []
+    assert find_dropped_frames(TIME[:4], positions[:4], 1e-4) == []
