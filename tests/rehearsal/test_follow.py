@@ -98,7 +98,7 @@ def result_of(delay: float, lag: float, off=(0.0, 0.0, 0.0), **more) -> Result:
     """Of a tip that is `off` from where the object was `lag` s before, in frames of all times."""
     way, result = path(), Result("follow", 0, True)
     frames = [frame(now, "follow", tip=way(now - lag) + off) for now in np.arange(0.0, 20.0, 1 / 60)]
-    tell(result, way, delay, more.get("frames", frames), more.get("seen", []))
+    tell(result, way, delay, more.get("frames", frames), more.get("views", []))
     return result
 
 
