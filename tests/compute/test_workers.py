@@ -6,13 +6,13 @@ import subprocess
 import sys
 from pathlib import Path
 
-TESTS = Path(__file__).parent
+TESTS = Path(__file__).parents[1]
 TEST = """
 import os, pathlib, pytest
 
 @pytest.mark.parametrize("number", range(4))
 def test_who_runs_this(number):
-    with (pathlib.Path(__file__).parents[2] / "workers.txt").open("a") as seen:
+    with (pathlib.Path(__file__).parents[1] / "workers.txt").open("a") as seen:
         seen.write(f"{pathlib.Path(__file__).parent.name} {os.environ['PYTEST_XDIST_WORKER']}\\n")
 """
 

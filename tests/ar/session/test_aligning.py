@@ -438,7 +438,7 @@ class Headset(Hands):
 
     @property
     def aligning(self):
-        return next(told for told in reversed(self.said) if told["type"] == "aligning")
+        return next(told for told in reversed(self.messages) if told["type"] == "aligning")
 
 
 @pytest.mark.realtime
@@ -516,7 +516,7 @@ def test_a_browser_is_asked_for_none_of_it():
             for message in ({"type": "touch"}, {"type": "anchor", "id": "a", "pose": None}):
                 await guest.say(**message)
             await guest.refused("alignment: your poses are in the base frame")
-            assert not any(told["type"] == "aligning" for told in guest.said)
+            assert not any(told["type"] == "aligning" for told in guest.messages)
 
     asyncio.run(session())
 
