@@ -13,11 +13,11 @@ import time
 import numpy as np
 
 from trunkline.ar.drivers.driver import TICK
-from trunkline.ar.drivers.driver_client import Adapted, ArmSettings, panda
+from trunkline.ar.drivers.driver_client import ArmSettings, DriverClient, panda
 from trunkline.ar.drivers.driver_process import TELL
-from trunkline.ar.drivers.robot import Machine
+from trunkline.ar.drivers.robot import HardwareRobot
 from trunkline.ar.drivers.setpoint_filter import LIMITS
-from trunkline.ar.drivers.time_scaling import PacedRobot
+from trunkline.ar.drivers.time_scaling import TimeScaledRobot
 from trunkline.ar.teleop.config import Config as Teleop
 from trunkline.ar.teleop.plan import Plan
 from trunkline.ar.teleop.trajectory import gentle, limits_of
@@ -40,12 +40,12 @@ def main(arguments: list[str]) -> int:
 
 def measure(robot: str, address: str) -> None:
     arm = panda(ArmSettings(os.environ.get("ROBOT_PYTHON", ""), address, 0.1), robot)
-    machine = Machine(arm, None, STRAIGHT)
+    machine = HardwareRobot(arm, None, STRAIGHT)
     limits = limits_of(load_folder(Teleop, PROJECT / "conf/teleop").motors)
     try:
         joints = machine.begin(np.zeros(7))
         turned = joints + TURN * np.where(joints > 0, -1.0, 1.0)
-        mover = PacedRobot(
+        mover = TimeScaledRobot(
             joints, STRAIGHT, limits, "none", lambda q, c, _: machine.move(q, c), LIMITS[robot]
         )  # fmt: skip
         print("| way | ended | cycles a second | furthest from what it is sent | from the plan's end |")
@@ -63,7 +63,7 @@ def way(start: np.ndarray, end: np.ndarray, limits) -> Plan:
     return Plan(0.002, rows[:, :7], rows[:, 7:], (("transfer", 0),), "none", "none")
 
 
-def moved(machine: Machine, arm: Adapted, mover: PacedRobot, plan: Plan, stop: float) -> str:
+def moved(machine: HardwareRobot, arm: DriverClient, mover: TimeScaledRobot, plan: Plan, stop: float) -> str:
     """A row of the table: `plan` run to its end, or stopped after `stop` s, and RESTS s of rest: a
     simulator that falls behind gets there later.
 

@@ -26,17 +26,17 @@ from typing import cast
 
 import numpy as np
 
-from trunkline.ar.drivers.settings import Config as Execution
+from trunkline.ar.drivers.settings import ExecutionConfig as Execution
 from trunkline.ar.drivers.simulated_motors import SIMULATED
 from trunkline.ar.preview.package import only_package
 from trunkline.ar.session import lease
 from trunkline.ar.session.alignment import mark_at
-from trunkline.ar.session.composition import Made
+from trunkline.ar.session.composition import SessionParts
 from trunkline.ar.session.controller import Robot
 from trunkline.ar.session.hardware import hardware_of
 from trunkline.ar.session.server import Server
 from trunkline.ar.session.session import Address, opened
-from trunkline.ar.session.settings import Alignment, Config
+from trunkline.ar.session.settings import AlignmentSettings, SessionConfig
 from trunkline.ar.teleop.config import Config as Teleop
 from trunkline.ar.teleop.executor import AT_START
 from trunkline.ar.teleop.messages import ExecutorReport
@@ -127,7 +127,7 @@ class Run:
 
 
 async def served(package: Path, runs: int, folder: Path) -> list[Run]:
-    config, teleop = load_folder(Config, PROJECT / "conf/live"), load_folder(Teleop, PROJECT / "conf/teleop")
+    config, teleop = load_folder(SessionConfig, PROJECT / "conf/live"), load_folder(Teleop, PROJECT / "conf/teleop")
     alignment = replace(config.alignment, anchors=str(folder / "anchors.json"))
     config = replace(config, alignment=alignment, journal=replace(config.journal, folder=str(folder)))
     safety = replace(teleop.core.safety, silence=PATIENCE)
@@ -140,7 +140,7 @@ async def served(package: Path, runs: int, folder: Path) -> list[Run]:
         return await driven(server, made, runs, alignment)
 
 
-async def driven(server: Server, made: Made, runs: int, alignment: Alignment) -> list[Run]:
+async def driven(server: Server, made: SessionParts, runs: int, alignment: AlignmentSettings) -> list[Run]:
     """By an operator in a browser."""
     mark, at = alignment.mark, json.dumps(alignment.at)
     robot = Led(made.robot, made.robot._limits, made.package)

@@ -21,7 +21,7 @@ from aiohttp import ClientSession, WSServerHandshakeError
 
 from benchmarks.guests import HZ, RIGID, SEEN, TIP, Guest, Hands, hands_at, knock
 from trunkline.ar.preview.package import only_package
-from trunkline.ar.session.composition import Made
+from trunkline.ar.session.composition import SessionParts
 from trunkline.ar.session.server import Server
 from trunkline.ar.session.session import Address, opened
 from trunkline.errors import InputError, in_one_line
@@ -39,7 +39,7 @@ class Scene:
     """A session, and connections to it."""
 
     server: Server
-    made: Made
+    made: SessionParts
     session: ClientSession
     token: str
 

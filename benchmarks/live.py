@@ -23,7 +23,7 @@ from benchmarks.watching import Door, Span, alone, attended, crowd, pressed, sto
 from trunkline.ar.preview.package import only_package
 from trunkline.ar.session import binary
 from trunkline.ar.session.certificate import make_certificate, tls_context
-from trunkline.ar.session.composition import Made
+from trunkline.ar.session.composition import SessionParts
 from trunkline.ar.session.server import Server
 from trunkline.ar.session.session import Address, opened
 from trunkline.errors import in_one_line
@@ -63,7 +63,7 @@ class Looks:
 class Holds:
     """When the robot was commanded to hold, s."""
 
-    made: Made
+    made: SessionParts
     times: list[float]
 
     def look(self) -> None:

@@ -8,7 +8,7 @@
 import sys
 
 from trunkline.ar.drivers.self_test import measures, table
-from trunkline.ar.drivers.settings import Config
+from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.errors import in_one_line
 from trunkline.pipeline.config import PROJECT, load_folder
 from upkeep.results import recorded
@@ -17,7 +17,7 @@ from upkeep.results import recorded
 @in_one_line
 def main(arguments: list[str]) -> int:
     with recorded("motors"):
-        print(table(measures(load_folder(Config, PROJECT / "conf/execution").motors)))
+        print(table(measures(load_folder(ExecutionConfig, PROJECT / "conf/execution").motors)))
     return 0
 
 

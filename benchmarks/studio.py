@@ -27,7 +27,7 @@ import numpy as np
 from benchmarks.browser import browsing
 from trunkline.ar.preview.package import only_package, read_package
 from trunkline.ar.session.composition import SEARCH, simulation_of
-from trunkline.ar.session.settings import Config
+from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.teleop.config import Config as Teleop
 from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.config import PROJECT, load_folder
@@ -122,7 +122,7 @@ async def compared(package: Path, seconds: float, pictures: Path | None) -> dict
     async with served(ours, "#token=") as (pid, line):
         found[OURS] = await measured(OURS, line, pid, begun, seconds, pictures)
     with tempfile.TemporaryDirectory() as folder:
-        teleop, config = load_folder(Teleop, PROJECT / "conf/teleop"), load_folder(Config, PROJECT / "conf/live")
+        teleop, config = load_folder(Teleop, PROJECT / "conf/teleop"), load_folder(SessionConfig, PROJECT / "conf/live")
         model = simulation_of(read_package(package), teleop, config, SEARCH).twin.model
         path = Path(folder) / "robot.mjb"
         mujoco.mj_saveModel(model, str(path), None)

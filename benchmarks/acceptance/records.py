@@ -14,9 +14,9 @@ from benchmarks.acceptance.row import Row
 from tests.support.ticking import fed, ticks
 from tests.support.waiting import until
 from trunkline.ar.drivers.ros_messages import trajectory
-from trunkline.ar.drivers.settings import Config as Execution
-from trunkline.ar.session.log_writer import NOTHING, JournalProcess
-from trunkline.ar.session.settings import Config
+from trunkline.ar.drivers.settings import ExecutionConfig as Execution
+from trunkline.ar.session.log_writer import NOTHING, LogWriterProcess
+from trunkline.ar.session.settings import SessionConfig
 from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT, load_folder
 
@@ -29,7 +29,7 @@ def rows() -> list[Row]:
 
 
 def killed() -> Row:
-    rng, period = np.random.default_rng(0), load_folder(Config, PROJECT / "conf/live").journal.period
+    rng, period = np.random.default_rng(0), load_folder(SessionConfig, PROJECT / "conf/live").journal.period
     with tempfile.TemporaryDirectory() as folder:
         lost = [_lost(Path(folder) / f"{number}.mcap", period, rng.uniform(*FED)) for number in range(KILLS)]
     what = f"log, its process killed -9, {KILLS} times: lost, worst"
@@ -38,7 +38,7 @@ def killed() -> Row:
 
 def _lost(path: Path, period: float, seconds: float) -> float:
     """s from the first that was told and is not in the file until the kill."""
-    journal = JournalProcess(path, NOTHING, period)
+    journal = LogWriterProcess(path, NOTHING, period)
     journal.event("tick", number=0)
     until(lambda: path.exists() and path.stat().st_size > BEGUN, seconds=COMES)
     told, end = fed(journal, seconds), time.monotonic()

@@ -36,7 +36,7 @@ from rehearsal.experiments.result import COLUMNS, Result, as_row, causes, rate
 from studies.rows import Rows
 from trunkline.ar.preview.package import only_package
 from trunkline.ar.session.session import Address, opened
-from trunkline.ar.session.settings import Config
+from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.teleop.config import Config as Teleop
 from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.config import PROJECT, load_folder
@@ -50,9 +50,9 @@ SILENCE = 0.6  # s for which the page may be silent: it shares the processor wit
 REHEARSED = Path("artifacts/rehearse/metrics.json")
 
 
-def config_of(bench: Bench, staged: Staged, folder: str) -> Config:
+def config_of(bench: Bench, staged: Staged, folder: str) -> SessionConfig:
     """A live session's settings where the experiment is staged."""
-    config, world = load_folder(Config, PROJECT / "conf/live"), staged.session.world
+    config, world = load_folder(SessionConfig, PROJECT / "conf/live"), staged.session.world
     x, y, z = bench.settings.mount_ready
     return replace(
         config, ready=(x, y, z), floor=FLOOR, boxes=world.boxes[1:], thing=next(iter(world.things), None),

@@ -11,7 +11,7 @@ import numpy as np
 from rehearsal.experiments.bench import Seen
 from rehearsal.session import RATE, TICKS, Session
 from trunkline.ar.session.log_format import JOINTS, TENDONS, TYPES
-from trunkline.ar.session.log_reader import read_logbook
+from trunkline.ar.session.log_reader import read_session_log
 from trunkline.errors import InputError
 from trunkline.recordings.logs.joint_stream import joint_stream
 from trunkline.recordings.logs.log import read_log
@@ -27,7 +27,7 @@ def done_again(session: Session, log: Path, begun: float) -> list[Seen]:
     Raises:
         InputError: the log lacks what was measured.
     """
-    book = read_logbook(log)
+    book = read_session_log(log)
     modes = [(event["time"] - begun, event["mode"]) for event in book.events if event["event"] == "mode"]
     first = next((time for time, mode in modes if mode in MOVES), None)
     if first is None:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from trunkline.ar.drivers.realtime_priority import URGENT
-from trunkline.ar.drivers.settings import Config
+from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.ar.drivers.simulated_motors import SIMULATED
 from trunkline.ar.session.hardware import Hardware, hardware_of
 from trunkline.errors import InputError
@@ -36,7 +36,7 @@ main()
 
 def hardware(python: Path) -> Hardware:
     """An FR3 at ADDRESS, by the library in the environment of `python`, and motors on the bus of simulated ones."""
-    config = load_folder(Config, PROJECT / "conf/execution")
+    config = load_folder(ExecutionConfig, PROJECT / "conf/execution")
     arm = replace(config.arm, python=str(python), address=ADDRESS)
     found = hardware_of("fr3", "gm6020", SIMULATED, "", replace(config, arm=arm))
     assert found is not None

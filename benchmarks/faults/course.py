@@ -13,7 +13,7 @@ import numpy as np
 from benchmarks.faults.hushed import HUSH
 from benchmarks.faults.operator import JUMP, PATIENCE
 from benchmarks.faults.scene import Scene, staged
-from trunkline.ar.session.log_reader import read_logbook
+from trunkline.ar.session.log_reader import read_session_log
 from trunkline.errors import InputError
 
 MOVING = 0.4  # s for which the robot has moved before anything is done
@@ -132,7 +132,7 @@ def session(package: Path, faults: list[Fault]) -> list[Suffered]:
             found.append(suffered(fault, scene))
             print(f"{fault.title}: {1e3 * found[-1].held:.0f} ms", file=sys.stderr, flush=True)
         time.sleep(WITHIN)
-    events = [event for event in read_logbook(scene.told.log).events if event["event"] in WHY]
+    events = [event for event in read_session_log(scene.told.log).events if event["event"] in WHY]
     for one in found:
         at, why = _why(one.done, events)
         one.said = why or _line(one.done, scene.lines) or "(nobody is left to say it)"

@@ -9,7 +9,7 @@ from trunkline.ar.drivers import driver_host, on_bus
 HUSH = 0.05  # s
 
 
-class Hushed(on_bus.BankOnBus):
+class Hushed(on_bus.SimulatedMotorsOnBus):
     """Such a bank. `until`: s until which its first motor is silent."""
 
     until = 0.0
@@ -25,5 +25,5 @@ def hush(*_) -> None:
 
 def main() -> int:
     signal.signal(signal.SIGUSR1, hush)
-    on_bus.BankOnBus = Hushed
+    on_bus.SimulatedMotorsOnBus = Hushed
     return driver_host.main(sys.argv[1:])

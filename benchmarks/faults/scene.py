@@ -15,7 +15,7 @@ from pathlib import Path
 
 from benchmarks.faults.operator import ADDRESS, PATIENCE, Operator
 from benchmarks.faults.witness import Watched, Witness, machine
-from trunkline.ar.drivers.settings import Config
+from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.ar.drivers.simulated_motors import SIMULATED
 from trunkline.ar.session import real, robot
 from trunkline.ar.session.hardware import hardware_of
@@ -106,7 +106,7 @@ def serve(pipe: Connection, witness: Witness, package: Path, motors: bool) -> No
     """The process of a session: until the other end of `pipe` is closed. All in it is as it is served, but that the
     robot's process tells the witness too, and that its bank, if it has one, has a motor that can be silent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    robot.Channel, real.run = functools.partial(Watched, witness=witness), machine
+    robot.RobotChannel, real.run = functools.partial(Watched, witness=witness), machine
     real.Channel = functools.partial(Watched, witness=None)  # the twin's: the class itself is not found by its name now
     asyncio.run(_serve(pipe, package, motors))
 
@@ -116,7 +116,7 @@ async def _serve(pipe: Connection, package: Path, motors: bool) -> None:
         with contextlib.suppress(OSError):  # it says how its end goes to nobody
             pipe.send((time.monotonic(), line))
 
-    execution = load_folder(Config, PROJECT / "conf/execution")
+    execution = load_folder(ExecutionConfig, PROJECT / "conf/execution")
     hardware = hardware_of("simulated", "gm6020", SIMULATED, "", execution) if motors else None
     async with opened(package, ADDRESS, say, hardware) as (server, made):
         assert made.robot.pid is not None

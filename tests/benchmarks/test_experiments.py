@@ -16,7 +16,7 @@ from tests.ar.session.test_hindsight import Clocked
 from tests.ar.teleop.test_plan import START, STRAIGHT
 from tests.rehearsal.test_session import THING, Sent
 from tests.support.operator import Operator
-from trunkline.ar.session.robot import Standing
+from trunkline.ar.session.robot import RobotState
 from trunkline.ar.teleop.messages import Controller
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz
@@ -44,7 +44,7 @@ def written(path, joints=True, moves=True):
             if moves and abs(now - MOVES) < 0.5 / 72:
                 journal.event("mode", mode="execute", notice="", digest="")
             at, lengths = measured(now)
-            journal.standing(Standing(
+            journal.standing(RobotState(
                 journal.time, 0.0, START + 1.0, STRAIGHT - 0.2, poses[0], poses, at if joints else None, lengths
             ))  # fmt: skip
             journal.step(1 / 60, operator.given, operator.step())

@@ -9,18 +9,18 @@ from functools import cache
 import numpy as np
 
 from trunkline.ar.drivers.gm6020 import command_frames, feedback_of
-from trunkline.ar.drivers.motors import Motors, MotorSettings
-from trunkline.ar.drivers.settings import Config
-from trunkline.ar.drivers.simulated_motors import Bank, Plant
+from trunkline.ar.drivers.motors import MotorGroup, MotorSettings
+from trunkline.ar.drivers.settings import ExecutionConfig
+from trunkline.ar.drivers.simulated_motors import MotorParameters, SimulatedMotors
 from trunkline.pipeline.config import PROJECT, load_folder
 
 TICK = 0.001  # s
-PLANTS = (Plant(), Plant(side=-1, begins=8100, stiffness=300.0), Plant(slack=0.03, begins=4000, stiffness=500.0))
+PLANTS = (MotorParameters(), MotorParameters(side=-1, begins=8100, stiffness=300.0), MotorParameters(slack=0.03, begins=4000, stiffness=500.0))
 
 
 def motor_settings() -> MotorSettings:
     """Of the project, the second motor on the other side."""
-    return replace(load_folder(Config, PROJECT / "conf/execution").motors, sides=(1, -1, 1))
+    return replace(load_folder(ExecutionConfig, PROJECT / "conf/execution").motors, sides=(1, -1, 1))
 
 
 class Workbench:
@@ -28,8 +28,8 @@ class Workbench:
 
     def __init__(self, plants=PLANTS, settings=None, lost=0.0, seed=0):
         self.now, self.lost, self._random = 100.0, lost, random.Random(seed)
-        self.bank = Bank(plants, self.now)
-        self.motors = Motors(settings or motor_settings(), self.now)
+        self.bank = SimulatedMotors(plants, self.now)
+        self.motors = MotorGroup(settings or motor_settings(), self.now)
         self.zeros = np.zeros(len(plants))
 
     @property

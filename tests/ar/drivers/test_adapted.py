@@ -10,14 +10,14 @@ import pytest
 
 from trunkline.ar.drivers import driver_client
 from trunkline.ar.drivers.driver import CONNECTING
-from trunkline.ar.drivers.driver_client import CLOSING, SILENT, Adapted, panda
-from trunkline.ar.drivers.driver_frames import Line, Setpoint, Told
-from trunkline.ar.drivers.driver_host import STARTING, hosted
+from trunkline.ar.drivers.driver_client import CLOSING, SILENT, DriverClient, panda
+from trunkline.ar.drivers.driver_frames import DriverState, FrameSocket, Setpoint
+from trunkline.ar.drivers.driver_host import STARTING, start_driver
 from trunkline.ar.drivers.motors import HOMING, MotorsOnBus
-from trunkline.ar.drivers.settings import Config
+from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.pipeline.config import PROJECT, load_folder
 
-SETTINGS = load_folder(Config, PROJECT / "conf/execution")
+SETTINGS = load_folder(ExecutionConfig, PROJECT / "conf/execution")
 NEAR, BEGUN, PATIENCE, ASTRAY = 1e-6, 100.0, 5.0, 0.05
 READY = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])
 
@@ -28,7 +28,7 @@ class Process:
     def __init__(self, command, pass_fds, **how):
         self.command, self.how, self.ends, self.waited, self.killed = command, how, True, [], False
         self.socket = socket.socket(fileno=os.dup(pass_fds[0]))
-        self.line = Line(self.socket, Setpoint.size(7))
+        self.line = FrameSocket(self.socket, Setpoint.size(7))
 
     def wait(self, seconds=None):
         self.waited.append(seconds)
@@ -40,7 +40,7 @@ class Process:
         self.killed = True
 
     def tell(self, time, measured=READY, sent=READY, fault=""):
-        self.socket.sendall(Told(time, tuple(measured), tuple(sent), fault).pack())
+        self.socket.sendall(DriverState(time, tuple(measured), tuple(sent), fault).pack())
 
 
 @pytest.fixture
@@ -51,7 +51,7 @@ def clock(monkeypatch):
 
 @pytest.fixture
 def limb(clock):
-    found = Adapted(["adapter"], 7, PATIENCE, ASTRAY, ", expected it here")
+    found = DriverClient(["adapter"], 7, PATIENCE, ASTRAY, ", expected it here")
     yield found
     found.close()
     found.process.socket.close()
@@ -144,7 +144,7 @@ def test_an_adapter_that_fails_before_it_is_ready_never_is(limb):
 
 def test_an_adapter_that_ends_is_a_fault_and_why_it_did_comes_first(clock):
     for fault, expected in (("", "its adapter has ended"), ("no robot", "no robot")):
-        limb = Adapted(["adapter"], 7)
+        limb = DriverClient(["adapter"], 7)
         limb.process.tell(BEGUN, fault=fault)
         limb.process.socket.close()
         limb.turn(BEGUN)
@@ -172,13 +172,13 @@ def test_what_is_sent_comes_to_the_adapter(ready):
 
 def test_an_adapter_that_takes_no_setpoints_is_a_fault_unless_it_has_told_one(clock):
     for told, expected in (("", "its adapter has ended"), ("reflex", "reflex")):
-        limb = Adapted(["adapter"], 7)
+        limb = DriverClient(["adapter"], 7)
         limb.process.tell(BEGUN, fault=told)
         limb.process.socket.close()
         limb.send(BEGUN, READY)
         assert limb.fault == expected
         limb.close()
-    full = Adapted(["adapter"], 7)
+    full = DriverClient(["adapter"], 7)
     while not full.fault:
         full.send(BEGUN, READY)
     assert full.fault.startswith("its adapter takes no setpoints (")
@@ -187,7 +187,7 @@ def test_an_adapter_that_takes_no_setpoints_is_a_fault_unless_it_has_told_one(cl
 
 @pytest.mark.parametrize("ends", [True, False])
 def test_an_adapter_that_does_not_end_is_killed_after_a_while(clock, ends):
-    limb = Adapted(["adapter"], 7)
+    limb = DriverClient(["adapter"], 7)
     limb.process.ends = ends
     limb.close()
     limb.process.line.heard()
@@ -218,8 +218,8 @@ def test_a_robots_joint_may_be_as_far_off_as_the_settings_say(clock):
 @pytest.mark.parametrize(
     ("limb_of", "patience"),
     [(lambda: panda(SETTINGS.arm, "fr3"), CONNECTING),
-     (lambda: hosted(MotorsOnBus(SETTINGS.motors, "can0", "socketcan")), HOMING + STARTING),
-     (lambda: hosted(SETTINGS.ros), CONNECTING + STARTING)],
+     (lambda: start_driver(MotorsOnBus(SETTINGS.motors, "can0", "socketcan")), HOMING + STARTING),
+     (lambda: start_driver(SETTINGS.ros), CONNECTING + STARTING)],
 )  # fmt: skip
 def test_how_long_each_limb_is_waited_for(clock, limb_of, patience):
     """Motors have to be homed until then, a robot has to be there."""

@@ -6,7 +6,7 @@ import pytest
 from tests.support.motors import TICK, PlayedMotors, Workbench, homed
 from trunkline.ar.drivers.driver import SILENT
 from trunkline.ar.drivers.motors import HOMING
-from trunkline.ar.drivers.tendon_driver import Cables
+from trunkline.ar.drivers.tendon_driver import TendonDriver
 
 LEAD = 0.03  # s
 
@@ -16,7 +16,7 @@ class Played:
 
     def __init__(self, bench):
         self.bench = bench
-        self.cables = Cables(PlayedMotors(bench), bench.now)
+        self.cables = TendonDriver(PlayedMotors(bench), bench.now)
 
     def play(self, seconds, way=None, turns=True):
         """Sent `way(t)`, m, of all cables, LEAD s ahead, t from 0 on; nothing without it. turns: whether they do."""

@@ -11,19 +11,19 @@ from trunkline.ar.drivers import robot as machines
 from trunkline.ar.drivers import ros_arm
 from trunkline.ar.drivers.driver import CONNECTING, SILENT, Watchdog
 from trunkline.ar.drivers.gm6020 import MOST_AMPERES, Feedback, command_frames, commanded
-from trunkline.ar.drivers.motors import PRESENT, Motors
+from trunkline.ar.drivers.motors import PRESENT, MotorGroup
 from trunkline.ar.drivers.motors import SILENT as UNHEARD
-from trunkline.ar.drivers.robot import LEAD, Machine
+from trunkline.ar.drivers.robot import LEAD, HardwareRobot
 from trunkline.ar.drivers.ros_arm import RosArm
 from trunkline.ar.drivers.setpoint_filter import ROUNDING
-from trunkline.ar.drivers.settings import Config
-from trunkline.ar.drivers.winch import Reel
+from trunkline.ar.drivers.settings import ExecutionConfig
+from trunkline.ar.drivers.winch import Winch
 from trunkline.errors import InputError
 from trunkline.kinematics.panda.limits import VELOCITY
 from trunkline.pipeline.config import PROJECT, load_folder
 
 NEAR = 1e-6
-ROS = load_folder(Config, PROJECT / "conf/execution").ros
+ROS = load_folder(ExecutionConfig, PROJECT / "conf/execution").ros
 READY = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])
 JOINTS = range(7)
 
@@ -39,7 +39,7 @@ def heard_at(now, motors, numbers=(1, 2, 3), celsius=30):
 @pytest.mark.parametrize("number", [1, 2, 3])
 @pytest.mark.parametrize(("silent", "faulty"), [(UNHEARD - NEAR, False), (UNHEARD + NEAR, True)])
 def test_a_motor_may_be_silent_for_so_long(number, silent, faulty):
-    motors = Motors(motor_settings(), 100.0)
+    motors = MotorGroup(motor_settings(), 100.0)
     heard_at(100.0, motors)
     heard_at(100.0 + silent, motors, {1, 2, 3} - {number})
     currents = motors.currents([0.0] * 3, [0.0] * 3, 100.0 + silent)
@@ -50,7 +50,7 @@ def test_a_motor_may_be_silent_for_so_long(number, silent, faulty):
 @pytest.mark.parametrize("number", [1, 2, 3])
 @pytest.mark.parametrize(("late", "faulty"), [(PRESENT - NEAR, False), (PRESENT + NEAR, True)])
 def test_each_motor_has_to_be_heard_at_first_and_none_is_driven_before(number, late, faulty):
-    motors = Motors(motor_settings(), 100.0)
+    motors = MotorGroup(motor_settings(), 100.0)
     heard_at(100.0 + late, motors, {1, 2, 3} - {number})
     assert set(motors.currents([0.01] * 3, [0.0] * 3, 100.0 + late).values()) == {0.0}
     assert motors.fault.startswith(f"motor {number}: found no feedback") == faulty
@@ -92,7 +92,7 @@ def test_a_fault_of_any_motor_ends_the_current_of_all(number):
 @pytest.mark.parametrize("beyond", [-NEAR, NEAR])
 def test_a_cable_may_be_so_loose_as_homing_begins(beyond):
     settings = motor_settings().reel
-    reel = Reel(settings, 1)
+    reel = Winch(settings, 1)
     reel.read(Feedback(1, 0, 0, 0.0, 30), 0.0)
     reel.pull = settings.slack + beyond
     current = reel.home(0.001)
@@ -110,7 +110,7 @@ def test_no_command_asks_a_motor_for_more_than_it_may_have(asked, sent, sign):
 @pytest.mark.parametrize("side", [-1, 1])
 @pytest.mark.parametrize("wanted", [-1.0, 1.0])
 def test_the_current_of_a_loop_ends_at_what_the_settings_allow_either_way(side, wanted):
-    reel = Reel(motor_settings().reel, side)
+    reel = Winch(motor_settings().reel, side)
     reel.read(Feedback(1, 0, 0, 0.0, 30), 0.0)
     assert reel.current(wanted, 0.0, 0.001) == pytest.approx(side * wanted * motor_settings().reel.most)
 
@@ -264,7 +264,7 @@ class Told:
 )  # fmt: skip
 def test_a_fault_of_either_limb_is_the_machines_and_has_its_name(arm, motors, fault):
     limbs = [None if said is None else Told(fault=said) for said in (arm, motors)]
-    assert Machine(*limbs, np.full(3, 0.5), lambda: 100.0).fault == fault
+    assert HardwareRobot(*limbs, np.full(3, 0.5), lambda: 100.0).fault == fault
 
 
 @pytest.fixture
@@ -278,7 +278,7 @@ def waits(monkeypatch):
 def test_a_machine_begins_once_both_limbs_are_ready(waits):
     arm, motors = Told(ready=False), Told(ready=False, at=np.zeros(3))
     waits += [lambda: setattr(arm, "ready", True), lambda: None, lambda: setattr(motors, "ready", True)]
-    made = Machine(arm, motors, np.full(3, 0.5), lambda: 100.0)
+    made = HardwareRobot(arm, motors, np.full(3, 0.5), lambda: 100.0)
     np.testing.assert_array_equal(made.begin(np.ones(7)), READY)
     assert waits == []
     assert (arm.turns, motors.turns) == (3, 3)
@@ -289,30 +289,30 @@ def test_a_machine_whose_limb_fails_does_not_begin(waits, limb, said):
     limbs = {"arm": Told(ready=False), "motors": Told(ready=False)}
     waits += [lambda: setattr(limbs[limb], "fault", "no robot")]
     with pytest.raises(InputError, match=f"^{said}$"):
-        Machine(**limbs, straight=np.full(3, 0.5), clock=lambda: 100.0).begin(np.ones(7))
+        HardwareRobot(**limbs, straight=np.full(3, 0.5), clock=lambda: 100.0).begin(np.ones(7))
 
 
 def test_a_machine_that_is_ready_and_has_failed_does_not_begin():
     with pytest.raises(InputError, match="^robot: reflex$"):
-        Machine(Told(fault="reflex"), Told(), np.full(3, 0.5), lambda: 100.0).begin(np.ones(7))
+        HardwareRobot(Told(fault="reflex"), Told(), np.full(3, 0.5), lambda: 100.0).begin(np.ones(7))
 
 
 @pytest.mark.parametrize("ready", [True, False])
 def test_a_machine_that_nobody_wants_any_more_does_not_begin(ready):
     with pytest.raises(InputError, match="^the session is gone$"):
-        Machine(Told(ready=ready), None, np.full(3, 0.5), lambda: 100.0).begin(np.ones(7), lambda: True)
+        HardwareRobot(Told(ready=ready), None, np.full(3, 0.5), lambda: 100.0).begin(np.ones(7), lambda: True)
 
 
 @pytest.mark.parametrize("limbs", [(True, True), (True, False), (False, True)])
 def test_each_limb_that_is_there_is_given_back(limbs):
     made = [Told() if there else None for there in limbs]
-    Machine(*made, np.full(3, 0.5), lambda: 100.0).close()
+    HardwareRobot(*made, np.full(3, 0.5), lambda: 100.0).close()
     assert [limb.closed for limb in made if limb is not None] == [True] * sum(limbs)
 
 
 def test_moves_that_are_due_anew_are_not_made_up_for():
     now = [100.0]
-    made = Machine(Told(), None, np.full(3, 0.5), lambda: now[0])
+    made = HardwareRobot(Told(), None, np.full(3, 0.5), lambda: now[0])
     made.begin(READY)
     made.move(READY, np.full(3, 0.5))
     assert made.behind == 0.0  # the first

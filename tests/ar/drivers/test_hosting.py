@@ -17,12 +17,12 @@ from tests.support.motors import PlayedMotors, Workbench, homed, motor_settings
 from trunkline.ar.drivers import driver_client, driver_host
 from trunkline.ar.drivers.driver import TICK
 from trunkline.ar.drivers.driver_client import SILENT
-from trunkline.ar.drivers.driver_frames import Line, Setpoint
-from trunkline.ar.drivers.driver_host import SETTLES, host, hosted
+from trunkline.ar.drivers.driver_frames import FrameSocket, Setpoint
+from trunkline.ar.drivers.driver_host import SETTLES, run_driver, start_driver
 from trunkline.ar.drivers.driver_process import TELL
 from trunkline.ar.drivers.motors import MotorsOnBus
 from trunkline.ar.drivers.simulated_motors import SIMULATED
-from trunkline.ar.drivers.tendon_driver import Cables
+from trunkline.ar.drivers.tendon_driver import TendonDriver
 
 LEAD, NEAR = 0.03, 1e-6  # s
 
@@ -43,12 +43,12 @@ class Played:
         monkeypatch.setattr(driver_host, "time", SimpleNamespace(monotonic=lambda: self.bench.now, sleep=self._sleep))
         monkeypatch.setattr(driver_client, "time", SimpleNamespace(monotonic=lambda: self.bench.now))
         monkeypatch.setattr(driver_client.subprocess, "Popen", self._popen)
-        self.limb = Cables(self.motors, bench.now)
-        self.seen = hosted(MotorsOnBus(motor_settings(), "can0", "socketcan"))
+        self.limb = TendonDriver(self.motors, bench.now)
+        self.seen = start_driver(MotorsOnBus(motor_settings(), "can0", "socketcan"))
 
     def _popen(self, command, pass_fds, **how):
         self.theirs = socket.socket(fileno=os.dup(pass_fds[0]))
-        self.line = Line(self.theirs, Setpoint.size(3))
+        self.line = FrameSocket(self.theirs, Setpoint.size(3))
         return SimpleNamespace(wait=lambda seconds=None: 0)
 
     def _sleep(self, seconds):
@@ -73,7 +73,7 @@ class Played:
 
         self.each = both
         try:
-            host(self.limb, self.line)
+            run_driver(self.limb, self.line)
         except Ended:
             return self
         raise AssertionError("it has ended by itself")
@@ -156,7 +156,7 @@ def test_it_holds_the_cables_for_a_while_once_nobody_is_there_and_then_gives_the
     began, driven = played.bench.now, []
     played.seen.line.close()
     played.each = lambda now: driven.append(min(np.abs(played.bench.currents)))
-    host(played.limb, played.line)
+    run_driver(played.limb, played.line)
     assert played.bench.now - began == pytest.approx(SETTLES, abs=2 * TICK)
     assert min(driven) > 0.05
 
@@ -178,7 +178,7 @@ def test_an_adapter_that_is_late_tells_of_its_limb_and_goes_on(played):
 
 @pytest.fixture
 def limb():
-    found = hosted(MotorsOnBus(motor_settings(), SIMULATED, "virtual"))
+    found = start_driver(MotorsOnBus(motor_settings(), SIMULATED, "virtual"))
     until(lambda: found.ready or found.fault, lambda: found.turn(time.monotonic()))
     assert found.fault == ""
     yield found
@@ -222,7 +222,7 @@ def test_it_ends_once_nobody_speaks_to_it(limb):
 
 
 def test_a_bus_that_is_not_there_is_one_line():
-    found = hosted(MotorsOnBus(motor_settings(), "nowhere0", "socketcan"))
+    found = start_driver(MotorsOnBus(motor_settings(), "nowhere0", "socketcan"))
     until(lambda: found.fault, lambda: found.turn(time.monotonic()))
     assert found.fault.startswith("bus nowhere0: found no socketcan bus that opens")
     found.close()
@@ -236,7 +236,7 @@ def test_a_robot_alone_needs_no_library_of_motors():
 def test_a_library_that_is_not_there_is_one_line():
     program = ("-c", "import sys; sys.modules['can'] = None; from trunkline.ar.drivers import hosting; "
                "sys.exit(hosting.main(sys.argv[1:]))")  # fmt: skip
-    found = hosted(MotorsOnBus(motor_settings(), "can0", "socketcan"), program)
+    found = start_driver(MotorsOnBus(motor_settings(), "can0", "socketcan"), program)
     until(lambda: found.fault, lambda: found.turn(time.monotonic()))
     assert found.fault == "found no library can, expected the extra motors to be installed"
     found.close()
@@ -261,8 +261,8 @@ def test_a_limb_that_fails_is_given_back_before_anything_waits(monkeypatch):
     monkeypatch.setattr(driver_host, "limb_of", lambda settings: Failing(done))
     monkeypatch.setattr(driver_host, "be_urgent", lambda: None)
     monkeypatch.setattr(driver_host.signal, "signal", lambda *_: None)
-    monkeypatch.setattr(Line, "end", lambda line, told: done.append(told.fault))
-    assert driver_host.main([driver_host.HOSTED.dump_json(settings).decode(), str(theirs.detach())]) == 1
+    monkeypatch.setattr(FrameSocket, "end", lambda line, told: done.append(told.fault))
+    assert driver_host.main([driver_host.DRIVER_SETTINGS.dump_json(settings).decode(), str(theirs.detach())]) == 1
     assert done == ["given back", "RuntimeError: no more"]
     ours.close()
 

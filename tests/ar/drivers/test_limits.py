@@ -8,8 +8,8 @@ import pytest
 
 from trunkline.ar.drivers.driver import SILENT
 from trunkline.ar.drivers.driver_frames import Setpoint
-from trunkline.ar.drivers.setpoint_filter import LIMITS, NEAR, ROUNDING, Stream
-from trunkline.ar.drivers.time_scaling import PacedRobot
+from trunkline.ar.drivers.setpoint_filter import LIMITS, NEAR, ROUNDING, SetpointFilter
+from trunkline.ar.drivers.time_scaling import TimeScaledRobot
 from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.plan import Plan
 from trunkline.ar.teleop.trajectory import Limits
@@ -22,9 +22,9 @@ JOINTS = range(7)
 SMALL = 0.004  # share of a limit, to either side
 
 
-def played(places: np.ndarray, robot: str) -> tuple[Stream, np.ndarray]:
+def played(places: np.ndarray, robot: str) -> tuple[SetpointFilter, np.ndarray]:
     """A stream that is sent `places` (T, 7), every ms, and what it sends, (T, 7)."""
-    stream, sent = Stream(places[0], LIMITS[robot]), []
+    stream, sent = SetpointFilter(places[0], LIMITS[robot]), []
     ahead = round(LEAD / DT)
     for step in range(len(places) + ahead):
         now = step * DT
@@ -110,7 +110,7 @@ def test_no_joint_leaves_its_range_on_either_side(robot, joint, side):
 @pytest.mark.parametrize("joint", JOINTS)
 def test_no_joint_starts_elsewhere_than_it_is(joint, sign):
     for off, refused in ((NEAR - 1e-6, False), (NEAR + 1e-6, True)):
-        stream = Stream(READY, LIMITS["panda"])
+        stream = SetpointFilter(READY, LIMITS["panda"])
         stream.hear(Setpoint(LEAD, tuple(READY + sign * off * np.eye(7)[joint])), 0.0)
         assert stream.fault.startswith("setpoint: starts 0.002 rad from where the robot is") == refused
 
@@ -118,7 +118,7 @@ def test_no_joint_starts_elsewhere_than_it_is(joint, sign):
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 @pytest.mark.parametrize("place", range(8))
 def test_a_setpoint_that_is_no_number_is_refused(place, value):
-    stream, numbers = Stream(READY, LIMITS["panda"]), [LEAD, *READY]
+    stream, numbers = SetpointFilter(READY, LIMITS["panda"]), [LEAD, *READY]
     numbers[place] = value
     stream.hear(Setpoint(numbers[0], tuple(numbers[1:])), 0.0)
     assert stream.fault == "setpoint: found values that are not finite"
@@ -127,7 +127,7 @@ def test_a_setpoint_that_is_no_number_is_refused(place, value):
 @pytest.mark.parametrize(("silent", "braked"), [(SILENT - 1e-6, False), (SILENT + 1e-6, True)])
 def test_setpoints_that_do_not_come_are_missed_after_so_long(silent, braked):
     """Though those that are there reach further."""
-    stream = Stream(READY, LIMITS["panda"])
+    stream = SetpointFilter(READY, LIMITS["panda"])
     for number in range(200):
         stream.hear(Setpoint(LEAD + number * DT, tuple(READY)), 0.0)
     stream.cycle(silent, DT)
@@ -159,7 +159,7 @@ def test_a_plan_that_leaves_the_robots_own_range_is_refused_and_its_targets_are_
         there = start.copy()
         there[joint] = border + sign * beyond
         plan = Plan(0.01, np.array([start, there, start]), np.full((3, 3), 0.5), (("approach", 0),), "p", "w")
-        robot = PacedRobot(start, np.full(3, 0.5), generous, "p", lambda q, c, _: None, limits)
+        robot = TimeScaledRobot(start, np.full(3, 0.5), generous, "p", lambda q, c, _: None, limits)
         found = robot.check(plan)
         said = f"plan: joint {joint + 1} leaves this robot's range at {there[joint]:.3f} rad"
         assert found == (said if beyond > 0 else "")

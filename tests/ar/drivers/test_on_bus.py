@@ -13,7 +13,14 @@ from tests.support.motors import PLANTS, TICK, Workbench, homed, motor_settings
 from trunkline.ar.drivers import on_bus
 from trunkline.ar.drivers.gm6020 import Feedback
 from trunkline.ar.drivers.motors import SILENT
-from trunkline.ar.drivers.on_bus import FILTERS, BankInThread, BankOnBus, BusMotors, SimulatedMotors, open_bus
+from trunkline.ar.drivers.on_bus import (
+    FILTERS,
+    BusMotors,
+    SimulatedBusMotors,
+    SimulatedMotorsOnBus,
+    SimulatedMotorsThread,
+    open_bus,
+)
 from trunkline.ar.drivers.simulated_motors import WATCHDOG
 from trunkline.errors import InputError
 
@@ -190,7 +197,7 @@ def test_where_one_frame_is_not_taken_the_other_still_is(monkeypatch):
 
 @pytest.mark.realtime
 def test_motors_in_real_time_are_driven_until_one_is_silent(request):
-    bank = BankInThread(PLANTS, can.Bus(interface="virtual", channel=request.node.name))
+    bank = SimulatedMotorsThread(PLANTS, can.Bus(interface="virtual", channel=request.node.name))
     driver = BusMotors(motor_settings(), can.Bus(interface="virtual", channel=request.node.name))
     begun = len(bank.reeled)
 
@@ -213,8 +220,8 @@ def test_motors_in_real_time_are_driven_until_one_is_silent(request):
 @pytest.mark.realtime
 def test_simulated_motors_turn_when_their_driver_does(request):
     name = request.node.name
-    bank = BankOnBus(PLANTS, can.Bus(interface="virtual", channel=name))
-    driver = SimulatedMotors(motor_settings(), can.Bus(interface="virtual", channel=name), bank)
+    bank = SimulatedMotorsOnBus(PLANTS, can.Bus(interface="virtual", channel=name))
+    driver = SimulatedBusMotors(motor_settings(), can.Bus(interface="virtual", channel=name), bank)
     until(lambda: all(motor.current for motor in bank.bank.motors), lambda: driver.turn([0.0] * 3, [0.0] * 3))
     before = [motor.reeled for motor in bank.bank.motors]
     until(lambda: all(m.reeled > b for m, b in zip(bank.bank.motors, before, strict=True)),

@@ -19,10 +19,10 @@ from tests.support.waiting import SOON, until
 from trunkline.ar.drivers import ros_arm
 from trunkline.ar.drivers.ros_arm import RosArm
 from trunkline.ar.drivers.ros_messages import Header, JointState, JointTrajectory, Time, trajectory
-from trunkline.ar.drivers.settings import Config
+from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.pipeline.config import PROJECT, load_folder
 
-SETTINGS = replace(load_folder(Config, PROJECT / "conf/execution").ros, domain=77)
+SETTINGS = replace(load_folder(ExecutionConfig, PROJECT / "conf/execution").ros, domain=77)
 LOOPBACK = '<General><Interfaces><NetworkInterface name="lo" multicast="true"/></Interfaces></General>'
 READY = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])
 THREADS = """

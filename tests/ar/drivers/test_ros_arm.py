@@ -10,11 +10,11 @@ from trunkline.ar.drivers import ros_arm
 from trunkline.ar.drivers.driver import SILENT, TICK
 from trunkline.ar.drivers.ros_arm import PERIOD, RosArm
 from trunkline.ar.drivers.setpoint_filter import ROUNDING
-from trunkline.ar.drivers.settings import Config
+from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.kinematics.panda.limits import VELOCITY
 from trunkline.pipeline.config import PROJECT, load_folder
 
-SETTINGS = load_folder(Config, PROJECT / "conf/execution").ros
+SETTINGS = load_folder(ExecutionConfig, PROJECT / "conf/execution").ros
 READY = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])
 LEAD, LATE = 0.03, 0.5  # s that setpoints are ahead, and when somebody is late
 FAST = 0.9 * VELOCITY[0]  # rad/s

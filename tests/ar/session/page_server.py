@@ -32,11 +32,11 @@ from trunkline.ar.session import lease, messages, preview_process
 from trunkline.ar.session import scene as pictured
 from trunkline.ar.session.anchors import Anchors
 from trunkline.ar.session.auth import Origins, make_token
-from trunkline.ar.session.bodies import drawn
-from trunkline.ar.session.controller import Desk
-from trunkline.ar.session.robot import Standing
-from trunkline.ar.session.server import House, Server
-from trunkline.ar.session.settings import Config
+from trunkline.ar.session.bodies import drawn_bodies
+from trunkline.ar.session.controller import SessionController
+from trunkline.ar.session.robot import RobotState
+from trunkline.ar.session.server import Composition, Server
+from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.teleop.alignment import base_quaternion
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.executor import SimulatedRobot
@@ -94,7 +94,7 @@ class Figure:
     def __init__(self) -> None:
         robot = PandaRobot("panda", OFFSET, 1.5, 0.0, list(READY_JOINTS))
         self.model = compose(rubbing_arm(spiral_chain(**SIZE), 8), robot).compile()
-        self.data, self.bodies = mujoco.MjData(self.model), drawn(self.model)
+        self.data, self.bodies = mujoco.MjData(self.model), drawn_bodies(self.model)
         self.ids = [self.model.body(name).id for name in self.bodies]
         self.rigid = self.model.jnt_qposadr[panda_joints(self.model)]
         units = [self.model.body(f"unit_{number:02d}") for number in range(1, UNITS + 1)]
@@ -115,7 +115,7 @@ class Robot:
         self.figure, self.robot = figure, SimulatedRobot(np.array(READY_JOINTS), STRAIGHT, LIMITS, PACKAGE)
         self.start, self.stop, self.hear = self.robot.start, self.robot.stop, self.robot.hear
         self.last, self.fault = time.monotonic(), ""
-        self.kept: Standing | None = None
+        self.kept: RobotState | None = None
         self.is_silent = False
 
     def permit(self) -> None:
@@ -127,7 +127,7 @@ class Robot:
     def state(self) -> ExecutorReport:
         return ExecutorReport("fault", "", self.fault) if self.fault else self.robot.state()
 
-    def standing(self) -> Standing:
+    def standing(self) -> RobotState:
         if self.is_silent and self.kept is not None:
             return self.kept
         now = time.monotonic()
@@ -135,7 +135,7 @@ class Robot:
             self.robot.advance(TICK)
             self.last += TICK
         poses = self.figure.poses(self.robot.joints, self.robot.commands)
-        self.kept = Standing(now, 0.0, self.robot.joints, self.robot.commands, np.full(7, np.nan), poses)
+        self.kept = RobotState(now, 0.0, self.robot.joints, self.robot.commands, np.full(7, np.nan), poses)
         return self.kept
 
 
@@ -156,33 +156,33 @@ class Planning:
         self.figure, self.heard = figure, None
         self.planner = Planner(RigidIK(OFFSET), NETWORK, STRAIGHT, LIMITS, OFFSET, step=0.005)
 
-    def order(self, order: preview_process.Order | preview_process.Seek) -> None:
-        if isinstance(order, preview_process.Seek):
+    def order(self, order: preview_process.Order | preview_process.FollowRequest) -> None:
+        if isinstance(order, preview_process.FollowRequest):
             targets = order.targets and within(order.targets)
-            self.heard(preview_process.Found(order.serial, *sought(self.planner, targets, order.joints, order.world)))
+            self.heard(preview_process.FollowAnswer(order.serial, *sought(self.planner, targets, order.joints, order.world)))
             return
         serial = order.request.serial
         try:
             request = replace(order.request, targets=within(order.request.targets))
             plan = self.planner.plan(request, order.world, order.joints, order.commands)
         except InputError as error:
-            self.heard(preview_process.Planned(PlanReport(serial, refused=str(error))))
+            self.heard(preview_process.PlanAnswer(PlanReport(serial, refused=str(error))))
             return
         digest, step = plan.digest(), 1 / RATE
         times = np.arange(0.0, plan.duration, step)
         poses = np.array([self.figure.poses(*plan.at(time)) for time in times], dtype=np.float32)
         tips, shares = poses[::9, -1, :3].astype(float), np.linspace(0, 1, len(times[::9]))
-        self.heard(preview_process.Planned(PlanReport(serial, digest, "", plan.package, plan.world), plan))
+        self.heard(preview_process.PlanAnswer(PlanReport(serial, digest, "", plan.package, plan.world), plan))
         phases = tuple((name, plan.step * row) for name, row in plan.phases)
-        preview = messages.Preview(digest, step, float(times[-1]), 0.0, phases)
-        self.heard(preview_process.Begun(serial, preview))
+        preview = messages.PreviewMessage(digest, step, float(times[-1]), 0.0, phases)
+        self.heard(preview_process.PreviewBegun(serial, preview))
         for first in range(0, len(times), 18):
             piece = poses[first : first + 18]
-            self.heard(preview_process.Shown(serial, first, float(times[first]), piece, first + 18 >= len(times)))
+            self.heard(preview_process.PreviewPiece(serial, first, float(times[first]), piece, first + 18 >= len(times)))
         spread = tuple(float(share) for share in 0.004 + 0.018 * shares)
         path = tuple(tuple(map(float, tip)) for tip in tips)
-        told = messages.Foreseen(digest, 0.84, 0.68, 0.93, tuple(map(float, times[::9])), path, spread, 0.9, 32)
-        self.heard(preview_process.Told(serial, told))
+        told = messages.PredictionMessage(digest, 0.84, 0.68, 0.93, tuple(map(float, times[::9])), path, spread, 0.9, 32)
+        self.heard(preview_process.PredictionAnswer(serial, told))
 
     def leave(self) -> None:
         pass
@@ -231,11 +231,11 @@ async def serve(port: int, folder: Path) -> None:
     safety = replace(core.safety, silence=PATIENCE, plan_wait=PATIENCE, start_wait=PATIENCE)
     settings = replace(core, delay=0.3, safety=safety)
     core = Teleoperation(settings, Balls(), PACKAGE, OFFSET)
-    desk = Desk(core, robot, planning, make_world((TABLE,), (CUP,)), 0.1)
+    desk = SessionController(core, robot, planning, make_world((TABLE,), (CUP,)), 0.1)
     page, origins = PROJECT / "trunkline/ar/session/page", Origins.of(["127.0.0.1"], port, tls=False)
-    alignment = load_folder(Config, PROJECT / "conf/live").alignment
+    alignment = load_folder(SessionConfig, PROJECT / "conf/live").alignment
     anchors = Anchors(folder / "anchors.json")
-    server = Server(House(
+    server = Server(Composition(
         desk, token, origins, PACKAGE, drawing(figure), Bowl(), RATE, page, log.append, alignment, anchors
     ))  # fmt: skip
     planning.heard, tick = server.foreseen, server.tick

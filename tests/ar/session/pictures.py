@@ -26,7 +26,7 @@ from trunkline.ar.preview.package import only_package
 from trunkline.ar.session import lease, preview_process, robot
 from trunkline.ar.session.controller import Planning
 from trunkline.ar.session.session import Address, opened
-from trunkline.ar.session.settings import Config
+from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.teleop.config import Config as Teleop
 from trunkline.ar.teleop.messages import Mode
 from trunkline.errors import InputError, in_one_line
@@ -80,7 +80,7 @@ class Kept:
     def __init__(self, planning: Planning) -> None:
         self._planning, self._orders = planning, []
 
-    def order(self, order: preview_process.Order | preview_process.Seek) -> None:
+    def order(self, order: preview_process.Order | preview_process.FollowRequest) -> None:
         self._orders.append(order)
 
     def leave(self) -> None:
@@ -187,7 +187,7 @@ async def taken(camera: Camera, planning: Kept) -> None:
 
 async def session(package: Path) -> dict[Mode, bytes]:
     """PNGs by state."""
-    config, teleop = load_folder(Config, PROJECT / "conf/live"), load_folder(Teleop, PROJECT / "conf/teleop")
+    config, teleop = load_folder(SessionConfig, PROJECT / "conf/live"), load_folder(Teleop, PROJECT / "conf/teleop")
     safety = replace(teleop.core.safety, silence=SILENCE, plan_wait=PATIENCE)
     teleop = replace(teleop, core=replace(teleop.core, safety=safety))
     lease.SILENCE, robot.STALE = SILENCE, STALE

@@ -29,7 +29,7 @@ from trunkline.ar.session.alignment import (
     tilt,
     tip_of,
 )
-from trunkline.ar.session.alignment_procedure import UNTRACKED, Aligner, Held
+from trunkline.ar.session.alignment_procedure import UNTRACKED, AlignmentProcedure, ControllerPose
 from trunkline.ar.session.anchors import MOST, Anchor, Anchors
 from trunkline.ar.session.controller import HERE
 from trunkline.ar.teleop.messages import Pose
@@ -178,7 +178,7 @@ class Person:
         for position, quaternion in zip(*turned(400, 30, self.rng), strict=True):
             if self.aligner.step != "tip":
                 return
-            self.hear(Held(tuple(position), tuple(quaternion)), np.zeros(3))
+            self.hear(ControllerPose(tuple(position), tuple(quaternion)), np.zeros(3))
 
     def touch(self, mark, off=0.0):
         """Rests with the tip at `mark` of the base, `off` m beside it."""
@@ -186,9 +186,9 @@ class Person:
         turn = Rotation.from_rotvec(0.3 * self.rng.normal(size=3))
         for _ in range(60):
             shaky = point + self.rng.normal(scale=self.sigma, size=3)
-            self.hear(Held(tuple(shaky - turn.apply(TIP)), tuple(wxyz_from_rotation(turn))), mark)
+            self.hear(ControllerPose(tuple(shaky - turn.apply(TIP)), tuple(wxyz_from_rotation(turn))), mark)
         for _ in range(5):
-            self.hear(Held(tuple(point + 0.1), tuple(wxyz_from_rotation(turn))), mark)
+            self.hear(ControllerPose(tuple(point + 0.1), tuple(wxyz_from_rotation(turn))), mark)
 
     def align(self, bad=None):
         self.aligner.touch()
@@ -198,7 +198,7 @@ class Person:
 
 
 def aligner(known=None, **changes):
-    return Aligner(replace(live().alignment, **changes), known)
+    return AlignmentProcedure(replace(live().alignment, **changes), known)
 
 
 def test_the_base_is_aligned_by_six_touches_and_its_error_is_told_before_anything_moves():
@@ -250,7 +250,7 @@ def test_a_tip_that_is_turned_too_little_is_said_and_then_found():
     person = Person(found)
     found.touch()
     for position, quaternion in zip(*turned(300, 5, person.rng), strict=True):
-        person.hear(Held(tuple(position), tuple(quaternion)))
+        person.hear(ControllerPose(tuple(position), tuple(quaternion)))
     assert (found.step, "of turn about one axis" in found.said) == ("tip", True)
     person.pivot()
     assert found.step == "touch"

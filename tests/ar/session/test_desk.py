@@ -15,10 +15,10 @@ from tests.support.operator import PACKAGE, Everywhere
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import messages, preview_process
 from trunkline.ar.session.binary import HAND, Received
-from trunkline.ar.session.controller import MOST_INPUTS, Desk
+from trunkline.ar.session.controller import MOST_INPUTS, SessionController
 from trunkline.ar.session.follow import SILENT
-from trunkline.ar.session.log_writer import Journal
-from trunkline.ar.session.robot import Standing
+from trunkline.ar.session.log_writer import LogWriter
+from trunkline.ar.session.robot import RobotState
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.executor import FOLLOWS, SimulatedRobot
 from trunkline.ar.teleop.messages import Box, ExecutorReport, Intent, PlanReport, Pose
@@ -60,7 +60,7 @@ class ToldRobot:
         return self.report
 
     def standing(self):
-        return Standing(0.0, 0.0, START, STRAIGHT, NOTHING, np.zeros((BODIES, 7)))
+        return RobotState(0.0, 0.0, START, STRAIGHT, NOTHING, np.zeros((BODIES, 7)))
 
 
 class Ordered:
@@ -76,9 +76,9 @@ class Ordered:
         self.left += 1
 
 
-def desk_of(robot, planning=None, journal=None, world=None) -> Desk:
+def desk_of(robot, planning=None, journal=None, world=None) -> SessionController:
     core = Teleoperation(patient(), Everywhere(), PACKAGE, OFFSET)
-    return Desk(core, robot, planning or Ordered(), world or make_world(()), 0.1, journal)
+    return SessionController(core, robot, planning or Ordered(), world or make_world(()), 0.1, journal)
 
 
 def some_plan(package=PACKAGE) -> Plan:
@@ -127,7 +127,7 @@ def blocked(desk, how):
 @pytest.mark.parametrize("motion", ["execute", "follow"])
 def test_where_nothing_may_be_executed_nothing_is_started_or_permitted(motion, how):
     robot = ToldRobot()
-    desk = desk_of(robot, journal=Journal())
+    desk = desk_of(robot, journal=LogWriter())
     desk.plan = some_plan()
     blocked(desk, how)
     execute = some_plan().digest() if motion == "execute" else ""
@@ -140,7 +140,7 @@ def test_where_nothing_may_be_executed_nothing_is_started_or_permitted(motion, h
 @pytest.mark.parametrize("how", ["unfit", "log"])
 def test_what_runs_is_stopped_as_soon_as_nothing_may_be_executed_and_permitted_no_more(how):
     robot = ToldRobot("running")
-    desk = desk_of(robot, journal=Journal())
+    desk = desk_of(robot, journal=LogWriter())
     desk.plan = some_plan()
     desk._drive(intent("execute", some_plan().digest()))
     blocked(desk, how)
@@ -291,12 +291,12 @@ def test_of_more_inputs_than_a_tick_takes_the_oldest_are_left_out():
 # --- what has been shown
 
 
-def previewed(**changes) -> Desk:
+def previewed(**changes) -> SessionController:
     """A desk at whose preview a client looks since 10 s."""
     desk = desk_of(ToldRobot())
     desk.intent = replace(intent("preview"), preview=DIGEST)
-    desk.preview, desk._since = messages.Preview(DIGEST, 0.02, PREVIEW, 0.02, ()), 10.0
-    desk.pieces = [preview_process.Shown(1, 0, 0.0, np.zeros((1, BODIES, 7)), last) for last in (False, True)]
+    desk.preview, desk._since = messages.PreviewMessage(DIGEST, 0.02, PREVIEW, 0.02, ()), 10.0
+    desk.pieces = [preview_process.PreviewPiece(1, 0, 0.0, np.zeros((1, BODIES, 7)), last) for last in (False, True)]
     for name, value in changes.items():
         setattr(desk, name, value)
     return desk
@@ -308,12 +308,12 @@ SHOWN = [
     ({}, "e" * 64, PREVIEW, f"shown: found digest 'eeeeeeeeeeee', expected {DIGEST[:12]}"),
     ({}, "", PREVIEW, f"shown: found digest '', expected {DIGEST[:12]}"),
     ({"pieces": []}, DIGEST, PREVIEW, "shown: its preview is not simulated to its end yet"),
-    ({"pieces": [preview_process.Shown(1, 0, 0.0, np.zeros((1, BODIES, 7)), False)]}, DIGEST, PREVIEW,
+    ({"pieces": [preview_process.PreviewPiece(1, 0, 0.0, np.zeros((1, BODIES, 7)), False)]}, DIGEST, PREVIEW,
      "shown: its preview is not simulated to its end yet"),
     ({"intent": None}, DIGEST, PREVIEW, "shown: no plan is previewed"),
     ({"intent": intent("aim")}, "", PREVIEW, "shown: no plan is previewed"),
     ({"preview": None}, DIGEST, PREVIEW, "shown: no plan is previewed"),
-    ({"preview": messages.Preview("e" * 64, 0.02, PREVIEW, 0.02, ())}, DIGEST, PREVIEW, "shown: no plan is previewed"),
+    ({"preview": messages.PreviewMessage("e" * 64, 0.02, PREVIEW, 0.02, ())}, DIGEST, PREVIEW, "shown: no plan is previewed"),
 ]  # fmt: skip
 
 
@@ -328,11 +328,11 @@ def test_what_counts_as_shown_to_its_end(changes, digest, after, said):
 def test_only_an_answer_to_what_was_asked_for_last_counts(serial, counts):
     desk = desk_of(ToldRobot())
     desk._asked = 3
-    plan, told = some_plan(), messages.Foreseen(DIGEST, None, None, None, (), (), (), 0.9, 12)
+    plan, told = some_plan(), messages.PredictionMessage(DIGEST, None, None, None, (), (), (), 0.9, 12)
     answers = [
-        preview_process.Planned(PlanReport(serial, plan.digest(), "", PACKAGE, "world"), plan),
-        preview_process.Begun(serial, messages.Preview(DIGEST, 0.02, PREVIEW, 0.02, ())),
-        preview_process.Shown(serial, 0, 0.0, np.zeros((1, BODIES, 7)), True), preview_process.Told(serial, told),
+        preview_process.PlanAnswer(PlanReport(serial, plan.digest(), "", PACKAGE, "world"), plan),
+        preview_process.PreviewBegun(serial, messages.PreviewMessage(DIGEST, 0.02, PREVIEW, 0.02, ())),
+        preview_process.PreviewPiece(serial, 0, 0.0, np.zeros((1, BODIES, 7)), True), preview_process.PredictionAnswer(serial, told),
     ]  # fmt: skip
     assert [desk.answered(answer, 0.0) for answer in answers] == [counts] * 4
     assert [desk.plan is plan, desk.preview is not None, bool(desk.pieces), desk.foreseen is told] == [counts] * 4
@@ -366,7 +366,7 @@ class PlayedRobot(SimulatedRobot):
         super().stop()
 
     def standing(self):
-        return Standing(0.0, 0.0, self.joints, self.commands, NOTHING, np.zeros((BODIES, 7)))
+        return RobotState(0.0, 0.0, self.joints, self.commands, NOTHING, np.zeros((BODIES, 7)))
 
 
 class Played:
@@ -374,7 +374,7 @@ class Played:
 
     def __init__(self):
         self.now, self.robot, self.planning = 100.0, PlayedRobot(), PlainPlanning()
-        self.desk = desk_of(self.robot, self.planning, Journal())
+        self.desk = desk_of(self.robot, self.planning, LogWriter())
         self.planning.heard = lambda answer: self.desk.answered(answer, self.now)
         self.desk.control(BASE)
         self.left, self.right, self.flags = {}, {}, TRACKED

@@ -21,8 +21,8 @@ from trunkline.ar.preview.grasp_preview import Foresight
 from trunkline.ar.preview.preview_twin import Believed
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import preview_process
-from trunkline.ar.session.preview_process import Foreseer, Order, Overtaken
-from trunkline.ar.session.settings import Config
+from trunkline.ar.session.preview_process import Order, Overtaken, PreviewPlanner
+from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.teleop.grasping import Grasping
 from trunkline.ar.teleop.messages import Box, Target, Thing
 from trunkline.ar.teleop.object_shapes import below_grip
@@ -35,16 +35,16 @@ FUTURES = 3
 
 
 @cache
-def made() -> Foreseer:
+def made() -> PreviewPlanner:
     s, spec = simulation(), small_spec()
-    live, robot = load_folder(Config, PROJECT / "conf/live"), load_folder(HybridSettings, PROJECT / "conf/hybrid").robot
+    live, robot = load_folder(SessionConfig, PROJECT / "conf/live"), load_folder(HybridSettings, PROJECT / "conf/hybrid").robot
     grips = {"hanging": SideGrip(config().hanging, read_geometry(spec))}
     rigid = RigidIK(OFFSET)
     grasping = Grasping(rigid, OFFSET, s.commands, grips, config().handling)
     bends = lambda poses: {k: v - 0.5 + s.commands if k != "tip" else v for k, v in NETWORK.ask(poses).items()}  # noqa: E731
     planner = Planner(rigid, replace(NETWORK, ask=bends), s.commands, LIMITS, OFFSET, step=0.01, grasping=grasping)
     known = Believed(spec, Doubts(contact=Contact()), robot)
-    return Foreseer(planner, Foresight(known, grips, replace(live.preview, futures=FUTURES)), s.bodies)
+    return PreviewPlanner(planner, Foresight(known, grips, replace(live.preview, futures=FUTURES)), s.bodies)
 
 
 def order(serial=1, thing="", tip=TIP) -> Order:
@@ -58,12 +58,12 @@ def test_a_plan_then_its_preview_in_pieces_then_the_batch():
     answers = list(made().answers(order(7)))
     planned, begun, *pieces, told = answers
     assert [type(one) for one in (planned, begun, told)] == [
-        preview_process.Planned,
-        preview_process.Begun,
-        preview_process.Told,
+        preview_process.PlanAnswer,
+        preview_process.PreviewBegun,
+        preview_process.PredictionAnswer,
     ]
     assert planned.report.digest == planned.plan.digest() == begun.preview.digest == told.foreseen.digest
-    assert {one.report.serial if isinstance(one, preview_process.Planned) else one.serial for one in answers} == {7}
+    assert {one.report.serial if isinstance(one, preview_process.PlanAnswer) else one.serial for one in answers} == {7}
     assert [piece.last for piece in pieces] == [False] * (len(pieces) - 1) + [True]
     frames = np.cumsum([0] + [len(piece.poses) for piece in pieces])
     assert [piece.first for piece in pieces] == list(frames[:-1])
@@ -78,12 +78,12 @@ def test_a_plan_then_its_preview_in_pieces_then_the_batch():
 
 
 def test_the_first_plan_in_a_world_that_was_prepared_for_composes_no_twin(monkeypatch):
-    once = Foreseer(made().planner, made().foresight, made().bodies)
+    once = PreviewPlanner(made().planner, made().foresight, made().bodies)
     once.prepare(order())
     composed = []
     monkeypatch.setattr(preview_process, "compose_twin", lambda *given: composed.append(given))
     assert isinstance(
-        next(one for one in once.answers(order(2)) if isinstance(one, preview_process.Shown)), preview_process.Shown
+        next(one for one in once.answers(order(2)) if isinstance(one, preview_process.PreviewPiece)), preview_process.PreviewPiece
     )
     assert not composed
 
@@ -115,15 +115,15 @@ def test_what_is_held_is_seen_in_the_arm_and_brought_to_rest_or_not():
     assert [name for name, _ in planned.plan.phases] == ["transfer", "release"]
     assert told.foreseen.probability is not None
     assert told.foreseen.low <= told.foreseen.probability <= told.foreseen.high
-    *_, blind = Foreseer(planner, made_once.foresight, made_once.bodies).answers(brought)
+    *_, blind = PreviewPlanner(planner, made_once.foresight, made_once.bodies).answers(brought)
     assert blind.foreseen.probability is None
 
 
 def test_the_assistants_offer_comes_after_what_the_batch_tells():
     known, bodies = made().foresight, made().bodies
     helpful = replace(known, settings=replace(known.settings, futures=2, assistant=1, sure=1.0, lifted=0.9))
-    answers = list(Foreseer(made().planner, helpful, bodies).answers(order(8, "the cylinder")))
-    tolds = [one for one in answers if isinstance(one, preview_process.Told)]
+    answers = list(PreviewPlanner(made().planner, helpful, bodies).answers(order(8, "the cylinder")))
+    tolds = [one for one in answers if isinstance(one, preview_process.PredictionAnswer)]
     assert [one.foreseen.probability for one in tolds] == [0.0, 0.0]  # nothing is lifted by so much, wherever
     assert tolds[0].foreseen.offer is None
     assert answers[-2:] == tolds
@@ -139,7 +139,7 @@ def answering(answers, orders, newest):
 
 def test_another_process_plans_where_one_has_ended():
     heard = queue.Queue()
-    process = preview_process.ForeseerProcess(answering, (), heard.put)
+    process = preview_process.PreviewProcess(answering, (), heard.put)
     try:
         first = process.pid
         for given, told in [(5, 5), (0, None), (6, 6)]:
@@ -152,7 +152,7 @@ def test_another_process_plans_where_one_has_ended():
 
 def test_a_process_that_cannot_begin_is_not_begun_again():
     heard = queue.Queue()
-    process = preview_process.ForeseerProcess(os._exit, (), heard.put)
+    process = preview_process.PreviewProcess(os._exit, (), heard.put)
     assert heard.get(timeout=60) is None
     time.sleep(0.2)
     assert not process.alive
@@ -172,20 +172,20 @@ def test_a_newer_order_ends_the_one_before_within_a_piece():
     class Pipe:
         def send(self, answer):
             sent.append(answer)
-            if sum(isinstance(one, preview_process.Shown) for one in sent) == 2:
+            if sum(isinstance(one, preview_process.PreviewPiece) for one in sent) == 2:
                 newest.value = 2
 
     given = [(1, order(1)), (2, order(2, tip=(0.5, 0.1, -0.6)))]
     orders = SimpleNamespace(get=lambda: given.pop(0))
     with pytest.raises(IndexError):  # there is no third
         preview_process.serve(Pipe(), orders, newest, made())
-    assert sum(isinstance(one, preview_process.Shown) for one in sent) == 2
-    assert isinstance(sent[-1], preview_process.Planned)
+    assert sum(isinstance(one, preview_process.PreviewPiece) for one in sent) == 2
+    assert isinstance(sent[-1], preview_process.PlanAnswer)
     assert sent[-1].report.serial == 2
 
 
 def test_what_breaks_a_preview_refuses_its_plan_and_not_the_next():
-    class Broken(Foreseer):
+    class Broken(PreviewPlanner):
         def _shown(self, *given):
             raise ValueError("two\nlines")
 
@@ -201,7 +201,7 @@ def test_an_order_that_is_left_goes_no_further():
         raise Overtaken
 
     answers = made().answers(order(1), go_on)
-    assert isinstance(next(answers), preview_process.Planned)
-    assert isinstance(next(answers), preview_process.Begun)
+    assert isinstance(next(answers), preview_process.PlanAnswer)
+    assert isinstance(next(answers), preview_process.PreviewBegun)
     with pytest.raises(Overtaken):
         next(answers)

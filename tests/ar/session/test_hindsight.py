@@ -11,11 +11,11 @@ from tests.ar.teleop.test_plan import OFFSET, START, STRAIGHT
 from tests.support.operator import Operator
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import messages
-from trunkline.ar.session.log_format import Book
-from trunkline.ar.session.log_reader import read_logbook
-from trunkline.ar.session.log_writer import Journal
-from trunkline.ar.session.preview_validation import Execution, _end, _held, _holds, executions, lines, main
-from trunkline.ar.session.robot import Standing
+from trunkline.ar.session.log_format import LogFormat
+from trunkline.ar.session.log_reader import read_session_log
+from trunkline.ar.session.log_writer import LogWriter
+from trunkline.ar.session.preview_validation import Execution, _end, _grasped, _holds, executions, lines, main
+from trunkline.ar.session.robot import RobotState
 from trunkline.ar.teleop.messages import ExecutorReport, Intent, Thing
 from trunkline.kinematics.panda.kinematics import joint_frames, mount_pose
 
@@ -44,11 +44,11 @@ def wrist(time):
     return np.concatenate([frame.p.T, turns.as_quat(scalar_first=True)], axis=1)
 
 
-class Clocked(Journal):
+class Clocked(LogWriter):
     def __init__(self, file, **hardware):
         self.time, subject = 99.0, replace(SUBJECT, **hardware)
         super().__init__(subject, lambda: self.time)
-        self.book = Book(file, subject, ZERO)
+        self.book = LogFormat(file, subject, ZERO)
 
     def keep(self, record):
         self.book.write(record)
@@ -61,7 +61,7 @@ def recorded(path, probability=0.8, held=True, end=None, spread=0.01, measured=F
         tip = {"body": SUBJECT.tip[0], "place": SUBJECT.tip[1]}
         journal.event("begin", package="p", tip=tip, mount_offset=OFFSET, **hardware)
         journal.event("world", world=make_world((), (CUP,)))
-        preview = messages.Preview(DIGEST, STEP, LASTS, STEP, (("approach", 0.0),))
+        preview = messages.PreviewMessage(DIGEST, STEP, LASTS, STEP, (("approach", 0.0),))
         journal.event("preview", preview=preview)
         times = np.arange(1, round(LASTS / STEP) + 1) * STEP
         for first in range(0, len(times), 20):
@@ -69,7 +69,7 @@ def recorded(path, probability=0.8, held=True, end=None, spread=0.01, measured=F
             rows = [wrist(times[first : first + 20]), piece, piece]
             journal.piece(first, float(times[first]), np.stack(rows, axis=1))
         tip = place(times[-1])[:3] + [0.0, 0.0, 0.1]
-        journal.event("foreseen", foreseen=messages.Foreseen(
+        journal.event("foreseen", foreseen=messages.PredictionMessage(
             DIGEST, probability, 0.6, 0.9, (LASTS,), (tuple(tip),), (spread,), 0.9, 12))  # fmt: skip
         journal.time = BEGIN
         journal.event("execute", digest=DIGEST, refused="")
@@ -81,7 +81,7 @@ def recorded(path, probability=0.8, held=True, end=None, spread=0.01, measured=F
                 break
             poses = np.stack([place(time - DELAY)] * len(NAMES)) + [0.0, 0.0, OFF, 0.0, 0.0, 0.0, 0.0]
             sensed = joints(time - DELAY) + OFF_JOINT if measured else None
-            journal.standing(Standing(journal.time, 0.0, START, STRAIGHT, poses[0], poses, sensed))
+            journal.standing(RobotState(journal.time, 0.0, START, STRAIGHT, poses[0], poses, sensed))
             intent: Intent = operator.step()
             journal.step(1 / 60, operator.given, intent)
         if end is None:
@@ -95,7 +95,7 @@ def recorded(path, probability=0.8, held=True, end=None, spread=0.01, measured=F
 
 
 def test_the_tip_is_compared_with_the_preview_whenever_the_robot_began(tmp_path):
-    (found,) = executions(read_logbook(recorded(tmp_path / "run.mcap")))
+    (found,) = executions(read_session_log(recorded(tmp_path / "run.mcap")))
     assert found.delay == pytest.approx(DELAY, abs=2e-3)
     assert found.median == pytest.approx(OFF, abs=2e-4)
     assert found.worst == pytest.approx(OFF, abs=5e-4)
@@ -105,7 +105,7 @@ def test_the_tip_is_compared_with_the_preview_whenever_the_robot_began(tmp_path)
 
 
 def test_what_did_not_come_about_counts_against_what_was_foreseen(tmp_path):
-    found = [next(executions(read_logbook(recorded(tmp_path / f"{n}.mcap", 0.8, n > 0, spread=1e-3)))) for n in (0, 1)]
+    found = [next(executions(read_session_log(recorded(tmp_path / f"{n}.mcap", 0.8, n > 0, spread=1e-3)))) for n in (0, 1)]
     assert [one.held for one in found] == [False, True]
     assert [one.within for one in found] == [False, False]  # the tip is 2 mm off, foreseen within 1
     assert lines(found)[-1] == (
@@ -115,7 +115,7 @@ def test_what_did_not_come_about_counts_against_what_was_foreseen(tmp_path):
 
 def test_of_a_plan_that_was_stopped_its_part_is_compared_and_no_outcome(tmp_path, capsys):
     path = recorded(tmp_path / "run.mcap", end=1.0)
-    (found,) = executions(read_logbook(path))
+    (found,) = executions(read_session_log(path))
     assert (found.end, found.within, found.held) == ("held", None, None)
     assert found.seconds == pytest.approx(1.0 - DELAY - STEP, abs=0.05)
     assert found.median == pytest.approx(OFF, abs=2e-4)
@@ -128,7 +128,7 @@ def test_of_a_plan_that_was_stopped_its_part_is_compared_and_no_outcome(tmp_path
 def test_of_a_real_machine_the_mount_is_compared_and_nobody_saw_the_arm(tmp_path, capsys):
     """A twin did and held what was foreseen."""
     path = recorded(tmp_path / "run.mcap", measured=True, hardware=REAL)
-    (found,) = executions(read_logbook(path))
+    (found,) = executions(read_session_log(path))
     assert (found.end, found.within, found.held, found.seen) == ("done", None, None, False)
     away = np.linalg.norm(np.diff(mount_pose(np.stack([START, START + OFF_JOINT]), OFFSET)[0], axis=0))
     assert found.delay == pytest.approx(DELAY, abs=2e-3)
@@ -144,14 +144,14 @@ def test_of_a_real_machine_the_mount_is_compared_and_nobody_saw_the_arm(tmp_path
 
 
 def test_of_motors_alone_nothing_is_compared(tmp_path):
-    (found,) = executions(read_logbook(recorded(tmp_path / "run.mcap", hardware="no real robot, motors 1, 2, 3")))
+    (found,) = executions(read_session_log(recorded(tmp_path / "run.mcap", hardware="no real robot, motors 1, 2, 3")))
     assert (found.end, found.seconds, found.within, found.held) == ("done", 0.0, None, None)
     assert np.isnan([found.median, found.worst, found.delay]).all()
 
 
 def test_where_nothing_was_executed_nothing_is_said(tmp_path):
     path = recorded(tmp_path / "run.mcap")
-    book = read_logbook(path)
+    book = read_session_log(path)
     refused = [event | {"refused": "busy"} if event["event"] == "execute" else event for event in book.events]
     book.events[:] = refused
     assert list(executions(book)) == []
@@ -187,7 +187,7 @@ HELD = [
 
 @pytest.mark.parametrize(("before", "later", "expected"), HELD)
 def test_what_came_of_a_grasp(before, later, expected):
-    assert _held(before, later) == expected
+    assert _grasped(before, later) == expected
 
 
 @pytest.mark.parametrize(

@@ -28,15 +28,15 @@ from tests.support.sessions import instruments, motion_truth, record
 from tests.support.ticking import fed, ticks
 from tests.support.workbench import ROOT
 from trunkline.ar.dataset.recording import read_recording
-from trunkline.ar.drivers.settings import Config as Execution
+from trunkline.ar.drivers.settings import ExecutionConfig as Execution
 from trunkline.ar.session import replay
 from trunkline.ar.session.binary import HANDS
 from trunkline.ar.session.composition import subject_of
 from trunkline.ar.session.hardware import hardware_of
-from trunkline.ar.session.log_format import EVENTS, POSES, TWIN, Book, Subject
-from trunkline.ar.session.log_reader import read_logbook
-from trunkline.ar.session.log_writer import Journal, JournalProcess, new_path
-from trunkline.ar.session.robot import Standing
+from trunkline.ar.session.log_format import EVENTS, POSES, TWIN, LogFormat, Subject
+from trunkline.ar.session.log_reader import read_session_log
+from trunkline.ar.session.log_writer import LogWriter, LogWriterProcess, new_path
+from trunkline.ar.session.robot import RobotState
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.messages import Input, Pose, from_json, to_json
 from trunkline.errors import InputError
@@ -55,14 +55,14 @@ PERIOD = 0.2
 REAL = "the robot fr3 at 192.168.1.11, no real motors"
 
 
-class Written(Journal):
+class Written(LogWriter):
     """One that writes here and now; `time` is its clock where it is set."""
 
     def __init__(self, path, subject=SUBJECT):
         super().__init__(subject, lambda: time.monotonic() if self.time is None else self.time)
         self.time = None
         self.file = open(path, "wb")  # noqa: SIM115
-        self.book = Book(self.file, subject, ZERO)
+        self.book = LogFormat(self.file, subject, ZERO)
 
     def keep(self, record):
         self.book.write(record)
@@ -110,7 +110,7 @@ def core(**changes):
 
 @pytest.mark.realtime
 def test_the_core_goes_through_a_log_again_to_the_same_bytes(log):
-    logbook = read_logbook(log)
+    logbook = read_session_log(log)
     assert logbook.damage == []
     assert len(logbook.steps) > RATE
     found = replay.core_of(logbook, PACKAGE, Everywhere())
@@ -120,7 +120,7 @@ def test_the_core_goes_through_a_log_again_to_the_same_bytes(log):
 
 @pytest.mark.realtime
 def test_the_first_difference_is_named_by_time_and_field(log):
-    steps = read_logbook(log).steps
+    steps = read_session_log(log).steps
     aiming = next(n for n, step in enumerate(steps) if b'"mode":"aim"' in step.intent and b'"targets":{' in step.intent)
     given = from_json(Input, steps[aiming].given)
     (x, y, z), turn = given.left.position, given.left
@@ -137,11 +137,11 @@ def test_the_first_difference_is_named_by_time_and_field(log):
 @pytest.mark.realtime
 def test_a_log_of_another_package_or_of_no_session_is_refused_by_name(log, tmp_path):
     with pytest.raises(InputError, match="package: found digest bbbbbbbbbbbb, expected aaaaaaaaaaaa"):
-        replay.core_of(read_logbook(log), "b" * 64, Everywhere())
+        replay.core_of(read_session_log(log), "b" * 64, Everywhere())
     path = tmp_path / "empty.mcap"
     Written(path).close()
     with pytest.raises(InputError, match="found no step of the core"):
-        read_logbook(path)
+        read_session_log(path)
 
 
 @pytest.mark.realtime
@@ -171,7 +171,7 @@ def told_of(path, truth, **hardware):
         pull, wound = truth.commands[row // 5], truth.tendon_positions[row]
         joints, nothing = START + 0.1 * np.sin(at), np.full(7, np.nan)
         poses = np.stack([base, base, *arm])
-        journal.standing(Standing(at, 0.0, joints, STRAIGHT - pull, nothing, poses, joints + 1e-4, STRAIGHT - wound))
+        journal.standing(RobotState(at, 0.0, joints, STRAIGHT - pull, nothing, poses, joints + 1e-4, STRAIGHT - wound))
         for part in ("left", "right", "view"):
             journal.headset(part, at, base, False)
         journal.step(1 / 120, operator.given, intent)
@@ -212,7 +212,7 @@ def test_what_a_twin_drew_of_a_real_machine_is_not_taken_for_the_arm(tmp_path, c
     merged(path, kept)
     with pytest.raises(InputError, match=f"no pose topic, found .*{TWIN}"):
         open_log(path, read_session(tmp_path))
-    logbook = read_logbook(path)
+    logbook = read_session_log(path)
     assert logbook.poses is None
     assert logbook.twin.names[-1] == "unit_08"
     assert read_recording(path).tip.names == ("tip.x.twin", "tip.y.twin", "tip.z.twin")
@@ -265,7 +265,7 @@ def test_with_motion_capture_merged_into_it_a_real_session_is_one_to_identify_fr
 
 @pytest.mark.realtime
 def test_a_log_says_what_of_its_robot_is_real(log):
-    assert read_logbook(log).begin["hardware"] == "simulated"
+    assert read_session_log(log).begin["hardware"] == "simulated"
     found = hardware_of("fr3", "simulated", "", "", load_folder(Execution, PROJECT / "conf/execution"))
     subject = subject_of(simulation(), found)
     assert (subject.hardware, subject.poses) == (found.words(), TWIN)
@@ -274,7 +274,7 @@ def test_a_log_says_what_of_its_robot_is_real(log):
 
 @pytest.mark.realtime
 def test_events_tell_who_controlled_what_was_planned_and_how_it_ended(log):
-    events = read_logbook(log).events
+    events = read_session_log(log).events
     kinds = [event["event"] for event in events]
     for kind in ("begin", "came", "clock", "control", "request", "planned", "preview", "piece", "foreseen", "shown",
                  "execute", "refused", "stop", "stopped", "left", "alignment", "world"):  # fmt: skip
@@ -315,11 +315,11 @@ def test_poses_that_are_no_newer_are_not_told_twice_and_what_is_not_there_is_lef
     poses = np.tile([1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0], (3, 1))
     poses[0] = np.nan
     for at in (1.0, 1.0, 0.9, 1.1):
-        journal.standing(Standing(at, 0.0, START, STRAIGHT, poses[0], poses))
+        journal.standing(RobotState(at, 0.0, START, STRAIGHT, poses[0], poses))
     operator = Operator()
     journal.step(0.1, operator.given, operator.step())
     journal.close()
-    found = read_logbook(tmp_path / "run.mcap").poses
+    found = read_session_log(tmp_path / "run.mcap").poses
     assert found.names == NAMES[1:]
     np.testing.assert_allclose(1e-9 * (found.stamps - ZERO), [1.0, 1.1], atol=1e-6)
 
@@ -327,7 +327,7 @@ def test_poses_that_are_no_newer_are_not_told_twice_and_what_is_not_there_is_lef
 def test_what_is_sent_and_what_is_measured_are_told_apart_and_what_is_not_measured_is_left_out(tmp_path):
     journal = Written(tmp_path / "run.mcap")
     poses, unknown = np.tile([1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0], (3, 1)), np.full(3, np.nan)
-    journal.standing(Standing(1.0, 0.0, START, STRAIGHT, poses[0], poses, START + 0.01, unknown))
+    journal.standing(RobotState(1.0, 0.0, START, STRAIGHT, poses[0], poses, START + 0.01, unknown))
     journal.close()
     with open(tmp_path / "run.mcap", "rb") as file:
         found = make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages()
@@ -351,7 +351,7 @@ def until(happens, seconds=20.0):
 @pytest.mark.realtime
 def test_a_process_that_is_killed_loses_less_than_a_second_and_says_so(tmp_path):
     path = tmp_path / "run.mcap"
-    journal = JournalProcess(path, SUBJECT, PERIOD)
+    journal = LogWriterProcess(path, SUBJECT, PERIOD)
     journal.event("tick", number=0)
     until(lambda: path.exists() and path.stat().st_size > 500)
     told = fed(journal, 1.5)
@@ -386,7 +386,7 @@ if __name__ == "__main__":
 @pytest.mark.realtime
 def test_a_process_that_hangs_is_a_fault_before_more_than_a_second_is_lost(tmp_path):
     path = tmp_path / "run.mcap"
-    journal = JournalProcess(path, SUBJECT, 0.5)
+    journal = LogWriterProcess(path, SUBJECT, 0.5)
     journal.event("tick", number=0)
     until(lambda: path.exists() and path.stat().st_size > 500)
     told = fed(journal, 1.2)
@@ -414,7 +414,7 @@ def test_a_process_that_hangs_is_a_fault_before_more_than_a_second_is_lost(tmp_p
 @pytest.mark.realtime
 def test_a_process_that_stalls_for_a_moment_is_no_fault(tmp_path):
     path = tmp_path / "run.mcap"
-    journal = JournalProcess(path, SUBJECT, 0.5)
+    journal = LogWriterProcess(path, SUBJECT, 0.5)
     journal.await_begun()
     told = len(fed(journal, 0.7))
     os.kill(journal.pid, signal.SIGSTOP)
@@ -462,13 +462,13 @@ def test_a_machine_that_stands_still_as_a_whole_is_no_fault(tmp_path):
 
 def test_a_session_waits_until_its_log_has_begun(tmp_path, monkeypatch):
     path = tmp_path / "run.mcap"
-    journal = JournalProcess(path, SUBJECT, PERIOD)
+    journal = LogWriterProcess(path, SUBJECT, PERIOD)
     journal.await_begun()
     assert path.exists()
     journal.close()
     monkeypatch.setattr("trunkline.ar.session.log_writer.BEGINS", 0.3)
     monkeypatch.setattr("trunkline.ar.session.log_writer.PATIENCE", 0.1)
-    hangs = JournalProcess(tmp_path / "other.mcap", SUBJECT, PERIOD, stuck)
+    hangs = LogWriterProcess(tmp_path / "other.mcap", SUBJECT, PERIOD, stuck)
     hangs.await_begun()
     assert hangs.fault == "log: other.mcap: its process has not begun for 0.3 s; nothing is executed"
     hangs.close()
@@ -487,7 +487,7 @@ def test_where_the_session_itself_is_killed_its_log_is_ended_as_it_should(tmp_pa
 
 
 def test_a_session_that_ends_leaves_a_whole_file(tmp_path):
-    journal = JournalProcess(tmp_path / "ended.mcap", SUBJECT, PERIOD)
+    journal = LogWriterProcess(tmp_path / "ended.mcap", SUBJECT, PERIOD)
     told = len(fed(journal, 0.2))
     journal.close()
     numbers, damage = ticks(tmp_path / "ended.mcap")
@@ -499,7 +499,7 @@ def test_a_session_that_ends_leaves_a_whole_file(tmp_path):
 @pytest.mark.parametrize("opened", [full, filling])
 def test_a_full_disk_is_said_in_one_line_and_what_was_written_stays(tmp_path, opened):
     path = tmp_path / "run.mcap"
-    journal = JournalProcess(path, SUBJECT, PERIOD, opened)
+    journal = LogWriterProcess(path, SUBJECT, PERIOD, opened)
     numbers = count(1)
 
     def fails():
@@ -520,7 +520,7 @@ def test_a_full_disk_is_said_in_one_line_and_what_was_written_stays(tmp_path, op
 def test_a_disk_that_does_not_answer_delays_nobody(tmp_path, monkeypatch):
     monkeypatch.setattr("trunkline.ar.session.log_writer.MOST", 200)
     monkeypatch.setattr("trunkline.ar.session.log_writer.PATIENCE", 0.1)
-    journal = JournalProcess(tmp_path / "run.mcap", SUBJECT, PERIOD, stuck)
+    journal = LogWriterProcess(tmp_path / "run.mcap", SUBJECT, PERIOD, stuck)
     longest = 0.0
     gc.disable()  # a collection of all that the tests have loaded is not the journal's
     for number in range(20_000):
@@ -535,7 +535,7 @@ def test_a_disk_that_does_not_answer_delays_nobody(tmp_path, monkeypatch):
     journal.close()
 
 
-class Failing(Journal):
+class Failing(LogWriter):
     fault = ""
 
 

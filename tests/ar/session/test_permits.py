@@ -16,7 +16,7 @@ from trunkline.ar.session import robot as seen
 from trunkline.ar.session import simulated
 from trunkline.ar.session.robot import (
     DEAD_MAN,
-    HELD,
+    HOLD_TIME,
     LOOKS,
     MODE,
     MODES,
@@ -27,8 +27,8 @@ from trunkline.ar.session.robot import (
     STALE,
     STOPS,
     TIME,
-    Channel,
     Goal,
+    RobotChannel,
     RobotProcess,
 )
 from trunkline.ar.session.simulated import LISTENS, Loop
@@ -53,7 +53,7 @@ class Played:
     """The robot's process, turn by turn; `serial`: of what was started last."""
 
     def __init__(self):
-        self.channel = Channel(multiprocessing.get_context("spawn"), 3, 0)
+        self.channel = RobotChannel(multiprocessing.get_context("spawn"), 3, 0)
         self.channel.plans = queue.Queue()
         self.plant = Still()
         self.robot = SimulatedRobot(START, STRAIGHT, LIMITS, PACKAGE)
@@ -125,13 +125,13 @@ def test_without_a_permit_it_brakes_after_so_long_and_goes_on_by_none(played):
     assert played.robot._pace == 1.0
     played.turn(2 * TICK, permits=False)
     assert played.robot._pace < 1.0
-    held = played.told[0][HELD]
+    held = played.told[0][HOLD_TIME]
     assert DEAD_MAN <= held - (BEGINS + 0.5) + NEAR < DEAD_MAN + 2 * TICK
     played.turn(BRAKE / 2, permits=False)
-    assert played.told[0][HELD] == held  # when it was told to hold, not since when it rests
+    assert played.told[0][HOLD_TIME] == held  # when it was told to hold, not since when it rests
     played.turn(BRAKE)  # permitted again
     assert played.mode == "idle"
-    assert played.told[0][HELD] == held
+    assert played.told[0][HOLD_TIME] == held
     assert played.rests()
 
 
@@ -140,7 +140,7 @@ def test_a_stop_counts_though_it_is_permitted(played, times):
     played.begin(plan_of()).turn(0.5)
     played.channel.asked[STOPS] += times
     played.turn(TICK)
-    assert played.told[0][HELD] == played.now
+    assert played.told[0][HOLD_TIME] == played.now
     assert played.robot._pace < 1.0
     played.turn(BRAKE)
     assert played.mode == "idle"
@@ -190,7 +190,7 @@ def test_a_plant_that_fails_stops_the_robot_and_lasts(played, monkeypatch):
     played.turn(TICK)
     assert played.mode == "fault"
     assert played.told[1] == "motors: silent"
-    assert played.told[0][HELD] == played.now
+    assert played.told[0][HOLD_TIME] == played.now
     played.turn(BRAKE + TICK)
     assert played.rests()
     assert played.begin(plan_of()).mode == "fault"

@@ -12,8 +12,8 @@ from tests.ar.session.test_journal import NAMES, REAL, SUBJECT, Written
 from tests.ar.teleop.test_plan import START, STRAIGHT
 from tests.support.operator import Operator
 from trunkline.ar.session import binary, recording
-from trunkline.ar.session.log_reader import read_logbook
-from trunkline.ar.session.robot import Standing
+from trunkline.ar.session.log_reader import read_session_log
+from trunkline.ar.session.robot import RobotState
 from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT
 
@@ -43,7 +43,7 @@ def written(path, **hardware):
         journal.time = at = BEGUN + number / RATE
         if not number:
             journal.event("begin")
-        journal.standing(Standing(at, 0.0, START, STRAIGHT, np.full(7, np.nan), moved(at)))
+        journal.standing(RobotState(at, 0.0, START, STRAIGHT, np.full(7, np.nan), moved(at)))
         journal.step(1 / RATE, operator.given, intent)
     journal.close()
     return path
@@ -74,7 +74,7 @@ def test_the_page_reads_the_poses_of_the_log_at_their_times(log, tmp_path, capsy
 
 
 def test_each_frame_has_the_servers_time_of_its_pose(log):
-    for number, message in enumerate(recording.recorded(read_logbook(log))):
+    for number, message in enumerate(recording.recorded(read_session_log(log))):
         (size,) = recording.LENGTH.unpack_from(message)
         assert size == len(message) - recording.LENGTH.size
         kind, _, count, _, time = binary._HEAD.unpack_from(message, recording.LENGTH.size)
@@ -84,7 +84,7 @@ def test_each_frame_has_the_servers_time_of_its_pose(log):
 
 def test_of_a_real_machine_its_twin_is_shown_and_called_so(log, tmp_path, capsys):
     twin = written(tmp_path / "real.mcap", hardware=REAL)
-    found, seen = (list(recording.recorded(read_logbook(path))) for path in (twin, log))
+    found, seen = (list(recording.recorded(read_session_log(path))) for path in (twin, log))
     assert found == seen
     assert recording.main([str(twin), str(tmp_path / "recording.bin")]) == 0
     assert "real.mcap: /tf_twin: its bodies are as a twin drew them: nobody saw the arm" in capsys.readouterr().out
@@ -96,4 +96,4 @@ def test_a_log_without_poses_is_refused_by_name(tmp_path):
     journal.step(1 / RATE, operator.given, intent)
     journal.close()
     with pytest.raises(InputError, match="run.mcap: /tf: found no poses"):
-        list(recording.recorded(read_logbook(tmp_path / "run.mcap")))
+        list(recording.recorded(read_session_log(tmp_path / "run.mcap")))

@@ -5,9 +5,9 @@ import pytest
 
 from tests.ar.session.test_journal import SUBJECT, Written
 from tests.ar.teleop.test_plan import START, STRAIGHT
-from trunkline.ar.session.decimation import AFTER, BEFORE, SELDOM, STILL, Resting
+from trunkline.ar.session.decimation import AFTER, BEFORE, SELDOM, STILL, LogDecimation
 from trunkline.ar.session.log_format import JOINTS_SENT, POSES
-from trunkline.ar.session.robot import Standing
+from trunkline.ar.session.robot import RobotState
 from trunkline.recordings.logs.joint_stream import joint_stream
 from trunkline.recordings.logs.log import read_log
 
@@ -21,7 +21,7 @@ def at(time, noise, speed):
     poses = np.tile([0.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0], (3, 1))
     poses[:, 0] = speed * np.clip(time - MOVES, 0.0, STOPS - MOVES)
     poses[0] = np.nan  # a thing that is not there
-    return Standing(time, 0.0, START, STRAIGHT, NOTHING, poses + noise, NOTHING, None)
+    return RobotState(time, 0.0, START, STRAIGHT, NOTHING, poses + noise, NOTHING, None)
 
 
 def told(speed):
@@ -30,7 +30,7 @@ def told(speed):
 
 
 def kept(standings):
-    resting = Resting()
+    resting = LogDecimation()
     found = [one for robot in standings for one in resting.take(robot, robot.time + 1.0)]
     return found + resting.rest()
 
@@ -60,12 +60,12 @@ def test_what_is_sent_moves_a_robot_however_little_and_what_appears_does():
     rests = told(0.0)[: round(RATE * MOVES)]
     for change in ({"joints": START + 1e-12}, {"commands": STRAIGHT - 1e-12}, {"measured": START},
                    {"bodies": np.nan_to_num(rests[0].bodies)}, {}):  # fmt: skip
-        resting = Resting()
+        resting = LogDecimation()
         for robot in rests:
             resting.take(robot, robot.time)
         last = rests[-1]
         fields = {name: getattr(last, name) for name in ("joints", "commands", "thing", "bodies", "measured")} | change
-        found = resting.take(Standing(MOVES, 0.0, **fields), MOVES)
+        found = resting.take(RobotState(MOVES, 0.0, **fields), MOVES)
         assert bool(found and found[-1][0].time == MOVES) == bool(change), change
 
 

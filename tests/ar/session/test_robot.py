@@ -19,7 +19,7 @@ from trunkline.ar.hybrid.settings import HybridSettings
 from trunkline.ar.preview.preview_twin import Believed, compose_twin
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import simulated
-from trunkline.ar.session.bodies import Poses, drawn
+from trunkline.ar.session.bodies import BodyPoses, drawn_bodies
 from trunkline.ar.session.composition import SEARCH, subject_of
 from trunkline.ar.session.log_reader import tip_path
 from trunkline.ar.session.robot import (
@@ -32,12 +32,12 @@ from trunkline.ar.session.robot import (
     POSE,
     STOPS,
     TELLS,
-    Channel,
+    RobotChannel,
     RobotProcess,
-    told_by,
+    next_report_time,
 )  # fmt: skip
-from trunkline.ar.session.settings import Config
-from trunkline.ar.session.simulated import Loop, Plant, Simulation, drive
+from trunkline.ar.session.settings import SessionConfig
+from trunkline.ar.session.simulated import Loop, Simulation, TwinPlant, drive
 from trunkline.ar.teleop.executor import SimulatedRobot
 from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.plan import Plan
@@ -49,13 +49,13 @@ LATE = 0.1  # s that a busy machine may take to schedule a process
 
 @cache
 def simulation():
-    live, robot = load_folder(Config, PROJECT / "conf/live"), load_folder(HybridSettings, PROJECT / "conf/hybrid").robot
+    live, robot = load_folder(SessionConfig, PROJECT / "conf/live"), load_folder(HybridSettings, PROJECT / "conf/hybrid").robot
     spec = small_spec()
     arm = spec.compile()
     straight, known = arm.tendon_length0[arm.actuator_trnid[:, 0]], Believed(spec, Doubts(), robot)
     twin = compose_twin(known, make_world(()), None, SEARCH, straight, live.preview)
     limits, offset = limits_of(config().motors), config().mount_offset
-    return Simulation(twin, SEARCH, straight, drawn(twin.model), limits, PACKAGE, offset)
+    return Simulation(twin, SEARCH, straight, drawn_bodies(twin.model), limits, PACKAGE, offset)
 
 
 @cache
@@ -70,9 +70,9 @@ def plan():
 
 
 def test_the_robot_does_what_the_preview_shows():
-    s, plant = simulation(), Plant(simulation())
+    s, plant = simulation(), TwinPlant(simulation())
     shown = joined(list(nominal(s.twin, Way(plan().step, plan().joints, plan().commands))))
-    poses, tip = Poses(s.twin.model, s.bodies), s.bodies.index("unit_08")
+    poses, tip = BodyPoses(s.twin.model, s.bodies), s.bodies.index("unit_08")
     time, away = 0.0, []
     for row, until in enumerate(shown.time + s.twin.model.opt.timestep):  # of the step that ends with a frame
         while time < until - plant.tick / 2:
@@ -269,7 +269,7 @@ class Still:
 @pytest.mark.realtime
 def test_where_its_server_is_gone_it_brakes_along_the_plan_before_it_ends():
     s, gone = simulation(), -1
-    channel = Channel(multiprocessing.get_context("spawn"), 3, 0)
+    channel = RobotChannel(multiprocessing.get_context("spawn"), 3, 0)
     channel.plans = queue.Queue()
     robot = SimulatedRobot(s.joints, s.commands, s.limits, PACKAGE, lambda joints, commands, dt: None)
     loop = Loop(channel, robot, Still())
@@ -288,6 +288,6 @@ def test_where_its_server_is_gone_it_brakes_along_the_plan_before_it_ends():
 
 def test_the_next_telling_is_the_first_from_when_it_is_wanted():
     for told in (0.0, 0.9995, 1.0, 1.002, 3.0):
-        after = told_by(1.0, told) - FRESH
+        after = next_report_time(1.0, told) - FRESH
         assert 1.0 - 1e-9 <= after < 1.0 + TELLS
         assert (after - told) / TELLS == pytest.approx(round((after - told) / TELLS))

@@ -15,7 +15,7 @@ from trunkline.ar.session.auth import CODE_SECONDS, CODE_TRIES, PairingCode
 from trunkline.ar.session.certificate import fingerprint, make_certificate, tls_context
 from trunkline.ar.session.clock import FORWARD, JUMP, LATEST, PINGS, ClientClock
 from trunkline.ar.session.lease import SILENCE, Control
-from trunkline.ar.session.outbox import MOST_SAID, WINDOW, Outbox
+from trunkline.ar.session.outbox import MOST_MESSAGES, WINDOW, Outbox
 from trunkline.errors import InputError
 
 NEAR = 1e-6  # s, to either side of a border
@@ -197,7 +197,7 @@ def test_frames_and_pieces_take_turns_and_what_is_said_comes_first():
         box.state("state", "old")
         box.state("state", "new")
         assert [box.take() for _ in range(6)] == ["said", "new", b"f2", b"p0", b"p1", None]
-        assert all(box.say("x") for _ in range(MOST_SAID))
+        assert all(box.say("x") for _ in range(MOST_MESSAGES))
         assert not box.say("x")
 
     asyncio.run(go())

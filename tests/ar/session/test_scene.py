@@ -6,7 +6,7 @@ import pytest
 import trimesh
 from point_cloud_utils import signed_distance_to_mesh
 
-from trunkline.ar.session.bodies import drawn
+from trunkline.ar.session.bodies import drawn_bodies
 from trunkline.ar.session.scene import MOST_TRIANGLES, SHELL_TRIANGLES, scene
 from trunkline.kinematics.panda.shipped import shipped_panda
 
@@ -38,7 +38,7 @@ def model() -> mujoco.MjModel:
 
 @pytest.fixture(scope="module")
 def found(model) -> dict:
-    return scene(model, drawn(model), empty(), 0.5)
+    return scene(model, drawn_bodies(model), empty(), 0.5)
 
 
 def empty() -> dict[str, np.ndarray]:
@@ -61,7 +61,7 @@ def test_geoms_are_those_that_are_seen_each_on_its_body(found):
 
 def test_meshes_are_decimated_to_what_may_be_drawn_and_stay_where_they_are():
     panda = shipped_panda(0.05).compile()
-    meshes = scene(panda, drawn(panda), empty(), 0.5)["meshes"]
+    meshes = scene(panda, drawn_bodies(panda), empty(), 0.5)["meshes"]
     assert panda.mesh_facenum.sum() > 5 * MOST_TRIANGLES
     assert sum(len(mesh["faces"]) for mesh in meshes) <= 3 * MOST_TRIANGLES
     assert len(meshes) == panda.nmesh

@@ -9,7 +9,7 @@ import pytest
 from tests.ar.session.test_desk import DIGEST, PACKAGE, STRAIGHT, ToldRobot, desk_of, intent, some_plan
 from tests.ar.session.test_permits import FOLLOWING, LIMITS, Played, plan_of
 from trunkline.ar.session import messages, preview_process
-from trunkline.ar.session.robot import DEAD_MAN, HELD, MODE, MODES, READY, SERIAL, STOPS, Goal
+from trunkline.ar.session.robot import DEAD_MAN, HOLD_TIME, MODE, MODES, READY, SERIAL, STOPS, Goal
 from trunkline.ar.teleop.executor import FOLLOWS
 from trunkline.ar.teleop.messages import ExecutorReport, PlanReport
 from trunkline.ar.teleop.plan import Plan
@@ -28,7 +28,7 @@ def test_a_stop_is_noted_unless_all_is_stopped_already(before, noted):
 
 def test_before_anything_was_started_a_robot_tells_so():
     numbers, fault = Played().told
-    assert (numbers[SERIAL], numbers[HELD], numbers[READY], fault) == (0, 0, 1, "")
+    assert (numbers[SERIAL], numbers[HOLD_TIME], numbers[READY], fault) == (0, 0, 1, "")
     assert MODES[int(numbers[MODE])] == "idle"
 
 
@@ -36,7 +36,7 @@ def test_an_answer_of_who_seeks_is_of_no_plan():
     """Whatever number it has."""
     desk, handed = desk_of(ToldRobot()), []
     desk._seeking = SimpleNamespace(found=handed.append)
-    answer = preview_process.Found(*[desk._asked] * len(fields(preview_process.Found)))
+    answer = preview_process.FollowAnswer(*[desk._asked] * len(fields(preview_process.FollowAnswer)))
     assert desk.answered(answer, 0.0) is False
     assert handed == [answer]
 
@@ -46,10 +46,10 @@ def test_what_was_planned_previewed_and_foreseen_is_noted():
     journal = SimpleNamespace(event=lambda name, **_: noted.append(name), piece=lambda *_: noted.append("piece"))
     desk, plan = desk_of(ToldRobot(), journal=journal), some_plan()
     for answer in (
-        preview_process.Planned(PlanReport(desk._asked, plan.digest(), "", PACKAGE, "world"), plan),
-        preview_process.Begun(desk._asked, messages.Preview(DIGEST, 0.02, 0.3, 0.02, ())),
-        preview_process.Shown(desk._asked, 0, 0.0, np.zeros((1, 1, 7)), True),
-        preview_process.Told(desk._asked, messages.Foreseen(DIGEST, None, None, None, (), (), (), 0.9, 12)),
+        preview_process.PlanAnswer(PlanReport(desk._asked, plan.digest(), "", PACKAGE, "world"), plan),
+        preview_process.PreviewBegun(desk._asked, messages.PreviewMessage(DIGEST, 0.02, 0.3, 0.02, ())),
+        preview_process.PreviewPiece(desk._asked, 0, 0.0, np.zeros((1, 1, 7)), True),
+        preview_process.PredictionAnswer(desk._asked, messages.PredictionMessage(DIGEST, None, None, None, (), (), (), 0.9, 12)),
     ):
         assert desk.answered(answer, 0.0)
     assert noted == ["planned", "preview", "piece", "foreseen"]
@@ -58,7 +58,7 @@ def test_what_was_planned_previewed_and_foreseen_is_noted():
 def test_a_robot_that_rests_needs_no_permit_and_is_held_by_none():
     played = Played()
     played.turn(0.5, permits=False)
-    assert played.told[0][HELD] == 0
+    assert played.told[0][HOLD_TIME] == 0
     assert played.begin(plan_of()).turn(0.1).mode == "running"
 
 
@@ -79,7 +79,7 @@ def test_of_several_stops_the_last_is_told():
     for _ in range(2):
         played.channel.asked[STOPS] += 1
         played.turn(2 * played.plant.tick)
-        assert played.told[0][HELD] == played.now - played.plant.tick
+        assert played.told[0][HOLD_TIME] == played.now - played.plant.tick
 
 
 def test_what_was_held_is_started_anew_and_has_not_come_to_rest_by_itself():
@@ -133,11 +133,11 @@ def test_a_fault_of_what_it_follows_is_told_and_lasts():
 def test_a_stop_of_what_nobody_permits_any_more_is_told_as_the_later():
     played = Played().begin(plan_of()).turn(0.05)
     played.turn(DEAD_MAN + 3 * played.plant.tick, permits=False)
-    ended = played.told[0][HELD]
+    ended = played.told[0][HOLD_TIME]
     played.channel.asked[STOPS] += 1
     played.turn(played.plant.tick, permits=False)
     assert played.mode == "running"  # it brakes still
-    assert played.told[0][HELD] == played.now > ended
+    assert played.told[0][HOLD_TIME] == played.now > ended
 
 
 def test_how_old_targets_are_is_told_with_them():

@@ -19,7 +19,7 @@ import numpy as np
 from pydantic import Field
 
 from trunkline.ar.drivers.driver import CONNECTING
-from trunkline.ar.drivers.driver_frames import Line, Setpoint, Told
+from trunkline.ar.drivers.driver_frames import DriverState, FrameSocket, Setpoint
 from trunkline.ar.drivers.driver_process import AXES
 from trunkline.errors import InputError
 
@@ -38,7 +38,7 @@ class ArmSettings:
     astray: Annotated[float, Field(gt=0, le=0.5)]
 
 
-class Adapted:
+class DriverClient:
     """A `Limb` of so many `axes` whose adapter is this `command`, with the socket's descriptor behind it.
 
     Attributes:
@@ -48,7 +48,7 @@ class Adapted:
         OSError: the command is not there.
     """
 
-    told: Told | None
+    told: DriverState | None
 
     def __init__(
         self, command: Sequence[str], axes: int, patience: float = CONNECTING, astray: float = math.inf, at: str = ""
@@ -58,7 +58,7 @@ class Adapted:
         self._axes, self._astray, self._at, self.fault, self.told = axes, astray, at, "", None
         self._patience, self._until = patience, time.monotonic() + patience
         ours, theirs = socket.socketpair()
-        self.line, path = Line(ours, Told.size(axes)), os.environ.get("PYTHONPATH", "")
+        self.line, path = FrameSocket(ours, DriverState.size(axes)), os.environ.get("PYTHONPATH", "")
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, (str(ROOT), path)))}
         try:
             self.process = subprocess.Popen(
@@ -109,7 +109,7 @@ class Adapted:
 
     def _hear(self) -> None:
         for frame in self.line.heard():
-            told = Told.unpack(frame)
+            told = DriverState.unpack(frame)
             if told.fault:
                 self._fail(told.fault)
             if self.told is not None or not told.fault:
@@ -118,7 +118,7 @@ class Adapted:
         if not self.line.open:
             self._fail("its adapter has ended")
 
-    def _look(self, told: Told) -> None:
+    def _look(self, told: DriverState) -> None:
         """Whether each joint is where it is sent."""
         off = np.abs(np.subtract(told.measured, told.sent))
         if not off.max() <= self._astray:  # or no number
@@ -129,7 +129,7 @@ class Adapted:
         self.fault = self.fault or fault
 
 
-def panda(settings: ArmSettings, robot: str) -> Adapted:
+def panda(settings: ArmSettings, robot: str) -> DriverClient:
     """A robot, "panda", "fr3" or "fake".
 
     Raises:
@@ -138,6 +138,6 @@ def panda(settings: ArmSettings, robot: str) -> Adapted:
     python = settings.python or sys.executable
     command = [python, "-m", "trunkline.ar.drivers.driver_process", robot, settings.address]
     try:
-        return Adapted(command, AXES, astray=settings.astray, at=f", expected {robot} at {settings.address}")
+        return DriverClient(command, AXES, astray=settings.astray, at=f", expected {robot} at {settings.address}")
     except OSError as error:
         raise InputError(f"arm.python: found {python} ({error.strerror}), expected a Python") from error

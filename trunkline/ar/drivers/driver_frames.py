@@ -35,7 +35,7 @@ class Setpoint:
 
 
 @dataclass(frozen=True)
-class Told:
+class DriverState:
     """At `time`, s: the axes as `measured` and as `sent`, rad or m; `fault` in words, "" for none."""
 
     time: float
@@ -54,14 +54,14 @@ class Told:
         return struct.pack(f"<{len(numbers)}d{TEXT}s", *numbers, text)
 
     @classmethod
-    def unpack(cls, data: bytes) -> "Told":
+    def unpack(cls, data: bytes) -> "DriverState":
         count = (len(data) - TEXT) // 8
         time, *axes, text = struct.unpack(f"<{count}d{TEXT}s", data)
         half = count // 2
         return cls(time, tuple(axes[:half]), tuple(axes[half:]), text.rstrip(b"\0").decode(errors="replace"))
 
 
-class Line:
+class FrameSocket:
     """One end of a socket that hears frames of `size` bytes; nothing waits. `open`: whether the other end is there."""
 
     def __init__(self, channel: socket.socket, size: int) -> None:
@@ -92,12 +92,12 @@ class Line:
         self._unsent = self._unsent or frame
         self._unsent = self._unsent[self._socket.send(self._unsent) :]
 
-    def tell(self, told: Told) -> None:
+    def tell(self, told: DriverState) -> None:
         """The same, unless nobody listens; whoever is slow misses a frame."""
         with contextlib.suppress(OSError):
             self.send(told.pack())
 
-    def end(self, told: Told) -> None:
+    def end(self, told: DriverState) -> None:
         """The last frame, for which it waits."""
         self._socket.settimeout(LAST)
         with contextlib.suppress(OSError):

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from trunkline.ar.drivers.gm6020 import FEEDBACK, Feedback
-from trunkline.ar.drivers.winch import Reel, ReelSettings
+from trunkline.ar.drivers.winch import Winch, WinchSettings
 
 SILENT = 0.02  # s without feedback of a motor
 HOMING = 60.0  # s
@@ -27,7 +27,7 @@ class MotorSettings:
     sides: tuple[Literal[-1, 1], ...]
     astray: Annotated[float, Field(gt=0, le=0.1)]
     hot: Annotated[float, Field(ge=30, le=120)]
-    reel: ReelSettings
+    reel: WinchSettings
 
     def __post_init__(self) -> None:
         if len(self.sides) != len(self.numbers):
@@ -50,12 +50,12 @@ class MotorsOnBus:
         return len(self.motors.numbers)
 
 
-class Motors:
+class MotorGroup:
     """Feedback in, currents out; it knows no bus and no clock. `begun`: s at which listening began."""
 
     def __init__(self, settings: MotorSettings, begun: float) -> None:
         self._settings, self._begun = settings, begun
-        self.reels = [Reel(settings.reel, side) for side in settings.sides]
+        self.reels = [Winch(settings.reel, side) for side in settings.sides]
         self._by_number = dict(zip(settings.numbers, self.reels, strict=True))
         self.fault = ""
 

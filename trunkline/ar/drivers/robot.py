@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from trunkline.ar.drivers.driver import TICK, Limb
+from trunkline.ar.drivers.driver import TICK, Driver
 from trunkline.ar.drivers.time_scaling import Smoother
 from trunkline.ar.teleop.trajectory import JOINTS
 from trunkline.errors import InputError
@@ -21,7 +21,7 @@ LEAD = 0.03  # s
 SMOOTH = 10  # ticks of each of the smoother's means
 
 
-class Machine:
+class HardwareRobot:
     """Of an `arm`, whose axes are joints, and `motors`, whose axes are pulls, or one of them; the cables' commands (K,)
     where the arm is straight are `straight`, m.
 
@@ -32,8 +32,8 @@ class Machine:
 
     def __init__(
         self,
-        arm: Limb | None,
-        motors: Limb | None,
+        arm: Driver | None,
+        motors: Driver | None,
         straight: np.ndarray,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:

@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from trunkline.ar.drivers.driver import CONNECTING, TICK, Watchdog
-from trunkline.ar.drivers.ros_settings import RosSettings, Said
+from trunkline.ar.drivers.ros_settings import JointReading, RosSettings
 from trunkline.ar.drivers.setpoint_filter import LIMITS, ROUNDING
 from trunkline.errors import InputError
 
@@ -37,7 +37,7 @@ class Link(Protocol):
         """
         ...
 
-    def states(self) -> list[Said]:
+    def states(self) -> list[JointReading]:
         """What was said since the last call, the newest last."""
         ...
 

@@ -14,7 +14,7 @@ from rclpy.qos import QoSProfile, qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from trunkline.ar.drivers.ros_settings import NANO, NEWEST, RosSettings, Said
+from trunkline.ar.drivers.ros_settings import NANO, NEWEST, JointReading, RosSettings
 from trunkline.errors import InputError
 
 PARTING = 1.0  # s that its thread has to end
@@ -55,7 +55,7 @@ class NodeLink:
         except RuntimeError as error:
             raise InputError(f"{self._settings.trajectory}: {error}") from error
 
-    def states(self) -> list[Said]:
+    def states(self) -> list[JointReading]:
         return [self._said.popleft() for _ in range(len(self._said))]
 
     def close(self) -> None:

@@ -17,9 +17,9 @@ import numpy as np
 
 from trunkline.ar.drivers.gm6020 import COUNTS, RATE
 from trunkline.ar.drivers.motors import MotorSettings
-from trunkline.ar.drivers.on_bus import BankInThread, BusMotors
-from trunkline.ar.drivers.settings import Config
-from trunkline.ar.drivers.simulated_motors import Plant
+from trunkline.ar.drivers.on_bus import BusMotors, SimulatedMotorsThread
+from trunkline.ar.drivers.settings import ExecutionConfig
+from trunkline.ar.drivers.simulated_motors import MotorParameters
 from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.config import PROJECT, load_folder
 
@@ -28,12 +28,12 @@ LOST = 0.01
 Row = tuple[str, str, str, bool]
 
 
-class Trial:
+class MotorTrial:
     """Motors and bank, joined by a bus, and the driver's loop."""
 
-    def __init__(self, settings: MotorSettings, plants: list[Plant]) -> None:
+    def __init__(self, settings: MotorSettings, plants: list[MotorParameters]) -> None:
         name = f"check {id(self)}"
-        self.bank = BankInThread(plants, can.Bus(interface="virtual", channel=name))
+        self.bank = SimulatedMotorsThread(plants, can.Bus(interface="virtual", channel=name))
         self.driver = BusMotors(settings, can.Bus(interface="virtual", channel=name))
         self.turns: list[float] = []
 
@@ -70,7 +70,7 @@ def cosine(begun: float) -> Callable[[float], tuple[float, float]]:
     return way
 
 
-def errors(trial: Trial, zeros: np.ndarray) -> tuple[float, float]:
+def errors(trial: MotorTrial, zeros: np.ndarray) -> tuple[float, float]:
     """Root mean square and largest, m, of a pull and its release, the worst cable's, in true pull.
 
     Raises:
@@ -95,10 +95,10 @@ def measures(settings: MotorSettings) -> list[Row]:
     reel = settings.reel
     turn = 2 * math.pi * reel.radius
     begins = COUNTS - round(0.5 * DEPTH / turn * COUNTS) % COUNTS  # so that the first wraps within a pull
-    plant = Plant(radius=reel.radius, inertia=reel.inertia, stiffness=1.2 * reel.stiffness)
+    plant = MotorParameters(radius=reel.radius, inertia=reel.inertia, stiffness=1.2 * reel.stiffness)
     plants = [replace(plant, begins=begins + 700 * n, slack=0.01 * (n + 1), side=side)
               for n, side in enumerate(settings.sides)]  # fmt: skip
-    trial, rows = Trial(settings, plants), []
+    trial, rows = MotorTrial(settings, plants), []
     try:
         trial.until(lambda: trial.driver.motors.homed or bool(trial.driver.fault), rest, 30.0)
         if trial.driver.fault:
@@ -110,7 +110,7 @@ def measures(settings: MotorSettings) -> list[Row]:
 
         trial.turns.clear()
         rms, most = errors(trial, zeros)
-        asked, found = f"{1e3 * DEPTH:.0f} mm pull in {SECONDS:g} s, and its release", told(rms, most)
+        asked, found = f"{1e3 * DEPTH:.0f} mm pull in {SECONDS:g} s, and its release", format_errors(rms, most)
         rows.append((asked, "≤ 0.5 mm rms", found, rms <= 5e-4))
         periods = np.diff(trial.turns)
         rate, late = 1 / periods.mean(), 1e3 * np.quantile(periods, (0.5, 0.99, 1.0))
@@ -121,7 +121,7 @@ def measures(settings: MotorSettings) -> list[Row]:
 
         trial.bank.lost = LOST
         rms, most = errors(trial, zeros)
-        rows.append((f"the same, {LOST:.0%} of frames lost", "≤ 1 mm rms", told(rms, most), rms <= 1e-3))
+        rows.append((f"the same, {LOST:.0%} of frames lost", "≤ 1 mm rms", format_errors(rms, most), rms <= 1e-3))
         trial.bank.lost = 0.0
 
         trial.until(lambda: False, rest, 0.2)
@@ -137,12 +137,12 @@ def measures(settings: MotorSettings) -> list[Row]:
     return rows
 
 
-def told(rms: float, most: float) -> str:
+def format_errors(rms: float, most: float) -> str:
     """Of errors, m."""
     return f"{1e3 * rms:.2f} mm rms, {1e3 * most:.2f} mm most"
 
 
-def silence(trial: Trial, each: Callable[[], None]) -> float:
+def silence(trial: MotorTrial, each: Callable[[], None]) -> float:
     """s for which any simulated motor still drives a current, `each` being done for half a second; 0 where none did."""
     begun = time.monotonic()
     while time.monotonic() - begun < 0.5:
@@ -162,7 +162,7 @@ def main(arguments: list[str]) -> int:
     if arguments:
         print((__doc__ or "").strip())
         return 0 if arguments in (["-h"], ["--help"]) else 2
-    rows = measures(load_folder(Config, PROJECT / "conf/execution").motors)
+    rows = measures(load_folder(ExecutionConfig, PROJECT / "conf/execution").motors)
     print(table(rows))
     return 0 if all(so for *_, so in rows) else 1
 

@@ -77,7 +77,7 @@ class Bridge:
         return place * self._place + BRIDGED * speed * self._speed + BRIDGED**2 * gain * self._gain
 
 
-class Stream:
+class SetpointFilter:
     """From rest at `joints` (7,), rad.
 
     Attributes:

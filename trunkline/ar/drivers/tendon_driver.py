@@ -10,7 +10,7 @@ from trunkline.ar.drivers.motors import HOMING
 from trunkline.ar.drivers.on_bus import BusMotors
 
 
-class Cables:
+class TendonDriver:
     """A `Limb` whose axes are the cables' pulls from zero, m.
 
     Where setpoints end, or this process is late itself, the cables hold at the last one, and follow no more. Where a

@@ -26,7 +26,7 @@ CREEP = 0.002  # m/s below which f is less than all of it
 
 
 @dataclass(frozen=True)
-class ReelSettings:
+class WinchSettings:
     """Of a motor and its spool.
 
     radius: of the spool, m. inertia: J of rotor and spool, kg m². crossover: ω / 2π, Hz. most: A. stiffness: k, N/m.
@@ -45,7 +45,7 @@ class ReelSettings:
     slack: Annotated[float, Field(gt=0, le=0.5)]
 
 
-class Reel:
+class Winch:
     """One of them; `side` is 1 where a positive current reels in, else -1.
 
     Attributes:
@@ -54,7 +54,7 @@ class Reel:
             zero is known. fault: why it cannot be homed.
     """
 
-    def __init__(self, settings: ReelSettings, side: int) -> None:
+    def __init__(self, settings: WinchSettings, side: int) -> None:
         self._settings, self._side = settings, side
         omega, self._mass = 2 * math.pi * settings.crossover, settings.inertia / settings.radius**2
         self._gains = omega, 0.4 * omega**2, 0.08 * omega**3

@@ -28,7 +28,7 @@ from trunkline.ar.session.alignment import (
     tip_of,
 )
 from trunkline.ar.session.anchors import Anchor
-from trunkline.ar.session.settings import Alignment
+from trunkline.ar.session.settings import AlignmentSettings
 from trunkline.ar.teleop.messages import Pose, Vector
 from trunkline.ar.teleop.vectors import Quaternion, add, angle_between, distance, rotate
 from trunkline.errors import InputError
@@ -49,21 +49,21 @@ NEXT: dict[messages.AligningStep, str] = {
 }
 
 
-class Held(NamedTuple):
+class ControllerPose(NamedTuple):
     """A tracked controller, in the reference frame."""
 
     position: Vector
     quaternion: Quaternion
 
 
-class Aligner:
+class AlignmentProcedure:
     """Of one client. `known`: its anchor of another day, to be restored; None where there is none.
 
     `alignment`: pose of the reference frame in the base, None where it must not be relied on. `expected`: error where
     it is told, m; None where nothing tells.
     """
 
-    def __init__(self, settings: Alignment, known: Anchor | None = None) -> None:
+    def __init__(self, settings: AlignmentSettings, known: Anchor | None = None) -> None:
         self.settings = settings
         self.known = known if self._is_trusted(known) else None
         self.reset()
@@ -83,7 +83,7 @@ class Aligner:
         self._forget()
 
     def _forget(self) -> None:
-        self._poses: list[Held] = []
+        self._poses: list[ControllerPose] = []
         self._dwell = Dwell()
         self._reference: list[np.ndarray] = []
         self._base: list[np.ndarray] = []
@@ -101,11 +101,11 @@ class Aligner:
         found = f"expected error {_mm(self.expected)}, more than {_mm(limit)}"
         return f"alignment: {found}: align anew; nothing is executed"
 
-    def told(self) -> messages.Aligning:
+    def told(self) -> messages.AlignmentProgress:
         words = NEXT[self.step].format(len(self._base) + 1, self.settings.places)
         anchor = self.anchor or (self.known if self.step == "place" else None)
         id = anchor.id if anchor is not None else ""
-        return messages.Aligning(self.step, words, self.said, self.place, self.expected, self.residual, id, self.fasten)
+        return messages.AlignmentProgress(self.step, words, self.said, self.place, self.expected, self.residual, id, self.fasten)
 
     # --- what the user wants
 
@@ -127,7 +127,7 @@ class Aligner:
 
     # --- what is seen
 
-    def hear(self, time: float, held: Held | None, mark: np.ndarray | None) -> None:
+    def hear(self, time: float, held: ControllerPose | None, mark: np.ndarray | None) -> None:
         """At `time`, s, the touching hand, None where it is not tracked; the flange's mark in the base, m (3,), None
         where the robot moves."""
         if self.step in ("tip", "touch", "check") and held is None:
@@ -188,7 +188,7 @@ class Aligner:
 
     # --- steps
 
-    def _turned(self, held: Held | None) -> None:
+    def _turned(self, held: ControllerPose | None) -> None:
         poses = self._poses
         if held is None or (poses and angle_between(poses[-1].quaternion, held.quaternion) < TURNED):
             return

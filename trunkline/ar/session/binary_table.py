@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Literal, get_args, get_origin
 
 from trunkline.ar.session import binary, messages
-from trunkline.ar.session.binary import Kind
+from trunkline.ar.session.binary import BinaryMessage
 from trunkline.errors import InputError, in_one_line
 
 MODULE, PAGE = Path("client/src/wire_table.js"), Path("docs/protocol.md")
@@ -37,8 +37,8 @@ def table() -> dict:
         "MARKERS": list(binary.MARKERS),
         "FROM_SERVER": {name: _kind(kind) for name, kind in binary.FROM_SERVER.items()},
         "FROM_CLIENT": {name: _kind(kind) for name, kind in binary.FROM_CLIENT.items()},
-        "SAID": {_type(kind): _fields(kind) for kind in messages.SAID},
-        "ANSWERS": {_type(kind): _fields(kind) for kind in messages.ANSWERS},
+        "SAID": {_type(kind): _fields(kind) for kind in messages.CLIENT_MESSAGES},
+        "ANSWERS": {_type(kind): _fields(kind) for kind in messages.SERVER_MESSAGES},
     }
 
 
@@ -57,8 +57,8 @@ def blocks() -> dict[str, str]:
         "wire_head": "\n".join(head),
         "wire_server": _kinds(binary.FROM_SERVER),
         "wire_client": _kinds(binary.FROM_CLIENT),
-        "wire_said": _messages(messages.SAID),
-        "wire_answers": _messages(messages.ANSWERS),
+        "wire_said": _messages(messages.CLIENT_MESSAGES),
+        "wire_answers": _messages(messages.SERVER_MESSAGES),
     }
 
 
@@ -78,7 +78,7 @@ def written(page: str) -> str:
     return page
 
 
-def _kind(kind: Kind) -> dict:
+def _kind(kind: BinaryMessage) -> dict:
     return {"type": kind.number, "row": list(kind.row), "flags": {name: 1 << n for n, name in enumerate(kind.flags)}}
 
 
@@ -94,7 +94,7 @@ def _fields(kind: type) -> dict:
     }
 
 
-def _kinds(kinds: dict[str, Kind]) -> str:
+def _kinds(kinds: dict[str, BinaryMessage]) -> str:
     lines = ["| message | type | flags, from bit 0 | count | sequence | time | a row, float32 |", "|---" * 7 + "|"]
     for name, kind in kinds.items():
         row, flags = ", ".join(kind.row) or "–", ", ".join(kind.flags) or "–"

@@ -6,13 +6,13 @@ import numpy as np
 from trunkline.ar.hybrid.rollouts import Piece
 
 
-def drawn(model: mujoco.MjModel) -> tuple[str, ...]:
+def drawn_bodies(model: mujoco.MjModel) -> tuple[str, ...]:
     """Names of the bodies that have geoms and move, in the model's order; the object is there or not."""
     with_geoms = sorted({int(body) for body in model.geom_bodyid if body})
     return tuple(model.body(body).name for body in with_geoms)
 
 
-class Poses:
+class BodyPoses:
     """Poses (N, 7) of the bodies `names` of a model, position and quaternion, w first; NaN of those that it lacks."""
 
     def __init__(self, model: mujoco.MjModel, names: tuple[str, ...]) -> None:

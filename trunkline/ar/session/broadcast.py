@@ -3,7 +3,7 @@
 import numpy as np
 
 from trunkline.ar.session import binary, messages, preview_process
-from trunkline.ar.session.controller import Desk
+from trunkline.ar.session.controller import SessionController
 from trunkline.ar.session.robot import STALE
 from trunkline.ar.session.scene import Shells
 from trunkline.ar.teleop.alignment import base_quaternion
@@ -13,13 +13,13 @@ STATES = 0.1  # s between states that tell no new mode
 TURNED = np.cos(np.radians(1.0))  # of gravity in the soft base, from which on there is a new shell
 
 
-class Showing:
+class Broadcast:
     """frames: of the robot so far. shell: of the tip's reach, the newest; empty where there are none."""
 
-    def __init__(self, desk: Desk, shells: Shells | None) -> None:
+    def __init__(self, desk: SessionController, shells: Shells | None) -> None:
         self.frames, self.shell = 0, b""
         self._desk, self._shells = desk, shells
-        self._said: tuple[float, messages.State | None] = (0.0, None)
+        self._said: tuple[float, messages.StateMessage | None] = (0.0, None)
         self._down, self._shelled = None, 0
 
     def robot(self, now: float) -> bytes:
@@ -55,7 +55,7 @@ class Showing:
         self.shell = binary.frame("shell", set(), len(points), self._shelled, now, points)
         return self.shell
 
-    def new_state(self, now: float, holder: str) -> messages.State | None:
+    def new_state(self, now: float, holder: str) -> messages.StateMessage | None:
         """What has changed, a new mode at once, all else every STATES; None where nothing is to be told."""
         (since, before), intent, robot = self._said, self._desk.intent, self._desk.robot.state()
         assert intent is not None
@@ -69,7 +69,7 @@ class Showing:
         return state
 
 
-def piece(shown: preview_process.Shown) -> bytes:
+def piece(shown: preview_process.PreviewPiece) -> bytes:
     """Of a preview."""
     flags = {"last"} if shown.last else set()
     return binary.frame("preview", flags, shown.poses.shape[1], shown.first, shown.time, shown.poses)

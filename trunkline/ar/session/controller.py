@@ -15,9 +15,9 @@ from trunkline.ar.preview.world_model import believe
 from trunkline.ar.session import messages, preview_process
 from trunkline.ar.session.binary import MARKERS, Received
 from trunkline.ar.session.controller_input import NOWHERE, controllers
-from trunkline.ar.session.follow import Seeking
-from trunkline.ar.session.log_writer import Journal
-from trunkline.ar.session.robot import Standing
+from trunkline.ar.session.follow import FollowControl
+from trunkline.ar.session.log_writer import LogWriter
+from trunkline.ar.session.robot import RobotState
 from trunkline.ar.session.ui_text import next_action, next_key
 from trunkline.ar.teleop.alignment import base_quaternion
 from trunkline.ar.teleop.core import Teleoperation
@@ -54,24 +54,24 @@ class Robot(Protocol):
     def permit(self) -> None: ...
     def stop(self) -> None: ...
     def state(self) -> ExecutorReport: ...
-    def standing(self) -> Standing: ...
+    def standing(self) -> RobotState: ...
 
 
 class Planning(Protocol):
-    """What answers orders, some time later, by `Desk.foreseen`."""
+    """What answers orders, some time later, by `SessionController.foreseen`."""
 
-    def order(self, order: preview_process.Order | preview_process.Seek) -> None: ...
+    def order(self, order: preview_process.Order | preview_process.FollowRequest) -> None: ...
     def leave(self) -> None: ...
 
 
 @dataclass(frozen=True)
-class Heard:
+class HandInput:
     stamp: float
     left: Controller
     right: Controller
 
 
-class Desk:
+class SessionController:
     """One robot, one core. `lift`: m by which a thing is lifted by a grasp. `journal`: what is told all of it.
     `period`: s, of the arm's slowest swing."""
 
@@ -82,27 +82,27 @@ class Desk:
         planning: Planning,
         world: World,
         lift: float,
-        journal: Journal | None = None,
+        journal: LogWriter | None = None,
         period: float = 0.0,
     ) -> None:
         self.core, self.robot, self.planning, self.world = core, robot, planning, world
         self.lift, self.period = lift, period
-        self.journal = journal or Journal()
+        self.journal = journal or LogWriter()
         self.state = core.start()
         self.alignment: Pose | None = None
         self.unfit = ""
         self.plan: Plan | None = None
-        self.preview: messages.Preview | None = None
-        self.foreseen: messages.Foreseen | None = None
+        self.preview: messages.PreviewMessage | None = None
+        self.foreseen: messages.PredictionMessage | None = None
         self.report: PlanReport | None = None
-        self.pieces: list[preview_process.Shown] = []
+        self.pieces: list[preview_process.PreviewPiece] = []
         self.intent: Intent | None = None
-        self._heard: deque[Heard] = deque(maxlen=MOST_INPUTS)
+        self._heard: deque[HandInput] = deque(maxlen=MOST_INPUTS)
         self._last, self._fresh = self._nobody, True
         self._stop, self._fault, self._shown, self._since, self._believed = False, "", "", 0.0, ""
         self._asked, self._ordered, self._started, self._ran = 0, False, "", False
         self._logged: tuple = ()
-        self._seeking = Seeking(planning.order, robot.hear)
+        self._seeking = FollowControl(planning.order, robot.hear)
 
     def begin(self, rate: float) -> None:
         """The log's first line: all that a replay needs besides the package. rate: of ticks, Hz."""
@@ -121,7 +121,7 @@ class Desk:
         if received.stamp <= last.stamp and not self._fresh:
             return f"input: stamp {received.stamp:.6g} s is not after {last.stamp:.6g} s: heard before"
         self._fresh = False
-        self._heard.append(Heard(received.stamp, *controllers(received)))
+        self._heard.append(HandInput(received.stamp, *controllers(received)))
         return ""
 
     def stop(self) -> None:
@@ -164,19 +164,19 @@ class Desk:
         if answer is None:
             self.report = PlanReport(self._asked, refused="the process that plans has ended")
             return False
-        if isinstance(answer, preview_process.Found):
+        if isinstance(answer, preview_process.FollowAnswer):
             self._seeking.found(answer)
             return False
-        serial = answer.report.serial if isinstance(answer, preview_process.Planned) else answer.serial
+        serial = answer.report.serial if isinstance(answer, preview_process.PlanAnswer) else answer.serial
         if serial != self._asked:
             return False
-        if isinstance(answer, preview_process.Planned):
+        if isinstance(answer, preview_process.PlanAnswer):
             self.report, self.plan = answer.report, answer.plan
             self.journal.event("planned", report=answer.report)
-        elif isinstance(answer, preview_process.Begun):
+        elif isinstance(answer, preview_process.PreviewBegun):
             self.preview, self._since = answer.preview, now
             self.journal.event("preview", preview=answer.preview)
-        elif isinstance(answer, preview_process.Shown):
+        elif isinstance(answer, preview_process.PreviewPiece):
             self.pieces.append(answer)
             self.journal.piece(answer.first, answer.time, answer.poses)
         else:
@@ -223,7 +223,7 @@ class Desk:
         """Why nothing may be executed, whatever the core wants; "" where it may."""
         return self.journal.fault or self.unfit
 
-    def _tell_journal(self, intent: Intent, standing: Standing) -> None:
+    def _tell_journal(self, intent: Intent, standing: RobotState) -> None:
         """What is at the end of a tick; of what seldom changes, the changes."""
         journal = self.journal
         journal.standing(standing)
@@ -249,12 +249,12 @@ class Desk:
         return ("left", "right").index(self.core.settings.rigid_hand)
 
     @property
-    def _nobody(self) -> Heard:
+    def _nobody(self) -> HandInput:
         """Nothing heard, at the stamp of the last step."""
         stamp = self.state.stamp if self.state.stamp is not None else 0.0
-        return Heard(stamp, NOWHERE, NOWHERE)
+        return HandInput(stamp, NOWHERE, NOWHERE)
 
-    def _ask(self, intent: Intent, standing: Standing) -> None:
+    def _ask(self, intent: Intent, standing: RobotState) -> None:
         request = intent.request
         if request is not None and request.serial != self._asked:
             self._asked, self.report, self.plan, self.preview = request.serial, None, None, None
@@ -302,7 +302,7 @@ class Desk:
         self._fault = self.blocked or self.robot.start(self.plan, intent.execute)
         self.journal.event("execute", digest=intent.execute, refused=self._fault)
 
-    def _believe(self, standing: Standing, executor: ExecutorReport) -> None:
+    def _believe(self, standing: RobotState, executor: ExecutorReport) -> None:
         done = executor.mode == "done" and executor.digest != self._believed and self.plan is not None
         phases = tuple(name for name, _ in self.plan.phases) if done and self.plan is not None else ()
         if done:
@@ -330,7 +330,7 @@ class Desk:
                     found[row] = (*target, 1.0, 0.0, 0.0, 0.0)
         return found
 
-    def told(self, holder: str) -> messages.State:
+    def told(self, holder: str) -> messages.StateMessage:
         """The state for clients, `holder` controlling; where nobody does, the core's notice is left out: of nobody."""
         intent, robot = self.intent, self.robot.state()
         assert intent is not None
@@ -339,7 +339,7 @@ class Desk:
         words = next_action(intent.mode, intent.targets, holder, self.alignment is not None, touched)
         keys = next_key(intent.mode, intent.targets, holder, touched)
         notice = intent.notice or self._seeking.refused if holder else ""
-        return messages.State(
+        return messages.StateMessage(
             intent.mode, intent.motion, _joined(notice, self.blocked), words, keys,
             round(intent.countdown, 2), intent.preview, intent.execute, _rounded(intent.targets),
             robot.mode, robot.fault,

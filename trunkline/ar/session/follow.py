@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from trunkline.ar.session.preview_process import Found, Seek
+from trunkline.ar.session.preview_process import FollowAnswer, FollowRequest
 from trunkline.ar.teleop.following import KNOT
 from trunkline.ar.teleop.messages import Targets, World
 from trunkline.ar.teleop.targets import why_not
@@ -13,11 +13,11 @@ from trunkline.ar.teleop.trajectory import JOINTS
 SILENT = 1.0  # s; a busy machine answers within 0.5
 
 
-class Seeking:
+class FollowControl:
     """`order` asks for axes; `hear` takes them, with the s since their targets. refused: why the newest targets are
     not followed, "" where they are."""
 
-    def __init__(self, order: Callable[[Seek], None], hear: Callable[[float, np.ndarray | None], None]) -> None:
+    def __init__(self, order: Callable[[FollowRequest], None], hear: Callable[[float, np.ndarray | None], None]) -> None:
         self._order, self._hear = order, hear
         self._now, self._serial = 0.0, 0
         self.end()
@@ -47,7 +47,7 @@ class Seeking:
         self._serial, self._last = self._serial + 1, self._now
         self._times[self._serial] = self._now
         near = joints if self._near is None else self._near
-        self._order(Seek(self._serial, None if why_not(targets) else targets, near, world))
+        self._order(FollowRequest(self._serial, None if why_not(targets) else targets, near, world))
 
     def begin(self) -> None:
         """The robot follows from now on, and hears what was found so far."""
@@ -55,7 +55,7 @@ class Seeking:
         while self._found:
             self._tell(*self._found.pop(0))
 
-    def found(self, answer: Found) -> None:
+    def found(self, answer: FollowAnswer) -> None:
         """What was sought; of an older following it is nothing."""
         time = self._times.pop(answer.serial, None)
         if time is None:

@@ -8,7 +8,7 @@ from trunkline.ar.drivers.driver_client import ArmSettings
 from trunkline.ar.drivers.motors import MotorSettings
 from trunkline.ar.drivers.ros_settings import RosSettings
 from trunkline.ar.drivers.setpoint_filter import LIMITS, RobotLimits
-from trunkline.ar.drivers.settings import Config
+from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.ar.drivers.simulated_motors import SIMULATED
 from trunkline.ar.teleop.config import Config as Teleop
 from trunkline.errors import InputError
@@ -61,7 +61,7 @@ class Hardware:
         return f"{robot}, {motors}"
 
 
-def hardware_of(robot: str, motors: str, bus: str, interface: str, config: Config) -> Hardware | None:
+def hardware_of(robot: str, motors: str, bus: str, interface: str, config: ExecutionConfig) -> Hardware | None:
     """What the options name; None where all is simulated. interface: of python-can, "" for the usual one.
 
     Raises:

@@ -70,7 +70,7 @@ class Subject:
 NOTHING = Subject((), (), (), np.empty(0), ("", (0.0, 0.0, 0.0)))
 
 
-class Book:
+class LogFormat:
     """Writes to `file`. `zero`: ns since 1970 at 0 s of the records' clock."""
 
     def __init__(self, file: BinaryIO, subject: Subject, zero: int) -> None:
@@ -154,7 +154,7 @@ def run(
     leave_signals_to_parent()
     try:
         with opened(path) as file:
-            book = Book(file, subject, zero)
+            book = LogFormat(file, subject, zero)
             write(book, pipe, kept, period)
             book.finish()
     except OSError as error:
@@ -162,7 +162,7 @@ def run(
         told.value = text.encode()[: TEXT - 1]
 
 
-def write(book: Book, pipe, kept, period: float) -> None:
+def write(book: LogFormat, pipe, kept, period: float) -> None:
     """All that comes, on the disk every `period` s."""
     due, heard = time.monotonic() + period, 0
     kept.value = heard

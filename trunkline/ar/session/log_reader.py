@@ -15,10 +15,10 @@ from trunkline.recordings.logs.joint_stream import JointStream, joint_stream
 from trunkline.recordings.logs.log import Log, read_log
 from trunkline.recordings.logs.pose_stream import PoseStream, pose_stream
 
-GIVEN = b',"given":'
+INPUT_KEY = b',"given":'
 
 
-class Step(NamedTuple):
+class LogStep(NamedTuple):
     """Of the core: `time`, s since the log's first step, `dt`, s, and the bytes of its `Input` and `Intent`."""
 
     time: float
@@ -28,7 +28,7 @@ class Step(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Logbook:
+class LogReader:
     """`damage`: what is lost, in sentences. zero: ns since 1970 at 0 s of the events' `time`. events: in their order,
     each with its kind as `event`. poses: of the robot's bodies; of a real machine None, as nobody sees them. twin: as a
     twin drew them of a real machine. joints: the rigid robot's, as measured."""
@@ -37,7 +37,7 @@ class Logbook:
     damage: list[str]
     zero: int
     events: list[dict]
-    steps: list[Step]
+    steps: list[LogStep]
     poses: PoseStream | None
     twin: PoseStream | None
     joints: JointStream | None
@@ -65,7 +65,7 @@ class Logbook:
         return self.begin.get("hardware", SIMULATED)
 
 
-def read_logbook(path: Path) -> Logbook:
+def read_session_log(path: Path) -> LogReader:
     """All of it that can be trusted.
 
     Raises:
@@ -82,18 +82,18 @@ def read_logbook(path: Path) -> Logbook:
         raise InputError(f"{path}: {INPUT}: found no step of the core, expected the log of a live session")
     poses, twin = (pose_stream({None: log.topics[name]}) if name in log.topics else None for name in (POSES, TWIN))
     joints = joint_stream(log.topics[JOINTS]) if JOINTS in log.topics else None
-    return Logbook(Path(path), log.damage, zero, events, steps, poses if twin is None else None, twin, joints)
+    return LogReader(Path(path), log.damage, zero, events, steps, poses if twin is None else None, twin, joints)
 
 
-def _steps(log: Log) -> list[Step]:
+def _steps(log: Log) -> list[LogStep]:
     """A last input whose intent was lost is left out."""
     found, since = [], None
     for (heard, logged), (intent, _) in zip(_texts(log, INPUT), _texts(log, INTENT), strict=False):
-        before, there, given = heard.partition(GIVEN)
+        before, there, given = heard.partition(INPUT_KEY)
         if not there:
             raise ValueError(f"{INPUT}: found no input in {heard[:40]!r}")
         since = logged if since is None else since
-        found.append(Step(1e-9 * (logged - since), float(before.removeprefix(b'{"dt":')), given[:-1], intent))
+        found.append(LogStep(1e-9 * (logged - since), float(before.removeprefix(b'{"dt":')), given[:-1], intent))
     return found
 
 

@@ -17,7 +17,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from pydantic import ConfigDict, TypeAdapter
 
-from trunkline.ar.session.decimation import Resting
+from trunkline.ar.session.decimation import LogDecimation
 from trunkline.ar.session.log_format import (
     BASE,
     EVENTS,
@@ -39,7 +39,7 @@ from trunkline.ar.session.log_format import (
     new_file,
     run,
 )
-from trunkline.ar.session.robot import Standing
+from trunkline.ar.session.robot import RobotState
 from trunkline.ar.teleop import messages
 from trunkline.ar.teleop.messages import Input, Intent, Pose
 from trunkline.errors import InputError
@@ -53,7 +53,7 @@ LATE = 0.5  # s beyond `period` that it may write nothing in: 1 s of a session t
 LOOKS = 0.05  # s between looks at whether it writes
 
 
-class Journal:
+class LogWriter:
     """Takes what a session of `subject` has to tell, as records for `keep`. By itself it keeps none. Times are s of
     `now`."""
 
@@ -61,7 +61,7 @@ class Journal:
 
     def __init__(self, subject: Subject = NOTHING, now: Callable[[], float] = time.monotonic) -> None:
         self.subject, self.now = subject, now
-        self._resting = Resting()
+        self._resting = LogDecimation()
 
     def keep(self, record: Record) -> None:
         """Take a record, without waiting."""
@@ -73,7 +73,7 @@ class Journal:
         self.keep(Record(INPUT, now, now, text))
         self.keep(Record(INTENT, now, now, messages.to_json(intent)))
 
-    def standing(self, robot: Standing) -> None:
+    def standing(self, robot: RobotState) -> None:
         """What the robot does; of what is measured, what is. While it rests, a few are kept, somewhat later."""
         for kept, now in self._resting.take(robot, self.now()):
             self._stand(kept, now)
@@ -83,7 +83,7 @@ class Journal:
         for kept, now in self._resting.rest():
             self._stand(kept, now)
 
-    def _stand(self, robot: Standing, now: float) -> None:
+    def _stand(self, robot: RobotState, now: float) -> None:
         for topic, axes in (
             (JOINTS_SENT, robot.joints), (JOINTS, robot.measured), (TENDONS_SENT, robot.commands),
             (TENDONS, robot.lengths),
@@ -120,7 +120,7 @@ class Journal:
         self.keep(Record(EVENTS, now, now, _EVENT.dump_json({"event": kind, "time": now} | fields)))
 
 
-class JournalProcess(Journal):
+class LogWriterProcess(LogWriter):
     """One that writes to `path`, by another process."""
 
     def __init__(

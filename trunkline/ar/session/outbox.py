@@ -10,7 +10,7 @@ from collections import deque
 from dataclasses import dataclass, field
 
 WINDOW = 3  # binary messages that may be unacknowledged
-MOST_SAID = 256  # JSON messages that may wait
+MOST_MESSAGES = 256  # JSON messages that may wait
 LATEST = ("robot", "shell")  # of these the newest wins
 
 
@@ -32,7 +32,7 @@ class Outbox:
         """Whether there was room."""
         self.said.append(text)
         self.ready.set()
-        return len(self.said) <= MOST_SAID
+        return len(self.said) <= MOST_MESSAGES
 
     def state(self, kind: str, text: str) -> None:
         """As `say`, in place of one of this kind that still waits."""

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from trunkline.ar.session.log_format import SIMULATED, WRIST
-from trunkline.ar.session.log_reader import Logbook, read_logbook, tip_path
+from trunkline.ar.session.log_reader import LogReader, read_session_log, tip_path
 from trunkline.errors import in_one_line
 from trunkline.kinematics.panda.kinematics import FLANGE, mount_pose
 from trunkline.kinematics.panda.shipped import JOINTS
@@ -51,12 +51,12 @@ class Execution:
     seen: bool = True
 
 
-def executions(logbook: Logbook) -> Iterator[Execution]:
+def executions(logbook: LogReader) -> Iterator[Execution]:
     """In their order, of those that the robot began."""
     events, begin = logbook.events, logbook.begin
     seen = logbook.hardware == SIMULATED
     rows, place = ("poses", begin["tip"]["place"]) if seen else (WRIST, (0.0, 0.0, FLANGE + begin["mount_offset"]))
-    times, path = _seen(logbook, begin["tip"]["body"], place) if seen else _measured(logbook, begin["mount_offset"])
+    times, path = _visible_path(logbook, begin["tip"]["body"], place) if seen else _measured(logbook, begin["mount_offset"])
     for index, event in enumerate(events):
         if event["event"] != "execute" or event["refused"]:
             continue
@@ -71,7 +71,7 @@ def executions(logbook: Logbook) -> Iterator[Execution]:
         if seen and told is not None and last is not None and told["spread"]:
             within = bool(np.linalg.norm(last - np.array(told["tip"][-1])) <= told["spread"][-1])
         probability = None if told is None else told["probability"]
-        held = _held(events[:index], later) if seen and done and probability is not None else None
+        held = _grasped(events[:index], later) if seen and done and probability is not None else None
         since_begin = since - begin["time"]
         yield Execution(digest, since_begin, end, seconds, median, worst, delay, within, probability, held, seen)
 
@@ -80,7 +80,7 @@ def _is_of(event: dict, kind: str, digest: str) -> bool:
     return event["event"] == kind and event[kind]["digest"] == digest
 
 
-def _seen(logbook: Logbook, body: str, place) -> tuple[np.ndarray, np.ndarray]:
+def _visible_path(logbook: LogReader, body: str, place) -> tuple[np.ndarray, np.ndarray]:
     """Times of the journal's clock, s (T,), and the tip as it was seen (T, 3)."""
     poses = logbook.poses
     if poses is None or body not in poses.names or poses.quaternions is None:
@@ -91,7 +91,7 @@ def _seen(logbook: Logbook, body: str, place) -> tuple[np.ndarray, np.ndarray]:
     return 1e-9 * (poses.stamps[there] - logbook.zero), tip_path(path, place)
 
 
-def _measured(logbook: Logbook, mount_offset: float) -> tuple[np.ndarray, np.ndarray]:
+def _measured(logbook: LogReader, mount_offset: float) -> tuple[np.ndarray, np.ndarray]:
     """Times of the journal's clock, s (T,), and the mount by the joints as measured (T, 3); none where nobody does."""
     joints = logbook.joints
     if joints is None or not set(JOINTS) <= set(joints.names):
@@ -151,7 +151,7 @@ def _compared(
     return min(seconds, float(shown[-1] - shown[0])), float(np.median(far)), float(far.max()), delay, last
 
 
-def _held(before: list[dict], later: list[dict]) -> bool:
+def _grasped(before: list[dict], later: list[dict]) -> bool:
     """Whether the arm holds something that it did not, as believed until the next plan is asked for."""
     held = _holds(before)
     for event in later:
@@ -201,7 +201,7 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="python -m trunkline.ar.session.preview_validation", description=summary)
     parser.add_argument("logs", type=Path, nargs="+", metavar="log")
     for path in parser.parse_args(arguments).logs:
-        logbook = read_logbook(path)
+        logbook = read_session_log(path)
         print("\n".join([f"{path}", *(f"  {line}" for line in [*logbook.damage, *lines(list(executions(logbook)))])]))
     return 0
 

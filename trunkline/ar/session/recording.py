@@ -15,13 +15,13 @@ import numpy as np
 
 from trunkline.ar.session import binary
 from trunkline.ar.session.log_format import POSES, TWIN
-from trunkline.ar.session.log_reader import Logbook, read_logbook
+from trunkline.ar.session.log_reader import LogReader, read_session_log
 from trunkline.errors import InputError, in_one_line
 
 LENGTH = struct.Struct("<I")  # bytes of the message that follows
 
 
-def recorded(logbook: Logbook) -> Iterator[bytes]:
+def recorded(logbook: LogReader) -> Iterator[bytes]:
     """The messages, each with its length before it; no marker is there, and no flag is set.
 
     Raises:
@@ -46,7 +46,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("log", type=Path)
     parser.add_argument("recording", type=Path)
     told = parser.parse_args(arguments)
-    logbook = read_logbook(told.log)
+    logbook = read_session_log(told.log)
     for damage in logbook.damage:
         print(f"{told.log}: {damage}")
     messages = list(recorded(logbook))

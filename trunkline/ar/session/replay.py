@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from pydantic import TypeAdapter, ValidationError
 
-from trunkline.ar.session.log_reader import Logbook, Step, read_logbook
+from trunkline.ar.session.log_reader import LogReader, LogStep, read_session_log
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.messages import Input, from_json, to_json
 from trunkline.ar.teleop.reach import MapReach, Reach
@@ -40,7 +40,7 @@ class Difference(NamedTuple):
         return f"{where}: found {self.found}, expected {self.expected} of the log"
 
 
-def replay(steps: Iterable[Step], core: Teleoperation) -> Difference | None:
+def replay(steps: Iterable[LogStep], core: Teleoperation) -> Difference | None:
     """The first difference; None where every intent is the same."""
     state = core.start()
     for number, step in enumerate(steps, 1):
@@ -51,7 +51,7 @@ def replay(steps: Iterable[Step], core: Teleoperation) -> Difference | None:
     return None
 
 
-def core_of(logbook: Logbook, package: str, reach: Reach) -> Teleoperation:
+def core_of(logbook: LogReader, package: str, reach: Reach) -> Teleoperation:
     """The core as the session had it.
 
     Raises:
@@ -90,7 +90,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("log", type=Path)
     parser.add_argument("package", type=Path)
     told = parser.parse_args(arguments)
-    logbook, files = read_logbook(told.log), unpacked.read_package(told.package)
+    logbook, files = read_session_log(told.log), unpacked.read_package(told.package)
     core = core_of(logbook, unpacked.package_digest(files), MapReach.from_arrays(unpacked.maps_of(files)))
     for damage in logbook.damage:
         print(f"{told.log}: {damage}")

@@ -30,17 +30,17 @@ LOOKS = 0.005  # s
 RESTING = 0.5  # s that braking may take before its process is ended
 TEXT = 240  # bytes of a fault
 MODES = ("idle", "running", "done", "fault")
-TIME, MODE, SERIAL, HELD, READY = range(5)  # of what the robot tells, before axes, sent and measured, thing and bodies
+TIME, MODE, SERIAL, HOLD_TIME, READY = range(5)  # of what the robot tells, before axes, sent and measured, thing and bodies
 PERMIT, PERMITTED, STOPS = range(3)  # of what it is told
 POSE = 7
 
 
-def told_by(due: float, told: float) -> float:
+def next_report_time(due: float, told: float) -> float:
     """The first s from `due` on at which a robot that told of itself at `told`, s, should have done so anew."""
     return told + math.ceil((due - told) / TELLS) * TELLS + FRESH
 
 
-class Channel:
+class RobotChannel:
     """What both processes share. One writes `told` whole, with a number that is odd meanwhile; the other, `asked`."""
 
     def __init__(self, context: SpawnContext, tendons: int, bodies: int) -> None:
@@ -80,7 +80,7 @@ class Goal:
 
 
 @dataclass(frozen=True)
-class Standing:
+class RobotState:
     """What the robot does at `time`, s.
 
     `joints` (7,), rad, and `commands` (K,), m, as they are sent, and poses of the `thing` (7,), NaN where there is
@@ -103,7 +103,7 @@ class RobotProcess:
 
     def __init__(self, run: Callable, setup: tuple, tendons: int, bodies: int, limits: Limits, package: str) -> None:
         context = multiprocessing.get_context("spawn")
-        self.channel = Channel(context, tendons, bodies)
+        self.channel = RobotChannel(context, tendons, bodies)
         self._limits, self._package, self._serial, self._digest, self._begun = limits, package, 0, "", 0.0
         edges = np.cumsum([5, JOINTS, tendons, JOINTS, tendons, POSE, POSE * bodies])
         self._places = [slice(*ends) for ends in pairwise(edges)]
@@ -128,12 +128,12 @@ class RobotProcess:
         """Whether it has told anything yet."""
         return self.channel.hear()[0][READY] > 0
 
-    def standing(self) -> Standing:
+    def standing(self) -> RobotState:
         """The newest."""
         numbers = self.channel.hear()[0]
         joints, commands, measured, lengths, thing, bodies = (numbers[place] for place in self._places)
         bodies = bodies.reshape(self.channel.bodies, POSE)
-        return Standing(numbers[TIME], numbers[HELD], joints, commands, thing, bodies, measured, lengths)
+        return RobotState(numbers[TIME], numbers[HOLD_TIME], joints, commands, thing, bodies, measured, lengths)
 
     def check(self, plan: Plan) -> str:
         now = self.standing()

@@ -14,7 +14,7 @@ TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".s
 ABSENT = b"<!doctype html><title>Trunkline</title><p>error: the page is not built: `client/` makes it</p>\n"
 
 
-class Site:
+class Routes:
     """scene: as `scene.scene` has it. folder: of the page."""
 
     def __init__(self, origins: Origins, token: str, scene: dict, folder: Path, log: Callable[[str], None]) -> None:

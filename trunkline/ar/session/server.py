@@ -16,19 +16,19 @@ from aiohttp import WSCloseCode, WSMsgType, web
 
 from trunkline.ar.session import binary, controller_input, messages, preview_process
 from trunkline.ar.session.alignment import mark_at
-from trunkline.ar.session.alignment_procedure import Aligner
+from trunkline.ar.session.alignment_procedure import AlignmentProcedure
 from trunkline.ar.session.anchors import Anchor, Anchors
 from trunkline.ar.session.auth import HEADERS, Origins, PairingCode, same
-from trunkline.ar.session.broadcast import Showing, piece
+from trunkline.ar.session.broadcast import Broadcast, piece
 from trunkline.ar.session.client import PER_SECOND, Client, end
-from trunkline.ar.session.controller import Desk
-from trunkline.ar.session.controller_input import held
-from trunkline.ar.session.gc_policy import Garbage
+from trunkline.ar.session.controller import SessionController
+from trunkline.ar.session.controller_input import controller_pose
+from trunkline.ar.session.gc_policy import GCPolicy
 from trunkline.ar.session.lease import Control
-from trunkline.ar.session.robot import told_by
-from trunkline.ar.session.routes import Site
+from trunkline.ar.session.robot import next_report_time
+from trunkline.ar.session.routes import Routes
 from trunkline.ar.session.scene import Shells
-from trunkline.ar.session.settings import Alignment
+from trunkline.ar.session.settings import AlignmentSettings
 from trunkline.errors import InputError
 
 HELLO = 3.0  # s for the first message
@@ -42,11 +42,11 @@ PREVIEWED = ("plan", "preview", "ready", "delay")  # modes in which who comes is
 
 
 @dataclass(frozen=True)
-class House:
+class Composition:
     """What a server is made of. scene: as `scene.scene` has it. alignment: how clients in a room are aligned, None
     where there are none; anchors: what is known of their rooms."""
 
-    desk: Desk
+    desk: SessionController
     token: str
     origins: Origins
     package: str
@@ -55,21 +55,21 @@ class House:
     rate: float
     page: Path
     log: Callable[[str], None] = print
-    alignment: Alignment | None = None
+    alignment: AlignmentSettings | None = None
     anchors: Anchors | None = None
 
 
 class Server:
     """The session's edge. `now` is its clock, s."""
 
-    def __init__(self, house: House, now: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, house: Composition, now: Callable[[], float] = time.monotonic) -> None:
         self.house, self.desk, self.now = house, house.desk, now
         self.control, self.code = Control(), PairingCode()
         self.clients: dict[str, Client] = {}
-        self._aligners: dict[str, Aligner] = {}  # of clients that may come again
-        self.showing = Showing(house.desk, house.shells)
-        self._site = Site(house.origins, house.token, house.scene, house.page, house.log)
-        self._world, self._unwritten, self._garbage = None, "", Garbage()
+        self._aligners: dict[str, AlignmentProcedure] = {}  # of clients that may come again
+        self.showing = Broadcast(house.desk, house.shells)
+        self._site = Routes(house.origins, house.token, house.scene, house.page, house.log)
+        self._world, self._unwritten, self._garbage = None, "", GCPolicy()
         self._ticked = now()
 
     # --- routes
@@ -150,7 +150,7 @@ class Server:
         self._greet(client)
         return client
 
-    def _aligner(self, hello: messages.Hello) -> Aligner | None:
+    def _aligner(self, hello: messages.Hello) -> AlignmentProcedure | None:
         """Its own where it comes again to the same room: whose anchor has to be seen anew."""
         kept = self._aligners.pop(hello.id, None)
         if hello.space == "base" or self.house.alignment is None:
@@ -162,14 +162,14 @@ class Server:
         anchors = self.house.anchors
         while len(self._aligners) >= MOST_CLIENTS:
             self._aligners.pop(next(iter(self._aligners)))
-        return Aligner(self.house.alignment, anchors.find(anchors.newest) if anchors is not None else None)
+        return AlignmentProcedure(self.house.alignment, anchors.find(anchors.newest) if anchors is not None else None)
 
     def _greet(self, client: Client) -> None:
         desk, say = self.desk, client.outbox.say
         say(messages.tell(messages.Welcome(client.id, self.house.token, self.house.package, self.house.rate)))
         if client.aligner is not None:
             say(messages.tell(client.aligner.told()))
-        say(messages.tell(messages.Around(desk.world)))
+        say(messages.tell(messages.WorldMessage(desk.world)))
         if desk.intent is not None:
             say(messages.tell(desk.told(self.control.holder)))
             if desk.preview is not None and desk.intent.mode in PREVIEWED:
@@ -257,35 +257,35 @@ class Server:
         rests = self.desk.robot.state().mode in ("idle", "done")
         mark = mark_at(self.desk.robot.standing().joints, settings.mark) if rests else None
         before = aligner.told()
-        aligner.hear(received.stamp, held(received, TOUCHING), mark)
+        aligner.hear(received.stamp, controller_pose(received, TOUCHING), mark)
         self._aligned(client, before)
 
-    def _said_by(self, client: Client, said: messages.Said, now: float) -> None:
+    def _said_by(self, client: Client, said: messages.ClientMessage, now: float) -> None:
         if isinstance(said, messages.Pong):
             if client.clock.pong(said.number, said.stamp, now):
                 assert client.clock.offset is not None
                 client.outbox.say(messages.tell(messages.Clock(client.clock.offset, client.clock.round_trip)))
                 self.desk.journal.event("clock", client=client.id, offset=client.clock.offset)
-        elif isinstance(said, messages.LeaseWish):
+        elif isinstance(said, messages.LeaseRequest):
             self._lease(client, said, now)
-        elif isinstance(said, messages.Alignment | messages.Touching | messages.Anchored):
+        elif isinstance(said, messages.AlignmentByEye | messages.TouchRequest | messages.AnchorPose):
             self._align(client, said)
-        elif isinstance(said, messages.Shown):
+        elif isinstance(said, messages.PreviewShown):
             reason = "shown: you do not control" if client.id != self.control.holder else ""
             if reason := reason or self.desk.shown(said.digest, now):
                 self._refuse(client, reason)
         else:
             self._refuse(client, "hello: was said before")
 
-    def _align(self, client: Client, said: messages.Alignment | messages.Touching | messages.Anchored) -> None:
+    def _align(self, client: Client, said: messages.AlignmentByEye | messages.TouchRequest | messages.AnchorPose) -> None:
         aligner, anchors, reason = client.aligner, self.house.anchors, ""
         if aligner is None:
             self._refuse(client, "alignment: your poses are in the base frame")
             return
         before, anchor = aligner.told(), aligner.anchor
-        if isinstance(said, messages.Touching):
+        if isinstance(said, messages.TouchRequest):
             aligner.touch()
-        elif isinstance(said, messages.Anchored):
+        elif isinstance(said, messages.AnchorPose):
             reason = aligner.anchored(said.id, said.pose, anchors.find(said.id) if anchors is not None else None)
         elif said.pose is None:
             aligner.reset()
@@ -297,7 +297,7 @@ class Server:
             self._keep_anchor(anchors, aligner.anchor)
         self._aligned(client, before)
 
-    def _aligned(self, client: Client, before: messages.Aligning) -> None:
+    def _aligned(self, client: Client, before: messages.AlignmentProgress) -> None:
         """The core, the client and the log hear what has changed."""
         assert client.aligner is not None
         now = client.aligner.told()
@@ -321,7 +321,7 @@ class Server:
 
         asyncio.get_running_loop().run_in_executor(None, anchors.save).add_done_callback(saved)
 
-    def _lease(self, client: Client, wish: messages.LeaseWish, now: float) -> None:
+    def _lease(self, client: Client, wish: messages.LeaseRequest, now: float) -> None:
         before = self.control.holder
         if wish.action == "ask":
             self.control.ask(client.id, now)
@@ -381,7 +381,7 @@ class Server:
         self._ticked = self.now()
         due = self._ticked + period
         while True:
-            after = told_by(due, self.desk.robot.standing().time)
+            after = next_report_time(due, self.desk.robot.standing().time)
             await asyncio.sleep(max(after - self.now(), 0.0))
             self.step()
             due = max(due + period, self._ticked)
@@ -412,21 +412,21 @@ class Server:
         self._show(now)
         if self.desk.world is not self._world:
             self._world = self.desk.world
-            self._tell(messages.Around(self.desk.world))
+            self._tell(messages.WorldMessage(self.desk.world))
 
     def foreseen(self, answer: preview_process.Answer | None) -> None:
         """An answer of the process that plans; called in the event loop."""
         if not self.desk.answered(answer, self.now()):
             return
-        if isinstance(answer, preview_process.Begun):
+        if isinstance(answer, preview_process.PreviewBegun):
             for client in self.clients.values():
                 client.outbox.forget_pieces()
             self._tell(answer.preview)
-        elif isinstance(answer, preview_process.Shown):
+        elif isinstance(answer, preview_process.PreviewPiece):
             message = piece(answer)
             for client in self.clients.values():
                 client.outbox.piece(message)
-        elif isinstance(answer, preview_process.Told):
+        elif isinstance(answer, preview_process.PredictionAnswer):
             self._tell(answer.foreseen)
 
     def _show(self, now: float) -> None:
@@ -445,7 +445,7 @@ class Server:
         people = tuple(messages.Person(client.id, client.name) for client in self.clients.values())
         self._tell(messages.Lease(self.control.holder, tuple(self.control.asking), people))
 
-    def _tell(self, answer: messages.Answer) -> None:
+    def _tell(self, answer: messages.ServerMessage) -> None:
         text = messages.tell(answer)
         for client in list(self.clients.values()):
             if not client.outbox.say(text):

@@ -15,14 +15,14 @@ from pathlib import Path
 
 from aiohttp import web
 
-from trunkline.ar.drivers.settings import Config as Execution
+from trunkline.ar.drivers.settings import ExecutionConfig as Execution
 from trunkline.ar.session.anchors import Anchors
 from trunkline.ar.session.auth import CODE_SECONDS, Origins, make_token
-from trunkline.ar.session.composition import Made, make
+from trunkline.ar.session.composition import SessionParts, make
 from trunkline.ar.session.hardware import Hardware, hardware_of
 from trunkline.ar.session.preview_process import Answer
-from trunkline.ar.session.server import PARTING, House, Server
-from trunkline.ar.session.settings import Alignment, Config
+from trunkline.ar.session.server import PARTING, Composition, Server
+from trunkline.ar.session.settings import AlignmentSettings, SessionConfig
 from trunkline.ar.teleop.config import Config as Teleop
 from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT, load_folder
@@ -30,7 +30,7 @@ from trunkline.pipeline.config import PROJECT, load_folder
 PAGE = Path(__file__).parent / "page"
 
 
-def alignment_for(hardware: Hardware | None, settings: Alignment) -> Alignment:
+def alignment_for(hardware: Hardware | None, settings: AlignmentSettings) -> AlignmentSettings:
     """As set; where anything real moves, never by eye."""
     return replace(settings, by_eye=False) if hardware is not None and hardware.real else settings
 
@@ -95,9 +95,9 @@ async def opened(
     address: Address,
     log: Callable[[str], None],
     hardware: Hardware | None = None,
-    config: Config | None = None,
+    config: SessionConfig | None = None,
     teleop: Teleop | None = None,
-) -> AsyncIterator[tuple[Server, Made]]:
+) -> AsyncIterator[tuple[Server, SessionParts]]:
     """A session that is ready, on the simulated robot where there is no hardware, by conf/live and conf/teleop where
     there is no `config` and `teleop`; its processes end with it.
 
@@ -109,7 +109,7 @@ async def opened(
     def heard(answer: Answer | None) -> None:
         loop.call_soon_threadsafe(lambda: [server.foreseen(answer) for server in servers])
 
-    config = config or load_folder(Config, PROJECT / "conf/live")
+    config = config or load_folder(SessionConfig, PROJECT / "conf/live")
     teleop = teleop or load_folder(Teleop, PROJECT / "conf/teleop")
     if hardware is not None:
         teleop = hardware.kept_by(teleop)
@@ -117,7 +117,7 @@ async def opened(
     anchors = Anchors(Path(alignment.anchors))
     made = await asyncio.to_thread(make, package, teleop, config, heard, hardware)
     try:
-        house = House(
+        house = Composition(
             made.desk, make_token(), address.origins, made.package, made.scene, made.shells, config.rate, PAGE, log,
             alignment, anchors,
         )  # fmt: skip

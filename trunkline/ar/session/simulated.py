@@ -21,8 +21,8 @@ from threadpoolctl import threadpool_limits
 from trunkline.ar.hybrid.compose import panda_joints
 from trunkline.ar.hybrid.rollouts import Twin
 from trunkline.ar.hybrid.torques import servo_commands
-from trunkline.ar.session.bodies import Poses
-from trunkline.ar.session.robot import DEAD_MAN, MODES, PERMIT, PERMITTED, STOPS, TELLS, Channel, Goal
+from trunkline.ar.session.bodies import BodyPoses
+from trunkline.ar.session.robot import DEAD_MAN, MODES, PERMIT, PERMITTED, STOPS, TELLS, Goal, RobotChannel
 from trunkline.ar.teleop.executor import FOLLOWS, SimulatedRobot
 from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.plan import Plan
@@ -54,7 +54,7 @@ class Simulation:
     mount_offset: float
 
 
-class Plant:
+class TwinPlant:
     """The twin moved by axes, a tick at a time."""
 
     def __init__(self, simulation: Simulation) -> None:
@@ -75,7 +75,7 @@ class Plant:
             off.mjDSBL_CONTACT | off.mjDSBL_FRICTIONLOSS | off.mjDSBL_EQUALITY | off.mjDSBL_LIMIT
         )
         self._data = mujoco.MjData(self._bare)
-        self._poses, self._thing = Poses(model, simulation.bodies), Poses(model, ("object",))
+        self._poses, self._thing = BodyPoses(model, simulation.bodies), BodyPoses(model, ("object",))
         self._last = np.tile(simulation.joints, (2, 1))
         controls = np.zeros((1, model.nu))
         controls[:, self._motors] = self._commands = simulation.commands
@@ -136,7 +136,7 @@ class Plant:
         return servo_commands(self.model, joints, data.qfrc_inverse[dofs]) + self._ratio * speed
 
 
-class Moved(Protocol):
+class MovingPlant(Protocol):
     """What a process moves, a tick at a time."""
 
     @property
@@ -152,7 +152,7 @@ class Moved(Protocol):
 class Loop:
     """Plans in, motion out; what the process does at each turn. `robot` moves the `plant`."""
 
-    def __init__(self, channel: Channel, robot: SimulatedRobot, plant: Moved) -> None:
+    def __init__(self, channel: RobotChannel, robot: SimulatedRobot, plant: MovingPlant) -> None:
         self.channel, self.robot, self.plant = channel, robot, plant
         self.serial, self.fault, self.held = 0, "", 0.0
         self._stops, self._holds, self._listens = channel.asked[STOPS], False, 0.0
@@ -239,7 +239,7 @@ def drive(loop: Loop, parent: int, behind: Callable[[], float] = lambda: BEHIND)
             loop.tell(time.monotonic())
 
 
-def run(channel: Channel, simulation: Simulation) -> None:
+def run(channel: RobotChannel, simulation: Simulation) -> None:
     """The process: until its parent is gone."""
     leave_signals_to_parent()
     os.environ["TRUNKLINE_THREADS"] = "1"
@@ -247,7 +247,7 @@ def run(channel: Channel, simulation: Simulation) -> None:
         os.nice(NICE)
     threadpool_limits(1)
     parent = parent_pid()
-    plant = Plant(simulation)
+    plant = TwinPlant(simulation)
     robot = SimulatedRobot(
         simulation.joints, simulation.commands, simulation.limits, simulation.package,
         lambda joints, commands, _: plant.move(joints, commands, robot.state().digest != FOLLOWS),
