@@ -193,7 +193,7 @@ ATTEMPTS: dict[str, Attempt] = {
 async def session(package: Path) -> None:
     """All of them, one after the other."""
     async with opened(package, ADDRESS, lambda line: None) as (server, made), ClientSession() as session:
-        scene = Scene(server, made, session, server.house.token)
+        scene = Scene(server, made, session, server.composition.token)
         began: list[str] = []
         start = made.robot.start
 
@@ -202,12 +202,12 @@ async def session(package: Path) -> None:
             return start(plan, digest)
 
         made.robot.start = counted  # type: ignore[method-assign]
-        rests = made.robot.standing().joints
+        rests = made.robot.robot_state().joints
         print("| attempt | it is told | plans begun | joints moved, rad |")
         print("|---|---|---:|---:|")
         for title, attempt in ATTEMPTS.items():
             said = await attempt(scene)
-            moved = float(np.abs(made.robot.standing().joints - rests).max())
+            moved = float(np.abs(made.robot.robot_state().joints - rests).max())
             print(f"| {title} | {said} | {len(began)} | {moved:.1g} |", flush=True)
 
 

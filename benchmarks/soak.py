@@ -67,7 +67,7 @@ class Robot:
     def state(self) -> ExecutorReport:
         return self.robot.state()
 
-    def standing(self) -> RobotState:
+    def robot_state(self) -> RobotState:
         bodies = np.tile([0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0], (BODIES, 1))
         return RobotState(self.now, 0.0, self.robot.joints, self.robot.commands, np.full(7, np.nan), bodies)
 
@@ -125,14 +125,14 @@ async def session(package: Package, hours: float) -> None:
     robot, clock, said = Robot(package, teleop), [0.0], Counter()
     planning = Planning(robot)
     core = Teleoperation(teleop.core, package.reach, package.digest, teleop.mount_offset)
-    desk, token = SessionController(core, robot, planning, make_world(()), teleop.handling.lift), make_token()
+    controller, token = SessionController(core, robot, planning, make_world(()), teleop.handling.lift), make_token()
 
     def log(line: str) -> None:
         said["silent"] += line.endswith("was silent")
         said["error"] += line.startswith("error:")
 
     scene = {"bodies": [f"b{n}" for n in range(BODIES)]}
-    house = Composition(desk, token, ADDRESS.origins, package.digest, scene, None, HZ, Path("nowhere"), log)
+    house = Composition(controller, token, ADDRESS.origins, package.digest, scene, None, HZ, Path("nowhere"), log)
     server = planning.server = Stepped(house, lambda: clock[0])
     began = time.monotonic()
     async with listening(server, ADDRESS), ClientSession() as sockets:

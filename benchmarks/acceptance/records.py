@@ -38,14 +38,14 @@ def killed() -> Row:
 
 def _lost(path: Path, period: float, seconds: float) -> float:
     """s from the first that was told and is not in the file until the kill."""
-    journal = LogWriterProcess(path, NOTHING, period)
-    journal.event("tick", number=0)
+    log_writer = LogWriterProcess(path, NOTHING, period)
+    log_writer.event("tick", number=0)
     until(lambda: path.exists() and path.stat().st_size > BEGUN, seconds=COMES)
-    told, end = fed(journal, seconds), time.monotonic()
-    assert journal.pid is not None
-    os.kill(journal.pid, signal.SIGKILL)
+    told, end = fed(log_writer, seconds), time.monotonic()
+    assert log_writer.pid is not None
+    os.kill(log_writer.pid, signal.SIGKILL)
     numbers, _ = ticks(path)
-    journal.close()
+    log_writer.close()
     if numbers != list(range(len(numbers))):
         raise InputError(f"{path.name}: found a gap between what is kept, expected none")
     return end - told[numbers[-1]] if numbers[-1] < len(told) else 0.0

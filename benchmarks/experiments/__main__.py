@@ -74,12 +74,12 @@ async def perform(bench: Bench, staged: Staged, python: Path, package: Path) -> 
         async with franka_sim(python, session.robot.joints[0]):
             asked = package, ADDRESS, lambda line: None, hardware(python), config, patient(bench)
             async with opened(*asked) as (server, made):
-                url = f"{ADDRESS.url}/#token={server.house.token}"
+                url = f"{ADDRESS.url}/#token={server.composition.token}"
                 async with browsing(url, WINDOW, YIELDS) as page:
-                    operator = AtPage(page, staged, made.desk.journal.subject.tip, accept)
+                    operator = AtPage(page, staged, made.controller.log_writer.subject.tip, accept)
                     ending, views = await operator.perform()
                     seconds = time.monotonic() - operator.begun
-            log = made.journal.path
+            log = made.log_writer.path
         frames = await asyncio.to_thread(done_again, session, log, operator.begun)
     return staged.judged(ending, frames, views, seconds)
 

@@ -120,7 +120,7 @@ async def _serve(pipe: Connection, package: Path, motors: bool) -> None:
     hardware = hardware_of("simulated", "gm6020", SIMULATED, "", execution) if motors else None
     async with opened(package, ADDRESS, say, hardware) as (server, made):
         assert made.robot.pid is not None
-        assert made.journal.pid is not None
-        pipe.send(Told(server.house.token, made.robot.pid, made.journal.pid, made.journal.path))
+        assert made.log_writer.pid is not None
+        pipe.send(Told(server.composition.token, made.robot.pid, made.log_writer.pid, made.log_writer.path))
         with contextlib.suppress(EOFError, OSError):
             await asyncio.to_thread(pipe.recv)

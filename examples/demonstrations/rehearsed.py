@@ -97,7 +97,7 @@ def listen(session: Session, journal: LogWriter) -> None:
         view, now = frame(), last["seen"]
         straight, sent = session.package.straight, session.executor
         tip = np.concatenate([now.tip, now.tip_quaternion])
-        journal.standing(
+        journal.robot_state(
             RobotState(session.now, 0.0, sent.joints, sent.commands, tip, tip[None], now.joints, straight - now.wound)
         )
         if changed("world", session.world):

@@ -44,7 +44,7 @@ def written(path, joints=True, moves=True):
             if moves and abs(now - MOVES) < 0.5 / 72:
                 journal.event("mode", mode="execute", notice="", digest="")
             at, lengths = measured(now)
-            journal.standing(RobotState(
+            journal.robot_state(RobotState(
                 journal.time, 0.0, START + 1.0, STRAIGHT - 0.2, poses[0], poses, at if joints else None, lengths
             ))  # fmt: skip
             journal.step(1 / 60, operator.given, operator.step())

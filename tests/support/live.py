@@ -61,7 +61,7 @@ class PlainRobot:
         self.stops.append(time.monotonic())
         self.robot.stop()
 
-    def standing(self):
+    def robot_state(self):
         now = time.monotonic()
         self.last = self.last or now
         while self.last + TICK <= now:
@@ -115,15 +115,15 @@ def patient(**seconds):
 class Laid:
     """A server, its parts, and its log."""
 
-    def __init__(self, port, page=Path("nowhere"), journal=None, anchors=None, settings=None, rate=RATE):
+    def __init__(self, port, page=Path("nowhere"), log_writer=None, anchors=None, settings=None, rate=RATE):
         self.robot, self.planning, self.log = PlainRobot(), PlainPlanning(), []
         core = Teleoperation(settings or patient(), Everywhere(), PACKAGE, OFFSET)
-        self.desk = SessionController(core, self.robot, self.planning, make_world(()), 0.1, journal)
-        self.desk.begin(rate)
+        self.controller = SessionController(core, self.robot, self.planning, make_world(()), 0.1, log_writer)
+        self.controller.begin(rate)
         scene = {"bodies": ["a", "b", "c"]}
         origins = Origins.of(["127.0.0.1"], port, tls=False)
         self.server = Server(Composition(
-            self.desk, TOKEN, origins, PACKAGE, scene, None, rate, page, self.log.append, live().alignment, anchors
+            self.controller, TOKEN, origins, PACKAGE, scene, None, rate, page, self.log.append, live().alignment, anchors
         ))  # fmt: skip
         self.planning.heard = self.server.foreseen
         self.url, self.origin = f"http://127.0.0.1:{port}", f"http://127.0.0.1:{port}"
@@ -213,10 +213,10 @@ def hand(place, **buttons):
 
 
 @asynccontextmanager
-async def laid(page=Path("nowhere"), journal=None, anchors=None, settings=None, rate=RATE):
+async def laid(page=Path("nowhere"), log_writer=None, anchors=None, settings=None, rate=RATE):
     """A server that runs, and how to come to it."""
     port = unused_port()
-    here = Laid(port, page, journal, anchors, settings, rate)
+    here = Laid(port, page, log_writer, anchors, settings, rate)
     served = TestServer(here.server.app(), host="127.0.0.1", port=port)
     async with served, ClientSession() as session:
 

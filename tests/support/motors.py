@@ -28,18 +28,18 @@ class Workbench:
 
     def __init__(self, plants=PLANTS, settings=None, lost=0.0, seed=0):
         self.now, self.lost, self._random = 100.0, lost, random.Random(seed)
-        self.bank = SimulatedMotors(plants, self.now)
+        self.simulated = SimulatedMotors(plants, self.now)
         self.motors = MotorGroup(settings or motor_settings(), self.now)
         self.zeros = np.zeros(len(plants))
 
     @property
     def currents(self):
-        return [motor.current for motor in self.bank.motors]
+        return [motor.current for motor in self.simulated.motors]
 
     @property
     def pulls(self):
         """True ones, (K,), m, once it is homed."""
-        return np.array([motor.reeled for motor in self.bank.motors]) - self.zeros
+        return np.array([motor.reeled for motor in self.simulated.motors]) - self.zeros
 
     def hear(self, frame):
         if self._random.random() >= self.lost:
@@ -48,14 +48,14 @@ class Workbench:
     def drive(self, pulls, speeds, now):
         for frame in command_frames(self.motors.currents(pulls, speeds, now)):
             if self._random.random() >= self.lost:
-                self.bank.hear(*frame, now)
+                self.simulated.hear(*frame, now)
 
     def tick(self, pull=0.0, speed=0.0, commanding=True):
         self.now += TICK
-        for frame in self.bank.advance(self.now):
+        for frame in self.simulated.advance(self.now):
             self.hear(frame)
         if commanding:
-            count = len(self.bank.motors)
+            count = len(self.simulated.motors)
             self.drive([pull] * count, [speed] * count, self.now)
 
     def rest(self, seconds, **how):
@@ -66,7 +66,7 @@ class Workbench:
         end = self.now + 20.0
         while not self.motors.homed and not self.motors.fault and self.now < end:
             self.tick()
-        self.zeros = np.array([motor.reeled for motor in self.bank.motors]) - self.motors.pulls
+        self.zeros = np.array([motor.reeled for motor in self.simulated.motors]) - self.motors.pulls
         return self
 
     def pull(self, depth=0.09, seconds=2.0):

@@ -69,7 +69,7 @@ class Session(LogWriter):
             pose = np.array([[0.0, 0, 0, 1, 0, 0, 0], [0.1 * self.time, 0, 0, 0, 1, 0, 0]])  # turned by 180° about x
             measured = lag_joints if self.measured else None
             wound = STRAIGHT - lag_pulls if self.measured else None
-            self.standing(RobotState(self.time, 0.0, joints, STRAIGHT - pulls, nothing, pose, measured, wound))
+            self.robot_state(RobotState(self.time, 0.0, joints, STRAIGHT - pulls, nothing, pose, measured, wound))
             fields = {"targets": None, "rays": ((0.1, 0.2, self.time), None)} | wanted
             if motion == "follow":
                 fields["follow"] = targets(0.1 * self.time)

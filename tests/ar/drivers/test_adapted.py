@@ -50,7 +50,7 @@ def clock(monkeypatch):
 
 
 @pytest.fixture
-def limb(clock):
+def driver(clock):
     found = DriverClient(["adapter"], 7, PATIENCE, ASTRAY, ", expected it here")
     yield found
     found.close()
@@ -58,12 +58,12 @@ def limb(clock):
 
 
 @pytest.fixture
-def ready(limb):
-    limb.process.tell(BEGUN)
-    limb.turn(BEGUN)
-    assert limb.ready
-    assert limb.fault == ""
-    return limb
+def ready(driver):
+    driver.process.tell(BEGUN)
+    driver.turn(BEGUN)
+    assert driver.ready
+    assert driver.fault == ""
+    return driver
 
 
 def test_an_adapter_that_tells_of_itself_is_no_fault_however_long(ready):
@@ -95,23 +95,23 @@ def test_what_it_told_long_ago_does_not_count_as_told_when_it_is_heard(ready):
     ("late", "fault"),
     [(0.0, ""), (PATIENCE - NEAR, ""), (PATIENCE + NEAR, "its adapter is not ready after 5 s, expected it here")],
 )  # fmt: skip
-def test_an_adapter_has_to_be_ready_within_its_time(limb, late, fault):
-    limb.turn(BEGUN + late)
-    assert not limb.ready
-    assert limb.fault == fault
-    assert np.isnan(limb.measured).all()
+def test_an_adapter_has_to_be_ready_within_its_time(driver, late, fault):
+    driver.turn(BEGUN + late)
+    assert not driver.ready
+    assert driver.fault == fault
+    assert np.isnan(driver.measured).all()
 
 
 @pytest.mark.parametrize("sign", [-1, 1])
 @pytest.mark.parametrize("joint", range(7))
-def test_a_joint_far_from_where_it_is_sent_is_a_fault(limb, joint, sign):
+def test_a_joint_far_from_where_it_is_sent_is_a_fault(driver, joint, sign):
     off = sign * np.eye(7)[joint]
-    limb.process.tell(BEGUN, READY + (ASTRAY - NEAR) * off)
-    limb.turn(BEGUN)
-    assert limb.fault == ""
-    limb.process.tell(BEGUN, READY + (ASTRAY + NEAR) * off)
-    limb.turn(BEGUN)
-    assert limb.fault == f"joint {joint + 1}: found 0.05 rad from where it is sent, expected at most 0.05"
+    driver.process.tell(BEGUN, READY + (ASTRAY - NEAR) * off)
+    driver.turn(BEGUN)
+    assert driver.fault == ""
+    driver.process.tell(BEGUN, READY + (ASTRAY + NEAR) * off)
+    driver.turn(BEGUN)
+    assert driver.fault == f"joint {joint + 1}: found 0.05 rad from where it is sent, expected at most 0.05"
 
 
 def test_a_joint_is_looked_at_in_every_frame_though_a_later_one_is_well(ready):
@@ -123,10 +123,10 @@ def test_a_joint_is_looked_at_in_every_frame_though_a_later_one_is_well(ready):
 
 @pytest.mark.parametrize("joint", range(7))
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_a_joint_that_is_nowhere_is_a_fault(limb, value, joint):
-    limb.process.tell(BEGUN, np.where(np.arange(7) == joint, value, READY))
-    limb.turn(BEGUN)
-    assert limb.fault.startswith(f"joint {joint + 1}: found ")
+def test_a_joint_that_is_nowhere_is_a_fault(driver, value, joint):
+    driver.process.tell(BEGUN, np.where(np.arange(7) == joint, value, READY))
+    driver.turn(BEGUN)
+    assert driver.fault.startswith(f"joint {joint + 1}: found ")
 
 
 def test_the_fault_that_an_adapter_tells_is_the_limbs(ready):
@@ -135,21 +135,21 @@ def test_the_fault_that_an_adapter_tells_is_the_limbs(ready):
     assert ready.fault == "reflex: too fast"
 
 
-def test_an_adapter_that_fails_before_it_is_ready_never_is(limb):
-    limb.process.tell(BEGUN, fault="no robot")
-    limb.turn(BEGUN)
-    assert limb.fault == "no robot"
-    assert not limb.ready
+def test_an_adapter_that_fails_before_it_is_ready_never_is(driver):
+    driver.process.tell(BEGUN, fault="no robot")
+    driver.turn(BEGUN)
+    assert driver.fault == "no robot"
+    assert not driver.ready
 
 
 def test_an_adapter_that_ends_is_a_fault_and_why_it_did_comes_first(clock):
     for fault, expected in (("", "its adapter has ended"), ("no robot", "no robot")):
-        limb = DriverClient(["adapter"], 7)
-        limb.process.tell(BEGUN, fault=fault)
-        limb.process.socket.close()
-        limb.turn(BEGUN)
-        assert limb.fault == expected
-        limb.close()
+        driver = DriverClient(["adapter"], 7)
+        driver.process.tell(BEGUN, fault=fault)
+        driver.process.socket.close()
+        driver.turn(BEGUN)
+        assert driver.fault == expected
+        driver.close()
 
 
 def test_a_fault_lasts_and_is_the_first(ready):
@@ -172,12 +172,12 @@ def test_what_is_sent_comes_to_the_adapter(ready):
 
 def test_an_adapter_that_takes_no_setpoints_is_a_fault_unless_it_has_told_one(clock):
     for told, expected in (("", "its adapter has ended"), ("reflex", "reflex")):
-        limb = DriverClient(["adapter"], 7)
-        limb.process.tell(BEGUN, fault=told)
-        limb.process.socket.close()
-        limb.send(BEGUN, READY)
-        assert limb.fault == expected
-        limb.close()
+        driver = DriverClient(["adapter"], 7)
+        driver.process.tell(BEGUN, fault=told)
+        driver.process.socket.close()
+        driver.send(BEGUN, READY)
+        assert driver.fault == expected
+        driver.close()
     full = DriverClient(["adapter"], 7)
     while not full.fault:
         full.send(BEGUN, READY)
@@ -187,32 +187,32 @@ def test_an_adapter_that_takes_no_setpoints_is_a_fault_unless_it_has_told_one(cl
 
 @pytest.mark.parametrize("ends", [True, False])
 def test_an_adapter_that_does_not_end_is_killed_after_a_while(clock, ends):
-    limb = DriverClient(["adapter"], 7)
-    limb.process.ends = ends
-    limb.close()
-    limb.process.line.heard()
-    assert not limb.process.line.open
-    assert limb.process.waited[0] == CLOSING
-    assert limb.process.killed == (not ends)
-    assert len(limb.process.waited) == (1 if ends else 2)  # none is left behind that has ended
+    driver = DriverClient(["adapter"], 7)
+    driver.process.ends = ends
+    driver.close()
+    driver.process.line.heard()
+    assert not driver.process.line.open
+    assert driver.process.waited[0] == CLOSING
+    assert driver.process.killed == (not ends)
+    assert len(driver.process.waited) == (1 if ends else 2)  # none is left behind that has ended
 
 
-def test_ctrl_c_is_for_whoever_sends_and_not_for_the_adapter(limb):
-    assert limb.process.how["start_new_session"] is True
-    assert limb.process.how["stdin"] == subprocess.DEVNULL
+def test_ctrl_c_is_for_whoever_sends_and_not_for_the_adapter(driver):
+    assert driver.process.how["start_new_session"] is True
+    assert driver.process.how["stdin"] == subprocess.DEVNULL
 
 
 def test_a_robots_joint_may_be_as_far_off_as_the_settings_say(clock):
     """A Panda's: 0.05 rad."""
     assert SETTINGS.arm.astray == ASTRAY
     for off, fault in ((ASTRAY - NEAR, ""), (ASTRAY + NEAR, "joint 4: found 0.05 rad from where it is sent, ")):
-        limb = panda(SETTINGS.arm, "panda")
-        assert limb.process.command[1:5] == ["-m", "trunkline.ar.drivers.driver_process", "panda", SETTINGS.arm.address]
-        limb.process.tell(BEGUN, READY + off * np.eye(7)[3])
-        limb.turn(BEGUN)
-        assert limb.fault.startswith(fault)
-        assert bool(limb.fault) == bool(fault)
-        limb.close()
+        driver = panda(SETTINGS.arm, "panda")
+        assert driver.process.command[1:5] == ["-m", "trunkline.ar.drivers.driver_process", "panda", SETTINGS.arm.address]
+        driver.process.tell(BEGUN, READY + off * np.eye(7)[3])
+        driver.turn(BEGUN)
+        assert driver.fault.startswith(fault)
+        assert bool(driver.fault) == bool(fault)
+        driver.close()
 
 
 @pytest.mark.parametrize(
@@ -223,9 +223,9 @@ def test_a_robots_joint_may_be_as_far_off_as_the_settings_say(clock):
 )  # fmt: skip
 def test_how_long_each_limb_is_waited_for(clock, limb_of, patience):
     """Motors have to be homed until then, a robot has to be there."""
-    limb = limb_of()
-    limb.turn(BEGUN + patience - NEAR)
-    assert limb.fault == ""
-    limb.turn(BEGUN + patience + NEAR)
-    assert limb.fault.startswith(f"its adapter is not ready after {patience:.0f} s")
-    limb.close()
+    driver = limb_of()
+    driver.turn(BEGUN + patience - NEAR)
+    assert driver.fault == ""
+    driver.turn(BEGUN + patience + NEAR)
+    assert driver.fault.startswith(f"its adapter is not ready after {patience:.0f} s")
+    driver.close()

@@ -24,7 +24,7 @@ class Played:
         for _ in range(round(seconds / TICK)):
             self.bench.now += TICK
             now = self.bench.now
-            for frame in self.bench.bank.advance(now):
+            for frame in self.bench.simulated.advance(now):
                 self.bench.hear(frame)
             if way is not None:
                 self.cables.send(now + LEAD, np.full(3, way(now - begun)))

@@ -61,7 +61,7 @@ def test_each_motor_has_to_be_heard_at_first_and_none_is_driven_before(number, l
 def test_a_motor_may_be_so_hot(number, beyond):
     bench = homed()
     hot = int(motor_settings().hot) + beyond
-    bench.motors.hear(Feedback(number, bench.motors.reels[number - 1]._angle, 0, 0.0, hot), bench.now)
+    bench.motors.hear(Feedback(number, bench.motors.winches[number - 1]._angle, 0, 0.0, hot), bench.now)
     assert bench.motors.fault == (f"motor {number}: found {hot} °C, expected at most 80" if beyond else "")
 
 
@@ -92,12 +92,12 @@ def test_a_fault_of_any_motor_ends_the_current_of_all(number):
 @pytest.mark.parametrize("beyond", [-NEAR, NEAR])
 def test_a_cable_may_be_so_loose_as_homing_begins(beyond):
     settings = motor_settings().reel
-    reel = Winch(settings, 1)
-    reel.read(Feedback(1, 0, 0, 0.0, 30), 0.0)
-    reel.pull = settings.slack + beyond
-    current = reel.home(0.001)
-    assert reel.fault == ("found no tension within 100 mm, expected 6 N" if beyond > 0 else "")
-    assert not (reel.fault and current)
+    winch = Winch(settings, 1)
+    winch.read(Feedback(1, 0, 0, 0.0, 30), 0.0)
+    winch.pull = settings.slack + beyond
+    current = winch.home(0.001)
+    assert winch.fault == ("found no tension within 100 mm, expected 6 N" if beyond > 0 else "")
+    assert not (winch.fault and current)
 
 
 @pytest.mark.parametrize("sign", [-1, 1])
@@ -110,9 +110,9 @@ def test_no_command_asks_a_motor_for_more_than_it_may_have(asked, sent, sign):
 @pytest.mark.parametrize("side", [-1, 1])
 @pytest.mark.parametrize("wanted", [-1.0, 1.0])
 def test_the_current_of_a_loop_ends_at_what_the_settings_allow_either_way(side, wanted):
-    reel = Winch(motor_settings().reel, side)
-    reel.read(Feedback(1, 0, 0, 0.0, 30), 0.0)
-    assert reel.current(wanted, 0.0, 0.001) == pytest.approx(side * wanted * motor_settings().reel.most)
+    winch = Winch(motor_settings().reel, side)
+    winch.read(Feedback(1, 0, 0, 0.0, 30), 0.0)
+    assert winch.current(wanted, 0.0, 0.001) == pytest.approx(side * wanted * motor_settings().reel.most)
 
 
 # --- setpoints
@@ -263,8 +263,8 @@ class Told:
      (None, "hot", "motors: hot"), ("reflex", None, "robot: reflex"), (None, None, "")],
 )  # fmt: skip
 def test_a_fault_of_either_limb_is_the_machines_and_has_its_name(arm, motors, fault):
-    limbs = [None if said is None else Told(fault=said) for said in (arm, motors)]
-    assert HardwareRobot(*limbs, np.full(3, 0.5), lambda: 100.0).fault == fault
+    drivers = [None if said is None else Told(fault=said) for said in (arm, motors)]
+    assert HardwareRobot(*drivers, np.full(3, 0.5), lambda: 100.0).fault == fault
 
 
 @pytest.fixture
@@ -285,11 +285,11 @@ def test_a_machine_begins_once_both_limbs_are_ready(waits):
 
 
 @pytest.mark.parametrize(("limb", "said"), [("arm", "robot: no robot"), ("motors", "motors: no robot")])
-def test_a_machine_whose_limb_fails_does_not_begin(waits, limb, said):
-    limbs = {"arm": Told(ready=False), "motors": Told(ready=False)}
-    waits += [lambda: setattr(limbs[limb], "fault", "no robot")]
+def test_a_machine_whose_limb_fails_does_not_begin(waits, driver, said):
+    drivers = {"arm": Told(ready=False), "motors": Told(ready=False)}
+    waits += [lambda: setattr(drivers[driver], "fault", "no robot")]
     with pytest.raises(InputError, match=f"^{said}$"):
-        HardwareRobot(**limbs, straight=np.full(3, 0.5), clock=lambda: 100.0).begin(np.ones(7))
+        HardwareRobot(**drivers, straight=np.full(3, 0.5), clock=lambda: 100.0).begin(np.ones(7))
 
 
 def test_a_machine_that_is_ready_and_has_failed_does_not_begin():
@@ -304,10 +304,10 @@ def test_a_machine_that_nobody_wants_any_more_does_not_begin(ready):
 
 
 @pytest.mark.parametrize("limbs", [(True, True), (True, False), (False, True)])
-def test_each_limb_that_is_there_is_given_back(limbs):
-    made = [Told() if there else None for there in limbs]
+def test_each_limb_that_is_there_is_given_back(drivers):
+    made = [Told() if there else None for there in drivers]
     HardwareRobot(*made, np.full(3, 0.5), lambda: 100.0).close()
-    assert [limb.closed for limb in made if limb is not None] == [True] * sum(limbs)
+    assert [driver.closed for driver in made if driver is not None] == [True] * sum(drivers)
 
 
 def test_moves_that_are_due_anew_are_not_made_up_for():

@@ -43,7 +43,7 @@ class Played:
         monkeypatch.setattr(driver_host, "time", SimpleNamespace(monotonic=lambda: self.bench.now, sleep=self._sleep))
         monkeypatch.setattr(driver_client, "time", SimpleNamespace(monotonic=lambda: self.bench.now))
         monkeypatch.setattr(driver_client.subprocess, "Popen", self._popen)
-        self.limb = TendonDriver(self.motors, bench.now)
+        self.driver = TendonDriver(self.motors, bench.now)
         self.seen = start_driver(MotorsOnBus(motor_settings(), "can0", "socketcan"))
 
     def _popen(self, command, pass_fds, **how):
@@ -56,7 +56,7 @@ class Played:
         end = self.bench.now + seconds
         while self.bench.now < end - NEAR:
             self.bench.now += TICK
-            for frame in self.bench.bank.advance(self.bench.now):
+            for frame in self.bench.simulated.advance(self.bench.now):
                 self.bench.hear(frame)
             self.bench.drive(*self.motors.wanted, self.bench.now)
             self.each(self.bench.now)
@@ -73,7 +73,7 @@ class Played:
 
         self.each = both
         try:
-            run_driver(self.limb, self.line)
+            run_driver(self.driver, self.line)
         except Ended:
             return self
         raise AssertionError("it has ended by itself")
@@ -99,7 +99,7 @@ def test_they_are_homed_and_follow_what_is_sent(monkeypatch):
     assert not made.seen.ready
     made.play(lambda now: made.seen.ready and _end(), 20.0)
     assert made.seen.fault == ""
-    made.bench.zeros = np.array([motor.reeled for motor in made.bench.bank.motors]) - made.bench.motors.pulls
+    made.bench.zeros = np.array([motor.reeled for motor in made.bench.simulated.motors]) - made.bench.motors.pulls
     made.play(made.send(lambda t: 0.02 * min(t, 1.0)), 1.2)
     assert made.seen.fault == ""
     np.testing.assert_allclose(made.seen.sent, 0.02, atol=1e-6)
@@ -115,7 +115,7 @@ def _end():
 
 def test_motors_that_cannot_be_homed_are_a_fault_of_the_limb(monkeypatch):
     bench = Workbench()
-    bench.bank.motors[1].silent = True
+    bench.simulated.motors[1].silent = True
     made = Played(monkeypatch, bench).play(seconds=2.0)
     assert made.seen.fault == "motor 2: found no feedback, expected it under the id 0x206"
     assert not made.seen.ready
@@ -125,7 +125,7 @@ def test_motors_that_cannot_be_homed_are_a_fault_of_the_limb(monkeypatch):
 def test_a_fault_is_told_at_once(played):
     """Not with the next of the frames that tell of a limb that is well."""
     played.play(played.send(lambda t: 0.0), 0.1)
-    played.bench.bank.motors[0].silent = True
+    played.bench.simulated.motors[0].silent = True
     began, told = played.bench.now, []
     played.play(lambda now: told.append(now) if played.seen.fault and not told else None, 0.1)
     assert played.seen.fault.startswith("motor 1: silent for 2")
@@ -156,7 +156,7 @@ def test_it_holds_the_cables_for_a_while_once_nobody_is_there_and_then_gives_the
     began, driven = played.bench.now, []
     played.seen.line.close()
     played.each = lambda now: driven.append(min(np.abs(played.bench.currents)))
-    run_driver(played.limb, played.line)
+    run_driver(played.driver, played.line)
     assert played.bench.now - began == pytest.approx(SETTLES, abs=2 * TICK)
     assert min(driven) > 0.05
 
@@ -164,8 +164,8 @@ def test_it_holds_the_cables_for_a_while_once_nobody_is_there_and_then_gives_the
 def test_an_adapter_that_is_late_tells_of_its_limb_and_goes_on(played):
     """By less than a setpoint may be missed; turns are not made up for without end."""
     played.play(played.send(lambda t: 0.0), 0.2)
-    turns, turn = [], played.limb.turn
-    played.limb.turn = lambda now: (turns.append(now), turn(now))
+    turns, turn = [], played.driver.turn
+    played.driver.turn = lambda now: (turns.append(now), turn(now))
     send = played.send(lambda t: 0.0)
     played.bench.now += 0.04
     played.play(send, 0.1)
@@ -177,7 +177,7 @@ def test_an_adapter_that_is_late_tells_of_its_limb_and_goes_on(played):
 
 
 @pytest.fixture
-def limb():
+def driver():
     found = start_driver(MotorsOnBus(motor_settings(), SIMULATED, "virtual"))
     until(lambda: found.ready or found.fault, lambda: found.turn(time.monotonic()))
     assert found.fault == ""
@@ -186,39 +186,39 @@ def limb():
 
 
 @pytest.mark.realtime
-def test_in_a_process_of_their_own_they_home_and_follow(limb):
-    np.testing.assert_allclose(limb.measured, 0.0, atol=2e-3)
+def test_in_a_process_of_their_own_they_home_and_follow(driver):
+    np.testing.assert_allclose(driver.measured, 0.0, atol=2e-3)
 
     def each():
-        limb.send(time.monotonic() + LEAD, np.full(3, 0.001))
-        limb.turn(time.monotonic())
+        driver.send(time.monotonic() + LEAD, np.full(3, 0.001))
+        driver.turn(time.monotonic())
 
-    until(lambda: limb.fault or limb.sent.min() > 0.0009, each)
-    assert limb.fault == ""
-
-
-@pytest.mark.realtime
-def test_their_process_killed_is_a_fault(limb):
-    limb.process.kill()
-    limb.process.wait(waiting.SOON)
-    limb.turn(time.monotonic())
-    assert limb.fault == "its adapter has ended"
+    until(lambda: driver.fault or driver.sent.min() > 0.0009, each)
+    assert driver.fault == ""
 
 
 @pytest.mark.realtime
-def test_their_process_hanging_is_a_fault(limb):
-    os.kill(limb.process.pid, signal.SIGSTOP)
+def test_their_process_killed_is_a_fault(driver):
+    driver.process.kill()
+    driver.process.wait(waiting.SOON)
+    driver.turn(time.monotonic())
+    assert driver.fault == "its adapter has ended"
+
+
+@pytest.mark.realtime
+def test_their_process_hanging_is_a_fault(driver):
+    os.kill(driver.process.pid, signal.SIGSTOP)
     stopped = time.monotonic()
-    until(lambda: limb.fault, lambda: limb.turn(time.monotonic()))
-    os.kill(limb.process.pid, signal.SIGCONT)
-    assert limb.fault.startswith("its adapter is silent for")
+    until(lambda: driver.fault, lambda: driver.turn(time.monotonic()))
+    os.kill(driver.process.pid, signal.SIGCONT)
+    assert driver.fault.startswith("its adapter is silent for")
     assert time.monotonic() - stopped > SILENT - TELL * TICK
 
 
 @pytest.mark.realtime
-def test_it_ends_once_nobody_speaks_to_it(limb):
-    limb.line.close()
-    assert limb.process.wait(waiting.SOON) == 0
+def test_it_ends_once_nobody_speaks_to_it(driver):
+    driver.line.close()
+    assert driver.process.wait(waiting.SOON) == 0
 
 
 def test_a_bus_that_is_not_there_is_one_line():
@@ -268,9 +268,9 @@ def test_a_limb_that_fails_is_given_back_before_anything_waits(monkeypatch):
 
 
 @pytest.mark.realtime
-def test_it_is_not_ended_by_a_signal_as_long_as_somebody_is_there(limb):
-    os.kill(limb.process.pid, signal.SIGTERM)
-    before = limb.told.time
-    until(lambda: limb.told.time > before + 0.5, lambda: limb.turn(time.monotonic()))
-    assert limb.process.poll() is None
-    assert limb.fault == ""
+def test_it_is_not_ended_by_a_signal_as_long_as_somebody_is_there(driver):
+    os.kill(driver.process.pid, signal.SIGTERM)
+    before = driver.told.time
+    until(lambda: driver.told.time > before + 0.5, lambda: driver.turn(time.monotonic()))
+    assert driver.process.poll() is None
+    assert driver.fault == ""

@@ -127,7 +127,7 @@ class Robot:
     def state(self) -> ExecutorReport:
         return ExecutorReport("fault", "", self.fault) if self.fault else self.robot.state()
 
-    def standing(self) -> RobotState:
+    def robot_state(self) -> RobotState:
         if self.is_silent and self.kept is not None:
             return self.kept
         now = time.monotonic()
@@ -207,7 +207,7 @@ async def obey(server: Server, robot: Robot, runner: web.AppRunner, port: int, l
     """Lines of the input, until it ends; the log goes out for each."""
     loop = asyncio.get_running_loop()
     site = await listen(runner, port)
-    print(f"ready {port} {server.house.token}", flush=True)
+    print(f"ready {port} {server.composition.token}", flush=True)
     while line := await loop.run_in_executor(None, sys.stdin.readline):
         word = line.strip()
         robot.is_silent = word == "silent" or (robot.is_silent and word != "speak")
@@ -231,20 +231,20 @@ async def serve(port: int, folder: Path) -> None:
     safety = replace(core.safety, silence=PATIENCE, plan_wait=PATIENCE, start_wait=PATIENCE)
     settings = replace(core, delay=0.3, safety=safety)
     core = Teleoperation(settings, Balls(), PACKAGE, OFFSET)
-    desk = SessionController(core, robot, planning, make_world((TABLE,), (CUP,)), 0.1)
+    controller = SessionController(core, robot, planning, make_world((TABLE,), (CUP,)), 0.1)
     page, origins = PROJECT / "trunkline/ar/session/page", Origins.of(["127.0.0.1"], port, tls=False)
     alignment = load_folder(SessionConfig, PROJECT / "conf/live").alignment
     anchors = Anchors(folder / "anchors.json")
     server = Server(Composition(
-        desk, token, origins, PACKAGE, drawing(figure), Bowl(), RATE, page, log.append, alignment, anchors
+        controller, token, origins, PACKAGE, drawing(figure), Bowl(), RATE, page, log.append, alignment, anchors
     ))  # fmt: skip
     planning.heard, tick = server.foreseen, server.tick
 
     def watched(now: float, dt: float) -> None:
-        before = desk.intent.mode if desk.intent else ""
+        before = controller.intent.mode if controller.intent else ""
         tick(now, dt)
-        if desk.intent.mode != before:
-            log.append(f"mode {desk.intent.mode}")
+        if controller.intent.mode != before:
+            log.append(f"mode {controller.intent.mode}")
 
     server.tick = watched
     runner = web.AppRunner(server.app())

@@ -194,8 +194,8 @@ async def session(package: Path) -> dict[Mode, bytes]:
     with tempfile.TemporaryDirectory() as logs:
         config = replace(config, journal=replace(config.journal, folder=logs))
         async with opened(package, ADDRESS, lambda line: None, config=config, teleop=teleop) as (server, made):
-            planning = made.desk.planning = Kept(made.desk.planning)
-            async with browsing(f"{ADDRESS.url}/#token={server.house.token}", SIZE, YIELDS) as page:
+            planning = made.controller.planning = Kept(made.controller.planning)
+            async with browsing(f"{ADDRESS.url}/#token={server.composition.token}", SIZE, YIELDS) as page:
                 camera = Camera(page)
                 await taken(camera, planning)
     return camera.pictures

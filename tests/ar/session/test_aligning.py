@@ -166,17 +166,17 @@ def joints(rng):
 class Person:
     """Who touches, with a headset of noise `sigma`; the controller's tip is at TIP."""
 
-    def __init__(self, aligner, seed=0, sigma=3e-4, pose=TRUE):
-        self.aligner, self.rng, self.sigma, self.pose = aligner, np.random.default_rng(seed), sigma, pose
+    def __init__(self, procedure, seed=0, sigma=3e-4, pose=TRUE):
+        self.procedure, self.rng, self.sigma, self.pose = procedure, np.random.default_rng(seed), sigma, pose
         self.time = 0.0
 
     def hear(self, held, mark=None):
         self.time += 1 / 72
-        self.aligner.hear(self.time, held, mark)
+        self.procedure.hear(self.time, held, mark)
 
     def pivot(self):
         for position, quaternion in zip(*turned(400, 30, self.rng), strict=True):
-            if self.aligner.step != "tip":
+            if self.procedure.step != "tip":
                 return
             self.hear(ControllerPose(tuple(position), tuple(quaternion)), np.zeros(3))
 
@@ -191,18 +191,18 @@ class Person:
             self.hear(ControllerPose(tuple(point + 0.1), tuple(wxyz_from_rotation(turn))), mark)
 
     def align(self, bad=None):
-        self.aligner.touch()
+        self.procedure.touch()
         self.pivot()
         for number, mark in enumerate(PLACES):
             self.touch(mark, 0.03 if number == bad else 0.0)
 
 
-def aligner(known=None, **changes):
+def procedure(known=None, **changes):
     return AlignmentProcedure(replace(live().alignment, **changes), known)
 
 
 def test_the_base_is_aligned_by_six_touches_and_its_error_is_told_before_anything_moves():
-    found = aligner()
+    found = procedure()
     assert (found.alignment, found.told().step) == (None, "place")
     person = Person(found)
     person.align()
@@ -214,7 +214,7 @@ def test_the_base_is_aligned_by_six_touches_and_its_error_is_told_before_anythin
 
 
 def test_a_bad_touch_is_named_and_touched_again():
-    found = aligner()
+    found = procedure()
     person = Person(found)
     person.align(bad=2)
     assert found.told().said.startswith("Touch 3 is ")
@@ -226,7 +226,7 @@ def test_a_bad_touch_is_named_and_touched_again():
 
 
 def test_touches_near_each_other_in_a_plane_or_of_a_guessed_place_do_not_count():
-    found = aligner()
+    found = procedure()
     person = Person(found)
     found.touch()
     person.pivot()
@@ -235,7 +235,7 @@ def test_touches_near_each_other_in_a_plane_or_of_a_guessed_place_do_not_count()
     assert found.told().said == "Move the robot further before the next touch."
     person.hear(None, PLACES[1])
     assert found.told().said == UNTRACKED
-    flat = aligner()
+    flat = procedure()
     person = Person(flat)
     flat.touch()
     person.pivot()
@@ -246,7 +246,7 @@ def test_touches_near_each_other_in_a_plane_or_of_a_guessed_place_do_not_count()
 
 
 def test_a_tip_that_is_turned_too_little_is_said_and_then_found():
-    found = aligner()
+    found = procedure()
     person = Person(found)
     found.touch()
     for position, quaternion in zip(*turned(300, 5, person.rng), strict=True):
@@ -257,14 +257,14 @@ def test_a_tip_that_is_turned_too_little_is_said_and_then_found():
 
 
 def test_a_headset_that_is_not_level_is_refused():
-    found = aligner()
+    found = procedure()
     Person(found, pose=pose_of(np.zeros(3), Rotation.from_euler("x", 3, degrees=True) * UP)).align()
     assert (found.step, found.alignment) == ("touch", None)
     assert found.said.startswith("The headset’s vertical is 3.0° off the robot’s")
 
 
 def test_above_the_limit_it_is_aligned_and_nothing_may_be_executed():
-    found = aligner(limit=1e-6)
+    found = procedure(limit=1e-6)
     Person(found).align()
     assert found.step == "done"
     assert found.unfit.startswith("alignment: expected error ")
@@ -276,15 +276,15 @@ def test_above_the_limit_it_is_aligned_and_nothing_may_be_executed():
 
 def test_by_eye_is_for_a_simulated_robot_alone():
     place = Pose((0.0, 0.5, -1.0), (1.0, 0.0, 0.0, 0.0))
-    found = aligner()
+    found = procedure()
     assert found.by_eye(place) == ""
     assert (found.step, found.told().place, found.told().expected) == ("done", place, None)
     for other in (Pose((0.0, 0.5, float("nan")), (1.0, 0.0, 0.0, 0.0)), Pose((0.0, 0.5, 0.0), (2.0, 0.0, 0.0, 0.0))):
-        found = aligner()
+        found = procedure()
         assert found.by_eye(other) == "alignment: found what is no pose"
         assert found.alignment is None
     kept = Anchor("room", place, None, None, "2026-01-01T00:00:00+00:00")
-    found = aligner(kept, by_eye=False)
+    found = procedure(kept, by_eye=False)
     assert found.told().anchor == ""
     found.anchored("room", SEEN, kept)
     assert found.step == "place"  # nor what was put there by eye another day
@@ -300,7 +300,7 @@ LEAPT = pose_of(np.array([-0.3, 0.1, 0.8]), Rotation.from_euler("y", -100, degre
 
 def anchored():
     """An aligner that is done, its anchor seen, and the anchor that is kept."""
-    found = aligner()
+    found = procedure()
     Person(found).align()
     assert found.anchored("room", SEEN, None) == ""
     assert not found.told().fasten
@@ -347,7 +347,7 @@ def test_an_anchor_that_creeps_by_little_voids_no_plan():
 
 def test_the_next_session_begins_with_one_touch_at_a_known_place():
     _, anchor = anchored()
-    found = aligner(anchor)
+    found = procedure(anchor)
     assert found.told().anchor == "room"
     found.anchored("room", SEEN, anchor)
     assert (found.step, found.alignment) == ("check", None)
@@ -360,7 +360,7 @@ def test_the_next_session_begins_with_one_touch_at_a_known_place():
 
 def test_a_touch_that_is_off_says_so_and_asks_to_align_again():
     _, anchor = anchored()
-    found = aligner(anchor)
+    found = procedure(anchor)
     found.anchored("room", SEEN, anchor)
     Person(found, seed=1).touch(PLACES[1], 0.02)
     assert (found.step, found.alignment, found.told().anchor) == ("touch", None, "")
@@ -369,7 +369,7 @@ def test_a_touch_that_is_off_says_so_and_asks_to_align_again():
 
 def test_an_anchor_without_a_tip_asks_for_the_tip_first():
     _, anchor = anchored()
-    found = aligner(replace(anchor, tip=None))
+    found = procedure(replace(anchor, tip=None))
     found.anchored("room", SEEN, replace(anchor, tip=None))
     person = Person(found, seed=1)
     assert found.step == "tip"
@@ -387,7 +387,7 @@ def test_who_comes_again_is_aligned_once_its_anchor_is_seen_and_without_one_anew
     assert found.alignment is None
     found.anchored("room", SEEN, anchor)
     assert found.step == "done"
-    other = aligner()
+    other = procedure()
     Person(other).align()
     other.lose()
     assert (other.step, other.alignment) == ("place", None)
@@ -467,7 +467,7 @@ def test_a_headset_is_aligned_over_the_network_and_its_anchor_brings_it_back(tmp
             done = await guest.hears("aligning", step="done")
             assert done["fasten"]
             assert done["expected"] < 1e-3
-            near(here.desk.alignment, TRUE, 2e-3)
+            near(here.controller.alignment, TRUE, 2e-3)
             await guest.hears("state", mode="aim")
             pose = {"position": list(SEEN.position), "quaternion": list(SEEN.quaternion)}
             await guest.say(type="anchor", id="room", pose=pose)
@@ -475,7 +475,7 @@ def test_a_headset_is_aligned_over_the_network_and_its_anchor_brings_it_back(tmp
             await guest.say(type="anchor", id="room", pose=None)
             await guest.hears("aligning", step="lost")
             await guest.hears("state", mode="hold")
-            assert here.desk.alignment is None
+            assert here.controller.alignment is None
             await guest.say(type="anchor", id="room", pose=pose)
             await guest.hears("state", mode="aim")
             guest.sending.cancel()
@@ -494,7 +494,7 @@ def test_an_alignment_that_is_not_good_enough_executes_nothing():
     async def session():
         async with laid() as here:
             guest = await controlling(here)
-            here.desk.align(HERE, "alignment: expected error 14.0 mm, more than 10.0 mm: nothing is executed")
+            here.controller.align(HERE, "alignment: expected error 14.0 mm, more than 10.0 mm: nothing is executed")
             state = await asked(here, guest)
             assert "expected error 14.0 mm" in state["notice"]
             await asyncio.sleep(0.4)

@@ -57,40 +57,40 @@ class Clocked(LogWriter):
 def recorded(path, probability=0.8, held=True, end=None, spread=0.01, measured=False, **hardware):
     """A log of one execution; `end`: s after which it was stopped; `measured`: whether the joints are."""
     with open(path, "wb") as file:
-        journal, operator = Clocked(file, **hardware), Operator()
+        log_writer, operator = Clocked(file, **hardware), Operator()
         tip = {"body": SUBJECT.tip[0], "place": SUBJECT.tip[1]}
-        journal.event("begin", package="p", tip=tip, mount_offset=OFFSET, **hardware)
-        journal.event("world", world=make_world((), (CUP,)))
+        log_writer.event("begin", package="p", tip=tip, mount_offset=OFFSET, **hardware)
+        log_writer.event("world", world=make_world((), (CUP,)))
         preview = messages.PreviewMessage(DIGEST, STEP, LASTS, STEP, (("approach", 0.0),))
-        journal.event("preview", preview=preview)
+        log_writer.event("preview", preview=preview)
         times = np.arange(1, round(LASTS / STEP) + 1) * STEP
         for first in range(0, len(times), 20):
             piece = place(times[first : first + 20])
             rows = [wrist(times[first : first + 20]), piece, piece]
-            journal.piece(first, float(times[first]), np.stack(rows, axis=1))
+            log_writer.piece(first, float(times[first]), np.stack(rows, axis=1))
         tip = place(times[-1])[:3] + [0.0, 0.0, 0.1]
-        journal.event("foreseen", foreseen=messages.PredictionMessage(
+        log_writer.event("foreseen", foreseen=messages.PredictionMessage(
             DIGEST, probability, 0.6, 0.9, (LASTS,), (tuple(tip),), (spread,), 0.9, 12))  # fmt: skip
-        journal.time = BEGIN
-        journal.event("execute", digest=DIGEST, refused="")
-        journal.event("robot", robot=ExecutorReport("running", DIGEST))
+        log_writer.time = BEGIN
+        log_writer.event("execute", digest=DIGEST, refused="")
+        log_writer.event("robot", robot=ExecutorReport("running", DIGEST))
         for time in np.arange(0.0, LASTS + 0.5, 1 / 72):
-            journal.time = BEGIN + time
+            log_writer.time = BEGIN + time
             if end is not None and time >= end:
-                journal.event("robot", robot=ExecutorReport("idle", DIGEST))
+                log_writer.event("robot", robot=ExecutorReport("idle", DIGEST))
                 break
             poses = np.stack([place(time - DELAY)] * len(NAMES)) + [0.0, 0.0, OFF, 0.0, 0.0, 0.0, 0.0]
             sensed = joints(time - DELAY) + OFF_JOINT if measured else None
-            journal.standing(RobotState(journal.time, 0.0, START, STRAIGHT, poses[0], poses, sensed))
+            log_writer.robot_state(RobotState(log_writer.time, 0.0, START, STRAIGHT, poses[0], poses, sensed))
             intent: Intent = operator.step()
-            journal.step(1 / 60, operator.given, intent)
+            log_writer.step(1 / 60, operator.given, intent)
         if end is None:
-            journal.event("robot", robot=ExecutorReport("done", DIGEST))
+            log_writer.event("robot", robot=ExecutorReport("done", DIGEST))
             if held:
                 thing = Thing("the cup", "cylinder", 0.05, 0.1, 0.1, (0.6, 0.0, 0.4), support="held")
-                journal.event("world", world=make_world((), (thing,)))
-        journal.settle()
-        journal.book.finish()
+                log_writer.event("world", world=make_world((), (thing,)))
+        log_writer.settle()
+        log_writer.book.finish()
     return path
 
 

@@ -200,10 +200,10 @@ def test_a_preview_that_was_not_shown_is_not_taken_for_shown():
             await asyncio.sleep(0.6)
             await guest.say(type="shown", digest="b" * 64)
             await guest.refused("shown: found digest 'bbbbbbbbbbbb'")
-            assert here.desk.intent.mode == "preview"
+            assert here.controller.intent.mode == "preview"
             guest.right = grips(TIP, trigger=1.0)
             await asyncio.sleep(0.3)
-            assert here.desk.intent.mode == "preview"
+            assert here.controller.intent.mode == "preview"
             assert here.robot.permits == 0
 
     asyncio.run(session())
@@ -215,10 +215,10 @@ def test_a_preview_lasts_as_long_as_it_lasts():
         async with laid() as here:
             guest = await controlling(here)
             state = await asked(here, guest)
-            here.desk._since = here.server.now()
+            here.controller._since = here.server.now()
             await guest.say(type="shown", digest=state["preview"])
             await guest.refused("shown: its preview lasts")
-            assert here.desk.intent.mode == "preview"
+            assert here.controller.intent.mode == "preview"
 
     asyncio.run(session())
 
@@ -236,8 +236,8 @@ def test_a_second_client_moves_nothing():
             await second.refused("input: you do not control")
             await second.refused("alignment")
             await asyncio.sleep(0.5)
-            assert here.desk.state.left.target is None
-            assert here.desk.intent.mode == "aim"
+            assert here.controller.state.left.target is None
+            assert here.controller.intent.mode == "aim"
 
     asyncio.run(session())
 

@@ -80,10 +80,10 @@ UNHURRIED = patient(silence=5.0, plan_wait=30.0, start_wait=30.0)
 def log(tmp_path_factory):
     """Of a session in which a plan was executed to its end, another stopped, and its client went."""
     path = tmp_path_factory.mktemp("logs") / "run.mcap"
-    journal = Written(path)
+    log_writer = Written(path)
 
     async def session():
-        async with laid(journal=journal, settings=UNHURRIED) as here:
+        async with laid(log_writer=log_writer, settings=UNHURRIED) as here:
             guest = await controlling(here)
             await executing(here, guest)
             await guest.hears("state", 60.0, mode="aim", robot="done")
@@ -100,7 +100,7 @@ def log(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr("trunkline.ar.session.lease.SILENCE", 60.0)
         asyncio.run(session())
-    journal.close()
+    log_writer.close()
     return path
 
 
@@ -110,12 +110,12 @@ def core(**changes):
 
 @pytest.mark.realtime
 def test_the_core_goes_through_a_log_again_to_the_same_bytes(log):
-    logbook = read_session_log(log)
-    assert logbook.damage == []
-    assert len(logbook.steps) > RATE
-    found = replay.core_of(logbook, PACKAGE, Everywhere())
+    log = read_session_log(log)
+    assert log.damage == []
+    assert len(log.steps) > RATE
+    found = replay.core_of(log, PACKAGE, Everywhere())
     assert found.settings == UNHURRIED
-    assert replay.replay(logbook.steps, found) is None
+    assert replay.replay(log.steps, found) is None
 
 
 @pytest.mark.realtime
@@ -160,22 +160,22 @@ def test_ingest_sees_the_arm_whole_and_takes_no_hand_for_it(log, capsys):
 def told_of(path, truth, **hardware):
     """A log of a session in which a robot did what `truth` says, and a twin, where it is one of hardware, as well."""
     bodies, tip = ("link_7", "base", *truth.segments), ("unit_08", (0.0, 0.0, 0.0))
-    journal = Written(path, Subject(bodies, JOINTS, truth.tendons, STRAIGHT, tip, **hardware))
+    log_writer = Written(path, Subject(bodies, JOINTS, truth.tendons, STRAIGHT, tip, **hardware))
     base = np.append(truth.base_position, truth.base_quaternion)
     intent = (operator := Operator()).step()
     for row in range(0, len(truth.time), 4):
-        at = journal.time = float(truth.time[row])
+        at = log_writer.time = float(truth.time[row])
         if not row:
-            journal.event("begin", tip={"body": tip[0], "place": tip[1]})
+            log_writer.event("begin", tip={"body": tip[0], "place": tip[1]})
         arm = np.concatenate([truth.positions[row], truth.quaternions[row]], axis=1)
         pull, wound = truth.commands[row // 5], truth.tendon_positions[row]
         joints, nothing = START + 0.1 * np.sin(at), np.full(7, np.nan)
         poses = np.stack([base, base, *arm])
-        journal.standing(RobotState(at, 0.0, joints, STRAIGHT - pull, nothing, poses, joints + 1e-4, STRAIGHT - wound))
+        log_writer.robot_state(RobotState(at, 0.0, joints, STRAIGHT - pull, nothing, poses, joints + 1e-4, STRAIGHT - wound))
         for part in ("left", "right", "view"):
-            journal.headset(part, at, base, False)
-        journal.step(1 / 120, operator.given, intent)
-    journal.close()
+            log_writer.headset(part, at, base, False)
+        log_writer.step(1 / 120, operator.given, intent)
+    log_writer.close()
 
 
 def test_a_session_in_which_the_arm_was_seen_is_one_to_identify_from(tmp_path, capsys):
@@ -212,9 +212,9 @@ def test_what_a_twin_drew_of_a_real_machine_is_not_taken_for_the_arm(tmp_path, c
     merged(path, kept)
     with pytest.raises(InputError, match=f"no pose topic, found .*{TWIN}"):
         open_log(path, read_session(tmp_path))
-    logbook = read_session_log(path)
-    assert logbook.poses is None
-    assert logbook.twin.names[-1] == "unit_08"
+    log = read_session_log(path)
+    assert log.poses is None
+    assert log.twin.names[-1] == "unit_08"
     assert read_recording(path).tip.names == ("tip.x.twin", "tip.y.twin", "tip.z.twin")
 
 
@@ -311,24 +311,24 @@ def test_others_read_it_as_ros_2(log):
 
 
 def test_poses_that_are_no_newer_are_not_told_twice_and_what_is_not_there_is_left_out(tmp_path):
-    journal = Written(tmp_path / "run.mcap")
+    log_writer = Written(tmp_path / "run.mcap")
     poses = np.tile([1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0], (3, 1))
     poses[0] = np.nan
     for at in (1.0, 1.0, 0.9, 1.1):
-        journal.standing(RobotState(at, 0.0, START, STRAIGHT, poses[0], poses))
+        log_writer.robot_state(RobotState(at, 0.0, START, STRAIGHT, poses[0], poses))
     operator = Operator()
-    journal.step(0.1, operator.given, operator.step())
-    journal.close()
+    log_writer.step(0.1, operator.given, operator.step())
+    log_writer.close()
     found = read_session_log(tmp_path / "run.mcap").poses
     assert found.names == NAMES[1:]
     np.testing.assert_allclose(1e-9 * (found.stamps - ZERO), [1.0, 1.1], atol=1e-6)
 
 
 def test_what_is_sent_and_what_is_measured_are_told_apart_and_what_is_not_measured_is_left_out(tmp_path):
-    journal = Written(tmp_path / "run.mcap")
+    log_writer = Written(tmp_path / "run.mcap")
     poses, unknown = np.tile([1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0], (3, 1)), np.full(3, np.nan)
-    journal.standing(RobotState(1.0, 0.0, START, STRAIGHT, poses[0], poses, START + 0.01, unknown))
-    journal.close()
+    log_writer.robot_state(RobotState(1.0, 0.0, START, STRAIGHT, poses[0], poses, START + 0.01, unknown))
+    log_writer.close()
     with open(tmp_path / "run.mcap", "rb") as file:
         found = make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages()
         told = {channel.topic: ros for _, channel, _, ros in found}
@@ -351,20 +351,20 @@ def until(happens, seconds=20.0):
 @pytest.mark.realtime
 def test_a_process_that_is_killed_loses_less_than_a_second_and_says_so(tmp_path):
     path = tmp_path / "run.mcap"
-    journal = LogWriterProcess(path, SUBJECT, PERIOD)
-    journal.event("tick", number=0)
+    log_writer = LogWriterProcess(path, SUBJECT, PERIOD)
+    log_writer.event("tick", number=0)
     until(lambda: path.exists() and path.stat().st_size > 500)
-    told = fed(journal, 1.5)
+    told = fed(log_writer, 1.5)
     killed = time.monotonic()
-    os.kill(journal.pid, signal.SIGKILL)
-    journal.event("tick", number=-1)
-    until(lambda: (journal.event("tick", number=-1), journal.fault)[1])
-    assert journal.fault == "log: run.mcap: its process has ended; nothing is executed"
+    os.kill(log_writer.pid, signal.SIGKILL)
+    log_writer.event("tick", number=-1)
+    until(lambda: (log_writer.event("tick", number=-1), log_writer.fault)[1])
+    assert log_writer.fault == "log: run.mcap: its process has ended; nothing is executed"
     numbers, damage = ticks(path)
     assert numbers == list(range(len(numbers)))  # none is missing in between
     assert damage != []
     assert killed - told[numbers[-1]] < 1.0
-    journal.close()
+    log_writer.close()
 
 
 SESSION = """
@@ -386,25 +386,25 @@ if __name__ == "__main__":
 @pytest.mark.realtime
 def test_a_process_that_hangs_is_a_fault_before_more_than_a_second_is_lost(tmp_path):
     path = tmp_path / "run.mcap"
-    journal = LogWriterProcess(path, SUBJECT, 0.5)
-    journal.event("tick", number=0)
+    log_writer = LogWriterProcess(path, SUBJECT, 0.5)
+    log_writer.event("tick", number=0)
     until(lambda: path.exists() and path.stat().st_size > 500)
-    told = fed(journal, 1.2)
-    os.kill(journal.pid, signal.SIGSTOP)
+    told = fed(log_writer, 1.2)
+    os.kill(log_writer.pid, signal.SIGSTOP)
     stopped, number, longest = time.monotonic(), len(told), 0.0
-    while not journal.fault:
+    while not log_writer.fault:
         assert time.monotonic() - stopped < 10.0
         told.append(time.monotonic())
         number += 1
         before = time.thread_time()
-        journal.event("tick", number=number)
+        log_writer.event("tick", number=number)
         longest = max(longest, time.thread_time() - before)
         time.sleep(0.01)
     seen = time.monotonic()
-    assert journal.fault == "log: run.mcap: its process does not answer for 1 s; nothing is executed"
-    os.kill(journal.pid, signal.SIGKILL)
-    journal.close()
-    assert journal.fault == "log: run.mcap: its process does not answer for 1 s; nothing is executed"
+    assert log_writer.fault == "log: run.mcap: its process does not answer for 1 s; nothing is executed"
+    os.kill(log_writer.pid, signal.SIGKILL)
+    log_writer.close()
+    assert log_writer.fault == "log: run.mcap: its process does not answer for 1 s; nothing is executed"
     numbers, damage = ticks(path)
     assert numbers == list(range(len(numbers)))
     assert seen - told[numbers[-1]] < 1.5  # 1.05, but for a busy machine
@@ -414,17 +414,17 @@ def test_a_process_that_hangs_is_a_fault_before_more_than_a_second_is_lost(tmp_p
 @pytest.mark.realtime
 def test_a_process_that_stalls_for_a_moment_is_no_fault(tmp_path):
     path = tmp_path / "run.mcap"
-    journal = LogWriterProcess(path, SUBJECT, 0.5)
-    journal.await_begun()
-    told = len(fed(journal, 0.7))
-    os.kill(journal.pid, signal.SIGSTOP)
+    log_writer = LogWriterProcess(path, SUBJECT, 0.5)
+    log_writer.await_begun()
+    told = len(fed(log_writer, 0.7))
+    os.kill(log_writer.pid, signal.SIGSTOP)
     time.sleep(0.3)
-    journal.event("tick", number=told + 1)
-    os.kill(journal.pid, signal.SIGCONT)
+    log_writer.event("tick", number=told + 1)
+    os.kill(log_writer.pid, signal.SIGCONT)
     time.sleep(2.0)  # nothing waits, so nothing need be written
-    assert not journal.fault
-    journal.event("tick", number=told + 2)
-    journal.close()
+    assert not log_writer.fault
+    log_writer.event("tick", number=told + 2)
+    log_writer.close()
     assert ticks(path) == (list(range(1, told + 3)), [])
 
 
@@ -462,10 +462,10 @@ def test_a_machine_that_stands_still_as_a_whole_is_no_fault(tmp_path):
 
 def test_a_session_waits_until_its_log_has_begun(tmp_path, monkeypatch):
     path = tmp_path / "run.mcap"
-    journal = LogWriterProcess(path, SUBJECT, PERIOD)
-    journal.await_begun()
+    log_writer = LogWriterProcess(path, SUBJECT, PERIOD)
+    log_writer.await_begun()
     assert path.exists()
-    journal.close()
+    log_writer.close()
     monkeypatch.setattr("trunkline.ar.session.log_writer.BEGINS", 0.3)
     monkeypatch.setattr("trunkline.ar.session.log_writer.PATIENCE", 0.1)
     hangs = LogWriterProcess(tmp_path / "other.mcap", SUBJECT, PERIOD, stuck)
@@ -487,28 +487,28 @@ def test_where_the_session_itself_is_killed_its_log_is_ended_as_it_should(tmp_pa
 
 
 def test_a_session_that_ends_leaves_a_whole_file(tmp_path):
-    journal = LogWriterProcess(tmp_path / "ended.mcap", SUBJECT, PERIOD)
-    told = len(fed(journal, 0.2))
-    journal.close()
+    log_writer = LogWriterProcess(tmp_path / "ended.mcap", SUBJECT, PERIOD)
+    told = len(fed(log_writer, 0.2))
+    log_writer.close()
     numbers, damage = ticks(tmp_path / "ended.mcap")
     assert (numbers, damage) == (list(range(1, told + 1)), [])
-    assert not journal.fault
+    assert not log_writer.fault
 
 
 @pytest.mark.realtime
 @pytest.mark.parametrize("opened", [full, filling])
 def test_a_full_disk_is_said_in_one_line_and_what_was_written_stays(tmp_path, opened):
     path = tmp_path / "run.mcap"
-    journal = LogWriterProcess(path, SUBJECT, PERIOD, opened)
+    log_writer = LogWriterProcess(path, SUBJECT, PERIOD, opened)
     numbers = count(1)
 
     def fails():
-        journal.event("tick", number=next(numbers))
-        return journal.fault
+        log_writer.event("tick", number=next(numbers))
+        return log_writer.fault
 
     until(fails)
-    assert journal.fault == "log: run.mcap: no space left on device; nothing is executed"
-    journal.close()
+    assert log_writer.fault == "log: run.mcap: no space left on device; nothing is executed"
+    log_writer.close()
     if opened is filling:
         found, damage = ticks(path)
         assert found == list(range(1, len(found) + 1))
@@ -520,19 +520,19 @@ def test_a_full_disk_is_said_in_one_line_and_what_was_written_stays(tmp_path, op
 def test_a_disk_that_does_not_answer_delays_nobody(tmp_path, monkeypatch):
     monkeypatch.setattr("trunkline.ar.session.log_writer.MOST", 200)
     monkeypatch.setattr("trunkline.ar.session.log_writer.PATIENCE", 0.1)
-    journal = LogWriterProcess(tmp_path / "run.mcap", SUBJECT, PERIOD, stuck)
+    log_writer = LogWriterProcess(tmp_path / "run.mcap", SUBJECT, PERIOD, stuck)
     longest = 0.0
     gc.disable()  # a collection of all that the tests have loaded is not the journal's
     for number in range(20_000):
         before = time.thread_time()
-        journal.event("tick", number=number, filler="x" * 1000)
+        log_writer.event("tick", number=number, filler="x" * 1000)
         longest = max(longest, time.thread_time() - before)
-        if journal.fault:
+        if log_writer.fault:
             break
     gc.enable()
-    assert journal.fault == "log: run.mcap: the disk does not keep up; nothing is executed"
+    assert log_writer.fault == "log: run.mcap: the disk does not keep up; nothing is executed"
     assert longest < 0.1
-    journal.close()
+    log_writer.close()
 
 
 class Failing(LogWriter):
@@ -542,20 +542,20 @@ class Failing(LogWriter):
 @pytest.mark.realtime
 def test_where_the_log_ends_nothing_new_is_executed_and_all_are_told():
     async def session():
-        journal = Failing()
-        async with laid(journal=journal) as here:
+        log_writer = Failing()
+        async with laid(log_writer=log_writer) as here:
             guest, watcher = await controlling(here), await here.come()
             state = await asked(here, guest)
-            journal.fault = "log: run.mcap: no space left on device; nothing is executed"
+            log_writer.fault = "log: run.mcap: no space left on device; nothing is executed"
             await asyncio.sleep(0.4)
             await guest.say(type="shown", digest=state["preview"])
             await guest.hears("state", mode="ready")
-            assert (await watcher.hears("state", mode="ready"))["notice"].endswith(journal.fault)
+            assert (await watcher.hears("state", mode="ready"))["notice"].endswith(log_writer.fault)
             kept = here.robot.robot.joints.copy()
             guest.right = grips(TIP, trigger=1.0)
             await guest.hears("state", mode="stopped")
-            assert journal.fault in (await watcher.hears("state", mode="stopped"))["notice"]
-            assert here.log.count(journal.fault) == 1
+            assert log_writer.fault in (await watcher.hears("state", mode="stopped"))["notice"]
+            assert here.log.count(log_writer.fault) == 1
             np.testing.assert_array_equal(here.robot.robot.joints, kept)
 
     asyncio.run(session())
@@ -564,12 +564,12 @@ def test_where_the_log_ends_nothing_new_is_executed_and_all_are_told():
 @pytest.mark.realtime
 def test_where_the_log_ends_a_robot_under_way_holds():
     async def session():
-        journal = Failing()
-        async with laid(journal=journal) as here:
+        log_writer = Failing()
+        async with laid(log_writer=log_writer) as here:
             guest = await controlling(here)
             await executing(here, guest)
             await asyncio.sleep(0.2)
-            journal.fault = "log: run.mcap: no space left on device; nothing is executed"
+            log_writer.fault = "log: run.mcap: no space left on device; nothing is executed"
             await guest.hears("state", mode="stopped", robot="idle")
             assert here.robot.stops
 
@@ -584,10 +584,10 @@ def test_a_folder_that_cannot_be_is_one_line(tmp_path):
 
 
 def test_a_lost_alignment_is_told_and_none_is_written_for_it(tmp_path):
-    journal = Written(tmp_path / "run.mcap")
-    journal.alignment(Pose((1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0)))
-    journal.event("alignment", pose=None)
-    journal.close()
+    log_writer = Written(tmp_path / "run.mcap")
+    log_writer.alignment(Pose((1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0)))
+    log_writer.event("alignment", pose=None)
+    log_writer.close()
     with open(tmp_path / "run.mcap", "rb") as file:
         topics = [c.topic for _, c, _ in make_reader(file).iter_messages()]
     assert sorted(topics) == [EVENTS, "/tf_static"]

@@ -256,15 +256,15 @@ def robot():
 
 @pytest.mark.realtime
 def test_a_session_runs_a_plan_on_it_and_draws_it(robot):
-    s, now = simulation(), robot.standing()
+    s, now = simulation(), robot.robot_state()
     here = np.append(now.joints, now.commands)
     rows = gentle(here, here + np.eye(10)[0] * 0.2 - np.eye(10)[7] * 0.01, s.limits, 0.002, 1.0)
     found = Plan(0.002, rows[:, :7], rows[:, 7:], (("approach", 0),), s.package, "world")
     assert robot.start(found, found.digest()) == ""
     until(lambda: robot.state().mode == "done", 20.0, robot.permit)
-    np.testing.assert_allclose(robot.standing().joints, found.joints[-1], atol=1e-9)
+    np.testing.assert_allclose(robot.robot_state().joints, found.joints[-1], atol=1e-9)
     link = s.bodies.index("link_7")
-    until(lambda: np.linalg.norm((robot.standing().bodies[link] - now.bodies[link])[:3]) > 0.02, 20.0)
+    until(lambda: np.linalg.norm((robot.robot_state().bodies[link] - now.bodies[link])[:3]) > 0.02, 20.0)
     pressed = time.monotonic()
     robot.stop()
     until(lambda: robot.channel.hear()[0][HOLD_TIME] >= pressed)
@@ -346,13 +346,13 @@ def test_plans_are_slow_enough_for_the_robot_that_is_named():
     """An FR3's last joints may accelerate half as much as a Panda's."""
     execution, teleop = load_folder(ExecutionConfig, PROJECT / "conf/execution"), load_folder(Teleop, PROJECT / "conf/teleop")
     panda, fr3 = (hardware_of(robot, "simulated", "", "", execution) for robot in ("panda", "fr3"))
-    assert panda.kept_by(teleop) == teleop
-    limits = limits_of(fr3.kept_by(teleop).motors)
+    assert panda.slow_enough(teleop) == teleop
+    limits = limits_of(fr3.slow_enough(teleop).motors)
     assert (limits.acceleration[:7] < LIMITS["fr3"].acceleration).all()
     assert (limits.acceleration[:7] >= 0.39 * LIMITS["panda"].acceleration).all()
     hasty = replace(teleop, motors=replace(teleop.motors, share=1.0))
     for robot in (panda, fr3):
-        found = limits_of(robot.kept_by(hasty).motors)
+        found = limits_of(robot.slow_enough(hasty).motors)
         assert (found.velocity[:7] < robot.limits.velocity).all()
 
 

@@ -37,15 +37,15 @@ def moved(time):
 
 
 def written(path, **hardware):
-    journal = Written(path, replace(SUBJECT, **hardware))
+    log_writer = Written(path, replace(SUBJECT, **hardware))
     intent = (operator := Operator()).step()
     for number in range(round(RATE * SECONDS)):
-        journal.time = at = BEGUN + number / RATE
+        log_writer.time = at = BEGUN + number / RATE
         if not number:
-            journal.event("begin")
-        journal.standing(RobotState(at, 0.0, START, STRAIGHT, np.full(7, np.nan), moved(at)))
-        journal.step(1 / RATE, operator.given, intent)
-    journal.close()
+            log_writer.event("begin")
+        log_writer.robot_state(RobotState(at, 0.0, START, STRAIGHT, np.full(7, np.nan), moved(at)))
+        log_writer.step(1 / RATE, operator.given, intent)
+    log_writer.close()
     return path
 
 
@@ -91,9 +91,9 @@ def test_of_a_real_machine_its_twin_is_shown_and_called_so(log, tmp_path, capsys
 
 
 def test_a_log_without_poses_is_refused_by_name(tmp_path):
-    journal = Written(tmp_path / "run.mcap")
+    log_writer = Written(tmp_path / "run.mcap")
     intent = (operator := Operator()).step()
-    journal.step(1 / RATE, operator.given, intent)
-    journal.close()
+    log_writer.step(1 / RATE, operator.given, intent)
+    log_writer.close()
     with pytest.raises(InputError, match="run.mcap: /tf: found no poses"):
         list(recording.recorded(read_session_log(tmp_path / "run.mcap")))

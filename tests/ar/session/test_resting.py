@@ -29,23 +29,23 @@ def told(speed):
     return [at(time, noise, speed) for time, noise in zip(TIMES, noises, strict=True)]
 
 
-def kept(standings):
+def kept(robot_states):
     resting = LogDecimation()
-    found = [one for robot in standings for one in resting.take(robot, robot.time + 1.0)]
+    found = [one for robot in robot_states for one in resting.take(robot, robot.time + 1.0)]
     return found + resting.rest()
 
 
 @pytest.mark.parametrize("speed", [0.5, 2e-3, 1e-3, 2e-4])
 def test_what_is_left_out_lies_between_what_is_kept(speed):
-    standings = told(speed)
-    found = kept(standings)
+    robot_states = told(speed)
+    found = kept(robot_states)
     times = np.array([robot.time for robot, _ in found])
     assert (np.diff(times) > 0).all()
     assert np.diff(times).max() < SELDOM + 1.5 / RATE
     assert [late - robot.time for robot, late in found] == pytest.approx([1.0] * len(found))
     for axis in range(7):
         between = np.interp(TIMES, times, [robot.bodies[1, axis] for robot, _ in found])
-        assert np.abs(between - [robot.bodies[1, axis] for robot in standings]).max() <= STILL
+        assert np.abs(between - [robot.bodies[1, axis] for robot in robot_states]).max() <= STILL
 
 
 def test_a_motion_is_kept_whole_with_the_rest_around_it_and_later_rest_seldom():
@@ -70,10 +70,10 @@ def test_what_is_sent_moves_a_robot_however_little_and_what_appears_does():
 
 
 def test_a_log_of_a_robot_at_rest_has_few_of_its_poses_and_its_last_ones(tmp_path):
-    journal = Written(tmp_path / "run.mcap", SUBJECT)
+    log_writer = Written(tmp_path / "run.mcap", SUBJECT)
     for robot in told(0.0):
-        journal.standing(robot)
-    journal.close()
+        log_writer.robot_state(robot)
+    log_writer.close()
     log = read_log(tmp_path / "run.mcap")
     for topic in (POSES, JOINTS_SENT):
         assert len(log.topics[topic].messages) < RATE * AFTER + (LASTS - AFTER) / SELDOM + RATE * BEFORE + 2

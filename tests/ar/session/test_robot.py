@@ -108,16 +108,16 @@ def test_a_robot_whose_session_ends_comes_to_rest_on_its_way_first():
     found = RobotProcess(simulated.run, (s,), len(s.commands), len(s.bodies), s.limits, s.package)
     until(lambda: found.ready, 60.0)
     way = back(found)
-    until(lambda: np.abs(found.standing().joints - way.joints[0]).max() > 0.05, each=found.permit)
+    until(lambda: np.abs(found.robot_state().joints - way.joints[0]).max() > 0.05, each=found.permit)
     found.close()
     numbers, _ = found.channel.hear()
     assert MODES[int(numbers[MODE])] == "idle"
-    assert np.abs(way.joints - found.standing().joints).sum(axis=1).min() < 0.02
+    assert np.abs(way.joints - found.robot_state().joints).sum(axis=1).min() < 0.02
 
 
 def back(robot):
     """A plan from where the robot is to where it began, and it runs."""
-    s, now = simulation(), robot.standing()
+    s, now = simulation(), robot.robot_state()
     here, there = np.append(now.joints, now.commands), np.append(s.joints, s.commands)
     rows = point_to_point(
         here, there + np.eye(10)[0] * (0.0 if abs(here[0] - there[0]) > 0.2 else 0.5), s.limits, 0.002
@@ -133,12 +133,12 @@ def test_it_runs_a_plan_to_its_end_while_it_is_permitted(robot):
     found = back(robot)
     until(lambda: robot.state().mode == "done", 20.0, robot.permit)
     assert robot.state().digest == found.digest()
-    np.testing.assert_allclose(robot.standing().joints, found.joints[-1], atol=1e-9)
+    np.testing.assert_allclose(robot.robot_state().joints, found.joints[-1], atol=1e-9)
     link = simulation().bodies.index("link_7")
-    assert np.isfinite(robot.standing().bodies[link]).all()
-    np.testing.assert_allclose(robot.standing().lengths, found.commands[-1], atol=0.01)  # servos are springs
-    np.testing.assert_allclose(robot.standing().measured, found.joints[-1], atol=5e-3)
-    assert not np.array_equal(robot.standing().measured, robot.standing().joints)
+    assert np.isfinite(robot.robot_state().bodies[link]).all()
+    np.testing.assert_allclose(robot.robot_state().lengths, found.commands[-1], atol=0.01)  # servos are springs
+    np.testing.assert_allclose(robot.robot_state().measured, found.joints[-1], atol=5e-3)
+    assert not np.array_equal(robot.robot_state().measured, robot.robot_state().joints)
 
 
 def test_a_log_is_about_the_simulated_robot():
@@ -158,14 +158,14 @@ def test_it_holds_when_it_is_stopped_and_goes_on_by_no_permit(robot):
     back(robot)
     pressed = time.monotonic()
     robot.stop()
-    until(lambda: robot.standing().held >= pressed)
-    assert robot.standing().held - pressed < LATE
+    until(lambda: robot.robot_state().held >= pressed)
+    assert robot.robot_state().held - pressed < LATE
     until(lambda: robot.state().mode == "idle", 3.0, robot.permit)
-    kept = robot.standing().joints
+    kept = robot.robot_state().joints
     for _ in range(40):
         robot.permit()
         time.sleep(0.01)
-    np.testing.assert_array_equal(robot.standing().joints, kept)
+    np.testing.assert_array_equal(robot.robot_state().joints, kept)
 
 
 @pytest.mark.realtime
@@ -173,8 +173,8 @@ def test_it_holds_when_nobody_says_that_it_may_go_on(robot):
     back(robot)
     silent = time.monotonic()
     until(lambda: robot.state().mode == "idle")
-    assert robot.standing().held - silent + 0.02 >= DEAD_MAN
-    assert robot.standing().held - silent < DEAD_MAN + LATE
+    assert robot.robot_state().held - silent + 0.02 >= DEAD_MAN
+    assert robot.robot_state().held - silent < DEAD_MAN + LATE
 
 
 def hearing(robot, axes, seconds):
@@ -190,7 +190,7 @@ def hearing(robot, axes, seconds):
 
 @pytest.mark.realtime
 def test_it_follows_what_it_hears_a_delay_later_and_brakes_when_it_is_stopped(robot):
-    now = robot.standing()
+    now = robot.robot_state()
     here = np.append(now.joints, now.commands)
     there = here + np.eye(10)[0] * 0.3
     assert robot.follow(Following(0.3, 0.0, 0.05)) == ""
@@ -198,37 +198,37 @@ def test_it_follows_what_it_hears_a_delay_later_and_brakes_when_it_is_stopped(ro
     assert robot.follow(Following(0.3, 0.0, 0.05)).startswith("busy")
     hearing(robot, here, 0.25)
     hearing(robot, there, 0.2)
-    np.testing.assert_allclose(robot.standing().joints, now.joints, atol=1e-3)  # its delay is longer
+    np.testing.assert_allclose(robot.robot_state().joints, now.joints, atol=1e-3)  # its delay is longer
     hearing(robot, there, 2.0)
-    np.testing.assert_allclose(robot.standing().joints, there[:7], atol=1e-3)
+    np.testing.assert_allclose(robot.robot_state().joints, there[:7], atol=1e-3)
     assert robot.state().mode == "running"
     hearing(robot, here, 0.45)
     pressed = time.monotonic()
     robot.stop()
     until(lambda: robot.state().mode == "idle", 3.0, robot.permit)
-    assert robot.standing().held - pressed < LATE
-    kept = robot.standing().joints
+    assert robot.robot_state().held - pressed < LATE
+    kept = robot.robot_state().joints
     assert here[0] < kept[0] < there[0]
     robot.hear(0.0, here)
     time.sleep(0.3)
-    np.testing.assert_array_equal(robot.standing().joints, kept)
+    np.testing.assert_array_equal(robot.robot_state().joints, kept)
 
 
 @pytest.mark.realtime
 def test_a_stop_before_a_plan_has_come_counts(robot):
-    s, now = simulation(), robot.standing()
+    s, now = simulation(), robot.robot_state()
     here = np.append(now.joints, now.commands)
     rows = point_to_point(here, here + np.eye(10)[0] * 0.2, s.limits, 0.002)
     found = Plan(0.002, rows[:, :7], rows[:, 7:], (("approach", 0),), PACKAGE, "world")
     assert robot.start(found, found.digest()) == ""
     robot.stop()
     until(lambda: robot.state().mode in ("fault", "idle") and robot.channel.hear()[0][2] == robot._serial)
-    np.testing.assert_allclose(robot.standing().joints, now.joints, atol=2e-3)
+    np.testing.assert_allclose(robot.robot_state().joints, now.joints, atol=2e-3)
 
 
 @pytest.mark.realtime
 def test_another_digest_or_package_does_not_run(robot):
-    now = robot.standing()
+    now = robot.robot_state()
     rows = np.tile(now.joints, (3, 1)), np.tile(now.commands, (3, 1))
     found = Plan(0.002, *rows, (("approach", 0),), PACKAGE, "world")
     assert robot.start(found, "b" * 64).startswith("digest: found")

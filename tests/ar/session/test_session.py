@@ -90,7 +90,7 @@ def test_a_robot_follows_moving_targets_until_both_grips_are_let_go():
             await guest.hears("state", motion="follow", robot="running")
             for mount in (MOUNT + aside, np.array(MOUNT)):  # there, and back again
                 guest.left, guest.right = grips(mount), grips(TIP + mount - MOUNT)
-                await asyncio.sleep(here.desk.core.settings.follow_delay)
+                await asyncio.sleep(here.controller.core.settings.follow_delay)
                 async with asyncio.timeout(20.0):
                     while np.abs(mount_pose(here.robot.robot.joints[None], OFFSET)[0][0][:2] - mount[:2]).max() > 5e-3:
                         await asyncio.sleep(0.1)
@@ -108,7 +108,7 @@ def test_a_robot_that_follows_stops_where_the_process_that_plans_is_silent_and_d
             guest = await controlling(here)
             await aimed(guest, stick_pressed=1.0)
             await guest.hears("state", motion="follow", robot="running")
-            seeking = here.desk._seeking
+            seeking = here.controller._follow
             answers, seeking._order = seeking._order, lambda order: None
             told = await guest.hears("state", mode="stopped")
             assert "the process that plans has not answered for 1.0" in told["notice"]
@@ -119,20 +119,20 @@ def test_a_robot_that_follows_stops_where_the_process_that_plans_is_silent_and_d
             rests = here.robot.robot.joints.copy()
             await asyncio.sleep(0.5)
             np.testing.assert_array_equal(here.robot.robot.joints, rests)
-            assert here.desk.intent.mode == "stopped"
+            assert here.controller.intent.mode == "stopped"
 
     asyncio.run(session())
 
 
 def test_a_start_that_is_on_its_way_is_stopped_by_what_comes_after_it():
     here = Laid(0)
-    desk, plan = here.desk, Plan(1.0, np.zeros((2, 7)), np.zeros((2, 3)), (), "", "")
-    desk.plan, here.robot.start = plan, lambda *_: ""  # its process has not told of it yet
-    desk._drive(Intent("execute", "execute", "", None, (None, None), execute=plan.digest()))
+    controller, plan = here.controller, Plan(1.0, np.zeros((2, 7)), np.zeros((2, 3)), (), "", "")
+    controller.plan, here.robot.start = plan, lambda *_: ""  # its process has not told of it yet
+    controller._drive(Intent("execute", "execute", "", None, (None, None), execute=plan.digest()))
     assert here.robot.permits == 1
-    desk._drive(Intent("hold", "hold", "", None, (None, None)))
+    controller._drive(Intent("hold", "hold", "", None, (None, None)))
     assert len(here.robot.stops) == 1
-    desk._drive(Intent("hold", "hold", "", None, (None, None)))
+    controller._drive(Intent("hold", "hold", "", None, (None, None)))
     assert len(here.robot.stops) == 1
 
 
@@ -142,7 +142,7 @@ def test_nobody_is_told_that_nobody_who_controls_is_silent():
         async with laid() as here:
             guest = await here.come()
             await asyncio.sleep(1.0)
-            assert here.desk.intent.notice == "base is not aligned; holding"
+            assert here.controller.intent.notice == "base is not aligned; holding"
             assert {told["notice"] for told in guest.said if told["type"] == "state"} == {""}
 
     asyncio.run(session())

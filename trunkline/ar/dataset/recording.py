@@ -57,7 +57,7 @@ def read_recording(path: Path) -> Recording:
     logbook, log = read_session_log(path), read_log(path)
     zero = int(log.topics[INPUT].log_times[0])  # of the steps' times
     steps = [
-        Step(zero + round(1e9 * step.time), from_json(Input, step.given), from_json(Intent, step.intent))
+        Step(zero + round(1e9 * step.time), from_json(Input, step.input), from_json(Intent, step.intent))
         for step in logbook.steps
     ]
     sent = [_axes(path, log, topic) for topic in (JOINTS_SENT, TENDONS_SENT)]

@@ -48,14 +48,14 @@ class DriverClient:
         OSError: the command is not there.
     """
 
-    told: DriverState | None
+    state: DriverState | None
 
     def __init__(
         self, command: Sequence[str], axes: int, patience: float = CONNECTING, astray: float = math.inf, at: str = ""
     ) -> None:
         """patience: s that the adapter has to be ready. astray: rad that a joint may be from where it is sent. at: what
         is said of where the limb should be."""
-        self._axes, self._astray, self._at, self.fault, self.told = axes, astray, at, "", None
+        self._axes, self._astray, self._at, self.fault, self.state = axes, astray, at, "", None
         self._patience, self._until = patience, time.monotonic() + patience
         ours, theirs = socket.socketpair()
         self.line, path = FrameSocket(ours, DriverState.size(axes)), os.environ.get("PYTHONPATH", "")
@@ -70,16 +70,16 @@ class DriverClient:
 
     @property
     def ready(self) -> bool:
-        return self.told is not None
+        return self.state is not None
 
     @property
     def sent(self) -> np.ndarray:
-        assert self.told is not None
-        return np.array(self.told.sent)
+        assert self.state is not None
+        return np.array(self.state.sent)
 
     @property
     def measured(self) -> np.ndarray:
-        return np.full(self._axes, np.nan) if self.told is None else np.array(self.told.measured)
+        return np.full(self._axes, np.nan) if self.state is None else np.array(self.state.measured)
 
     def send(self, due: float, axes: np.ndarray) -> None:
         try:
@@ -91,11 +91,11 @@ class DriverClient:
     def turn(self, now: float) -> None:
         """Hear what the adapter tells, at `now`, s."""
         self._hear()
-        if self.told is None:
+        if self.state is None:
             if now > self._until:
                 self._fail(f"its adapter is not ready after {self._patience:.0f} s{self._at}")
             return
-        if (silent := now - self.told.time) > SILENT:
+        if (silent := now - self.state.time) > SILENT:
             self._fail(f"its adapter is silent for {1e3 * silent:.0f} ms")
 
     def close(self) -> None:
@@ -109,18 +109,18 @@ class DriverClient:
 
     def _hear(self) -> None:
         for frame in self.line.heard():
-            told = DriverState.unpack(frame)
-            if told.fault:
-                self._fail(told.fault)
-            if self.told is not None or not told.fault:
-                self.told = told
-                self._look(told)
+            state = DriverState.unpack(frame)
+            if state.fault:
+                self._fail(state.fault)
+            if self.state is not None or not state.fault:
+                self.state = state
+                self._check(state)
         if not self.line.open:
             self._fail("its adapter has ended")
 
-    def _look(self, told: DriverState) -> None:
+    def _check(self, state: DriverState) -> None:
         """Whether each joint is where it is sent."""
-        off = np.abs(np.subtract(told.measured, told.sent))
+        off = np.abs(np.subtract(state.measured, state.sent))
         if not off.max() <= self._astray:  # or no number
             where = f"found {off.max():.3g} rad from where it is sent, expected at most {self._astray:g}"
             self._fail(f"joint {int(off.argmax()) + 1}: {where}")

@@ -92,16 +92,16 @@ class FrameSocket:
         self._unsent = self._unsent or frame
         self._unsent = self._unsent[self._socket.send(self._unsent) :]
 
-    def tell(self, told: DriverState) -> None:
+    def tell(self, state: DriverState) -> None:
         """The same, unless nobody listens; whoever is slow misses a frame."""
         with contextlib.suppress(OSError):
-            self.send(told.pack())
+            self.send(state.pack())
 
-    def end(self, told: DriverState) -> None:
+    def end(self, state: DriverState) -> None:
         """The last frame, for which it waits."""
         self._socket.settimeout(LAST)
         with contextlib.suppress(OSError):
-            self._socket.sendall(self._unsent + told.pack())
+            self._socket.sendall(self._unsent + state.pack())
 
     def close(self) -> None:
         """This end."""

@@ -61,18 +61,18 @@ def driver_of(settings: DriverSettings) -> Driver:
     return TendonDriver(motors_on(settings), time.monotonic())
 
 
-def run_driver(limb: Driver, line: FrameSocket) -> None:
+def run_driver(driver: Driver, line: FrameSocket) -> None:
     """Turn the limb until nobody is at the other end, and SETTLES s more."""
     due, gone, turns, fault = time.monotonic(), math.inf, 0, ""
     while (now := time.monotonic()) - gone < SETTLES:
         for frame in line.heard():
             setpoint = Setpoint.unpack(frame)
-            limb.send(setpoint.due, np.array(setpoint.axes))
+            driver.send(setpoint.due, np.array(setpoint.axes))
         gone = gone if line.open else min(gone, now)
-        limb.turn(now)
-        if limb.fault != fault or (limb.ready and turns % TELL == 0):
-            fault = limb.fault
-            line.tell(DriverState(now, tuple(limb.measured), tuple(limb.sent), fault))
+        driver.turn(now)
+        if driver.fault != fault or (driver.ready and turns % TELL == 0):
+            fault = driver.fault
+            line.tell(DriverState(now, tuple(driver.measured), tuple(driver.sent), fault))
         turns, due = turns + 1, max(due + TICK, now - LATE)
         time.sleep(max(due - time.monotonic(), 0.0))
 
@@ -83,14 +83,14 @@ def main(arguments: list[str]) -> int:
     with socket.socket(fileno=descriptor) as channel:
         line = FrameSocket(channel, Setpoint.size(settings.axes))
         try:
-            with closing(driver_of(settings)) as limb:
+            with closing(driver_of(settings)) as driver:
                 gc.freeze()
                 raise_priority()
-                run_driver(limb, line)
+                run_driver(driver, line)
         except Exception as error:  # whatever a library raises is the fault that is told, once the limb is given back
-            said = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
+            reason = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
             unknown = (math.nan,) * settings.axes
-            line.end(DriverState(time.monotonic(), unknown, unknown, " ".join(said.split())))
+            line.end(DriverState(time.monotonic(), unknown, unknown, " ".join(reason.split())))
             return 1
     return 0
 

@@ -108,7 +108,7 @@ class DriverProcess:
             self._stream = SetpointFilter(desired, self._limits)
         now, stream = time.monotonic(), self._stream
         if rates is not None:
-            stream.found(desired, *rates)
+            stream.synchronize(desired, *rates)
         for frame in self._line.heard():
             stream.hear(Setpoint.unpack(frame), now)
         if not self._line.open:

@@ -84,7 +84,7 @@ class SimulatedMotorsOnBus:
     """Simulated motors on the other end of `bus`. `lost`: share of frames, either way, that get lost."""
 
     def __init__(self, plants: Sequence[MotorParameters], bus: can.BusABC, seed: int = 0) -> None:
-        self.bank, self.lost = SimulatedMotors(plants, time.monotonic()), 0.0
+        self.simulated, self.lost = SimulatedMotors(plants, time.monotonic()), 0.0
         self._bus, self._random = bus, random.Random(seed)
 
     def turn(self) -> None:
@@ -92,8 +92,8 @@ class SimulatedMotorsOnBus:
         now = time.monotonic()
         while (message := self._bus.recv(0)) is not None:
             if self._random.random() >= self.lost:
-                self.bank.hear(message.arbitration_id, bytes(message.data), now)
-        for identifier, data in self.bank.advance(now):
+                self.simulated.hear(message.arbitration_id, bytes(message.data), now)
+        for identifier, data in self.simulated.advance(now):
             if self._random.random() >= self.lost:
                 self._bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
 
@@ -106,17 +106,17 @@ class SimulatedBusMotors(BusMotors):
     """Motors before a `bank` of simulated ones, which turns when they do: python-can's bus "virtual" is of one process
     only, and two threads of it would wait for each other."""
 
-    def __init__(self, settings: MotorSettings, bus: can.BusABC, bank: SimulatedMotorsOnBus) -> None:
+    def __init__(self, settings: MotorSettings, bus: can.BusABC, simulated: SimulatedMotorsOnBus) -> None:
         super().__init__(settings, bus)
-        self._bank = bank
+        self._simulated = simulated
 
     def turn(self, pulls: Sequence[float], speeds: Sequence[float]) -> None:
-        self._bank.turn()
+        self._simulated.turn()
         super().turn(pulls, speeds)
 
     def close(self) -> None:
         super().close()
-        self._bank.close()
+        self._simulated.close()
 
 
 def motors_on(settings: MotorsOnBus) -> BusMotors:
@@ -128,15 +128,15 @@ def motors_on(settings: MotorsOnBus) -> BusMotors:
     bus = open_bus(settings.interface, settings.bus)
     if settings.bus != SIMULATED:
         return BusMotors(settings.motors, bus)
-    bank = SimulatedMotorsOnBus(motor_parameters(settings.motors), open_bus(settings.interface, settings.bus))
-    return SimulatedBusMotors(settings.motors, bus, bank)
+    simulated = SimulatedMotorsOnBus(motor_parameters(settings.motors), open_bus(settings.interface, settings.bus))
+    return SimulatedBusMotors(settings.motors, bus, simulated)
 
 
 def motor_parameters(settings: MotorSettings) -> list[MotorParameters]:
     """Simulated motors that are as the settings have them."""
-    reel = settings.reel
+    winch = settings.reel
     return [
-        MotorParameters(inertia=reel.inertia, radius=reel.radius, stiffness=reel.stiffness, side=side) for side in settings.sides
+        MotorParameters(inertia=winch.inertia, radius=winch.radius, stiffness=winch.stiffness, side=side) for side in settings.sides
     ]
 
 
@@ -161,6 +161,6 @@ class SimulatedMotorsThread(SimulatedMotorsOnBus):
             now = time.monotonic()
             due = max(due + 1 / RATE, now - 0.1)
             self.turn()
-            if any(motor.current for motor in self.bank.motors):
+            if any(motor.current for motor in self.simulated.motors):
                 self.driven = now
-            self.reeled.append((now, tuple(motor.reeled for motor in self.bank.motors)))
+            self.reeled.append((now, tuple(motor.reeled for motor in self.simulated.motors)))

@@ -38,7 +38,7 @@ class HardwareRobot:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._arm, self._motors, self._straight, self._clock = arm, motors, np.array(straight, dtype=float), clock
-        self._limbs = {name: limb for name, limb in (("robot", arm), ("motors", motors)) if limb is not None}
+        self._drivers = {name: driver for name, driver in (("robot", arm), ("motors", motors)) if driver is not None}
         self._smoother: Smoother | None = None
         self._due, self._anew = 0.0, False
 
@@ -55,10 +55,10 @@ class HardwareRobot:
         Raises:
             InputError: a limb is not there, or cannot be homed, or nobody waits any more.
         """
-        while not (self.fault or left() or all(limb.ready for limb in self._limbs.values())):
+        while not (self.fault or left() or all(driver.ready for driver in self._drivers.values())):
             time.sleep(TICK)
-            for limb in self._limbs.values():
-                limb.turn(self._clock())
+            for driver in self._drivers.values():
+                driver.turn(self._clock())
         if self.fault or left():
             raise InputError(self.fault or "the session is gone")
         joints = np.array(joints if self._arm is None else self._arm.sent)
@@ -68,7 +68,7 @@ class HardwareRobot:
     @property
     def fault(self) -> str:
         """What ended it, "" while it goes."""
-        return next((f"{name}: {limb.fault}" for name, limb in self._limbs.items() if limb.fault), "")
+        return next((f"{name}: {driver.fault}" for name, driver in self._drivers.items() if driver.fault), "")
 
     def move(self, joints: np.ndarray, commands: np.ndarray) -> None:
         """One tick, at whose end the axes shall be at `joints` (7,), rad, and `commands` (K,), m."""
@@ -82,8 +82,8 @@ class HardwareRobot:
             self._arm.send(self._due, wanted[:JOINTS])
         if self._motors is not None:
             self._motors.send(self._due, self._straight - wanted[JOINTS:])
-        for limb in self._limbs.values():
-            limb.turn(now)
+        for driver in self._drivers.values():
+            driver.turn(now)
 
     @property
     def behind(self) -> float:
@@ -102,4 +102,4 @@ class HardwareRobot:
     def close(self) -> None:
         """Give back all there is: the motors are without current, the arm brakes."""
         with ThreadPoolExecutor() as pool:  # each waits for its own
-            list(pool.map(lambda limb: limb.close(), self._limbs.values()))
+            list(pool.map(lambda driver: driver.close(), self._drivers.values()))

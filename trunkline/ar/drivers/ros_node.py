@@ -29,7 +29,7 @@ class NodeLink:
     """
 
     def __init__(self, settings: RosSettings) -> None:
-        self._settings, self._said = settings, deque(maxlen=NEWEST)
+        self._settings, self._readings = settings, deque(maxlen=NEWEST)
         self._context = rclpy.Context()
         try:
             rclpy.init(args=[], context=self._context, domain_id=settings.domain)
@@ -56,7 +56,7 @@ class NodeLink:
             raise InputError(f"{self._settings.trajectory}: {error}") from error
 
     def states(self) -> list[JointReading]:
-        return [self._said.popleft() for _ in range(len(self._said))]
+        return [self._readings.popleft() for _ in range(len(self._readings))]
 
     def close(self) -> None:
         """End the node."""
@@ -66,4 +66,4 @@ class NodeLink:
         rclpy.shutdown(context=self._context)
 
     def _hear(self, state: JointState) -> None:
-        self._said.append((list(state.name), list(state.position)))
+        self._readings.append((list(state.name), list(state.position)))

@@ -33,7 +33,7 @@ class MotorTrial:
 
     def __init__(self, settings: MotorSettings, plants: list[MotorParameters]) -> None:
         name = f"check {id(self)}"
-        self.bank = SimulatedMotorsThread(plants, can.Bus(interface="virtual", channel=name))
+        self.simulated = SimulatedMotorsThread(plants, can.Bus(interface="virtual", channel=name))
         self.driver = BusMotors(settings, can.Bus(interface="virtual", channel=name))
         self.turns: list[float] = []
 
@@ -44,7 +44,7 @@ class MotorTrial:
             time.sleep(max(due - time.monotonic(), 0.0))
             now = time.monotonic()
             pull, speed = way(now)
-            count = len(self.bank.bank.motors)
+            count = len(self.simulated.simulated.motors)
             self.driver.turn([pull] * count, [speed] * count)
             self.turns.append(now)
             due = max(due + 1 / RATE, now - 0.02)
@@ -52,7 +52,7 @@ class MotorTrial:
     def close(self) -> None:
         """Off the bus."""
         self.driver.close()
-        self.bank.close()
+        self.simulated.close()
 
 
 def rest(now: float) -> tuple[float, float]:
@@ -77,11 +77,11 @@ def errors(trial: MotorTrial, zeros: np.ndarray) -> tuple[float, float]:
         InputError: it did not come to its end.
     """
     begun = time.monotonic()
-    way, first = cosine(begun), len(trial.bank.reeled)
+    way, first = cosine(begun), len(trial.simulated.reeled)
     trial.until(lambda: bool(trial.driver.fault), way, 2 * SECONDS)
     if trial.driver.fault:
         raise InputError(f"motors: {trial.driver.fault} (is this machine too busy for a loop in real time?)")
-    rows = trial.bank.reeled[first:]
+    rows = trial.simulated.reeled[first:]
     off = np.array([reeled for _, reeled in rows]) - zeros - np.array([[way(t)[0]] for t, _ in rows])
     return float(np.sqrt((off**2).mean(axis=0)).max()), float(np.abs(off).max())
 
@@ -92,10 +92,10 @@ def measures(settings: MotorSettings) -> list[Row]:
     Raises:
         InputError: the motors have a fault before it is wanted.
     """
-    reel = settings.reel
-    turn = 2 * math.pi * reel.radius
+    winch = settings.reel
+    turn = 2 * math.pi * winch.radius
     begins = COUNTS - round(0.5 * DEPTH / turn * COUNTS) % COUNTS  # so that the first wraps within a pull
-    plant = MotorParameters(radius=reel.radius, inertia=reel.inertia, stiffness=1.2 * reel.stiffness)
+    plant = MotorParameters(radius=winch.radius, inertia=winch.inertia, stiffness=1.2 * winch.stiffness)
     plants = [replace(plant, begins=begins + 700 * n, slack=0.01 * (n + 1), side=side)
               for n, side in enumerate(settings.sides)]  # fmt: skip
     trial, rows = MotorTrial(settings, plants), []
@@ -103,35 +103,35 @@ def measures(settings: MotorSettings) -> list[Row]:
         trial.until(lambda: trial.driver.motors.homed or bool(trial.driver.fault), rest, 30.0)
         if trial.driver.fault:
             raise InputError(f"motors: {trial.driver.fault}")
-        true = np.array([p.slack + reel.pretension / p.stiffness for p in plants])
-        zeros = np.array(trial.bank.reeled[-1][1]) - np.array(trial.driver.motors.pulls)
+        true = np.array([p.slack + winch.pretension / p.stiffness for p in plants])
+        zeros = np.array(trial.simulated.reeled[-1][1]) - np.array(trial.driver.motors.pulls)
         off = float(np.abs(zeros - true).max())
         rows.append(("homing: zero from the pretension's place", "≤ 1 mm", f"{1e3 * off:.2f} mm", off <= 1e-3))
 
         trial.turns.clear()
         rms, most = errors(trial, zeros)
-        asked, found = f"{1e3 * DEPTH:.0f} mm pull in {SECONDS:g} s, and its release", format_errors(rms, most)
-        rows.append((asked, "≤ 0.5 mm rms", found, rms <= 5e-4))
+        asked, result = f"{1e3 * DEPTH:.0f} mm pull in {SECONDS:g} s, and its release", format_errors(rms, most)
+        rows.append((asked, "≤ 0.5 mm rms", result, rms <= 5e-4))
         periods = np.diff(trial.turns)
         rate, late = 1 / periods.mean(), 1e3 * np.quantile(periods, (0.5, 0.99, 1.0))
-        found = f"{rate:.0f} Hz; periods {late[0]:.2f} / {late[1]:.2f} / {late[2]:.2f} ms median, 99 %, most"
-        rows.append(("loop", "≥ 950 Hz", found, bool(rate >= 950)))
-        jump = float(np.abs(np.array(trial.bank.reeled[-1][1]) - zeros - np.array(trial.driver.motors.pulls)).max())
+        result = f"{rate:.0f} Hz; periods {late[0]:.2f} / {late[1]:.2f} / {late[2]:.2f} ms median, 99 %, most"
+        rows.append(("loop", "≥ 950 Hz", result, bool(rate >= 950)))
+        jump = float(np.abs(np.array(trial.simulated.reeled[-1][1]) - zeros - np.array(trial.driver.motors.pulls)).max())
         rows.append(("encoder wrapped: counted pull from the true one", "no jump", f"{1e3 * jump:.2f} mm", jump < 1e-3))
 
-        trial.bank.lost = LOST
+        trial.simulated.lost = LOST
         rms, most = errors(trial, zeros)
         rows.append((f"the same, {LOST:.0%} of frames lost", "≤ 1 mm rms", format_errors(rms, most), rms <= 1e-3))
-        trial.bank.lost = 0.0
+        trial.simulated.lost = 0.0
 
         trial.until(lambda: False, rest, 0.2)
         after = silence(trial, lambda: None)
         rows.append(("no command: bank drives no current after", "100 ms", f"{1e3 * after:.0f} ms", 0 < after <= 0.11))
         trial.until(lambda: False, rest, 0.2)
-        trial.bank.bank.motors[0].silent = True
+        trial.simulated.simulated.motors[0].silent = True
         after = silence(trial, lambda: trial.until(lambda: False, rest, 0.001))
-        found = f"{1e3 * after:.0f} ms; {trial.driver.fault}"
-        rows.append(("a motor silent: no motor driven after", "≤ 50 ms", found, 0 < after <= 0.05))
+        result = f"{1e3 * after:.0f} ms; {trial.driver.fault}"
+        rows.append(("a motor silent: no motor driven after", "≤ 50 ms", result, 0 < after <= 0.05))
     finally:
         trial.close()
     return rows
@@ -148,12 +148,12 @@ def silence(trial: MotorTrial, each: Callable[[], None]) -> float:
     while time.monotonic() - begun < 0.5:
         each()
         time.sleep(0.0005)
-    return max(trial.bank.driven - begun, 0.0)
+    return max(trial.simulated.driven - begun, 0.0)
 
 
 def table(rows: list[Row]) -> str:
     """In Markdown."""
-    lines = [f"| {asked} | {wanted} | {found} | {'yes' if so else 'NO'} |" for asked, wanted, found, so in rows]
+    lines = [f"| {asked} | {wanted} | {result} | {'yes' if so else 'NO'} |" for asked, wanted, result, so in rows]
     return "\n".join(["| asked | wanted | found | |", "|---|---|---|---|", *lines])
 
 

@@ -20,7 +20,7 @@ class TendonDriver:
     def __init__(self, motors: BusMotors, begun: float) -> None:
         """begun: s at which homing begins."""
         self._motors, self._until, self._fault = motors, begun + HOMING, ""
-        self.sent = np.zeros(len(motors.motors.reels))
+        self.sent = np.zeros(len(motors.motors.winches))
         self._queue: deque[tuple[float, np.ndarray]] = deque()
         self._watchdog, self._fresh = Watchdog(), False  # whether setpoints came since the last turn
 

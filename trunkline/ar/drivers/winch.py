@@ -81,10 +81,10 @@ class Winch:
         """A, so that the cable is at `pull`, m, and moves at `speed`, m/s."""
         dt = self._lapse(now)
         damping, stiffness, integral = (self._mass * gain for gain in self._gains)
-        error, known = pull - self.pull, self._settings.friction * min(max(speed / CREEP, -1.0), 1.0)
+        error, feedforward = pull - self.pull, self._settings.friction * min(max(speed / CREEP, -1.0), 1.0)
         if self.homed:
-            known += self._settings.stiffness * pull
-        force = damping * (speed - self.speed) + stiffness * error + self._integral + known
+            feedforward += self._settings.stiffness * pull
+        force = damping * (speed - self.speed) + stiffness * error + self._integral + feedforward
         most = self._settings.most * TORQUE / self._settings.radius
         if abs(force) < most:
             self._integral += integral * error * dt

@@ -44,7 +44,7 @@ def table() -> dict:
 
 def module() -> str:
     """The client's, in JavaScript."""
-    lines = [f"// Written by `{COMMAND}` from trunkline/ar/session/binary.py and talk.py; do not edit."]
+    lines = [f"// Written by `{COMMAND}` from trunkline/ar/session/binary.py and messages.py; do not edit."]
     for name, value in table().items():
         lines.append(f"export const {name} = {json.dumps(value, indent=2 if isinstance(value, dict) else None)};")
     return "\n".join(lines) + "\n"
@@ -70,9 +70,9 @@ def written(page: str) -> str:
     """
     for name, text in blocks().items():
         begin, end = f"<!-- {name} -->", f"<!-- /{name} -->"
-        before, found, rest = page.partition(begin)
+        before, opened, rest = page.partition(begin)
         _, closed, after = rest.partition(end)
-        if not found or not closed:
+        if not opened or not closed:
             raise InputError(f"{PAGE}: found no block {begin} … {end}")
         page = f"{before}{begin}\n{text}\n{end}{after}"
     return page
@@ -83,14 +83,14 @@ def _kind(kind: BinaryMessage) -> dict:
 
 
 def _type(kind: type) -> str:
-    return next(str(one.default) for one in fields(kind) if one.name == "type")
+    return next(str(field.default) for field in fields(kind) if field.name == "type")
 
 
 def _fields(kind: type) -> dict:
     """Field to what is missing: "required", or the default."""
     return {
-        one.name: "required" if one.default is MISSING and one.default_factory is MISSING else one.default
-        for one in fields(kind)
+        field.name: "required" if field.default is MISSING and field.default_factory is MISSING else field.default
+        for field in fields(kind)
     }
 
 
@@ -105,9 +105,9 @@ def _kinds(kinds: dict[str, BinaryMessage]) -> str:
 def _messages(kinds: tuple[type, ...]) -> str:
     lines = ["| `type` | fields | what |", "|---|---|---|"]
     for kind in kinds:
-        names = ", ".join(f"`{one.name}`{_choice(one.type)}" for one in fields(kind) if one.name != "type")
-        told = " ".join((kind.__doc__ or "").split())
-        lines.append(f"| `{_type(kind)}` | {names or '–'} | {told} |")
+        names = ", ".join(f"`{field.name}`{_choice(field.type)}" for field in fields(kind) if field.name != "type")
+        summary = " ".join((kind.__doc__ or "").split())
+        lines.append(f"| `{_type(kind)}` | {names or '–'} | {summary} |")
     return "\n".join(lines)
 
 

@@ -25,10 +25,10 @@ class BodyPoses:
         """At `qpos` (nq,)."""
         self._data.qpos[:] = qpos
         mujoco.mj_kinematics(self._model, self._data)
-        found = np.full((self._count, 7), np.nan)
-        found[self._there, :3] = self._data.xpos[self._numbers]
-        found[self._there, 3:] = self._data.xquat[self._numbers]
-        return found
+        poses = np.full((self._count, 7), np.nan)
+        poses[self._there, :3] = self._data.xpos[self._numbers]
+        poses[self._there, 3:] = self._data.xquat[self._numbers]
+        return poses
 
     def of_piece(self, piece: Piece) -> np.ndarray:
         """Of its first future. Shape (F, N, 7), float32."""

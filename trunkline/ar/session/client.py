@@ -27,7 +27,7 @@ class Client:
     name: str
     space: str
     socket: web.WebSocketResponse
-    aligner: AlignmentProcedure | None  # None for who is in the base frame
+    procedure: AlignmentProcedure | None  # None for who is in the base frame
     outbox: Outbox = field(default_factory=Outbox)
     clock: ClientClock = field(default_factory=ClientClock)
     left: float = BURST
@@ -39,12 +39,12 @@ class Client:
     @property
     def alignment(self) -> Pose | None:
         """Of its reference frame in the base, None where that is not known."""
-        return HERE if self.aligner is None else self.aligner.alignment
+        return HERE if self.procedure is None else self.procedure.alignment
 
     @property
     def unfit(self) -> str:
         """Why its alignment is not good enough to execute anything."""
-        return "" if self.aligner is None else self.aligner.unfit
+        return "" if self.procedure is None else self.procedure.unfit
 
     def count(self, now: float) -> None:
         """One more message."""

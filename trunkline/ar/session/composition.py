@@ -38,18 +38,18 @@ BELOW, AROUND = 1.0, 3.0  # m, of the floor as a solid
 class SessionParts:
     """What a server serves, and the processes behind it."""
 
-    desk: SessionController
+    controller: SessionController
     package: str
     scene: dict
     shells: Shells | None
     robot: RobotProcess
     planning: PreviewProcess
-    journal: LogWriterProcess
+    log_writer: LogWriterProcess
 
     def close(self) -> None:
         self.robot.close()  # first: it may be moving
         self.planning.close()
-        self.journal.close()
+        self.log_writer.close()
 
 
 def make(
@@ -75,13 +75,13 @@ def make(
     planning = PreviewProcess(preview_process.run, setup, heard)  # first: it takes longest until it is ready
     drawing = scene(simulation.twin.model, simulation.bodies, maps, package.geometry.length)
     subject = subject_of(simulation, hardware)
-    journal = LogWriterProcess(new_path(Path(config.journal.folder)), subject, config.journal.period)
+    log_writer = LogWriterProcess(new_path(Path(config.journal.folder)), subject, config.journal.period)
     robot = robot_of(simulation, hardware)
     core = Teleoperation(teleop.core, package.reach, package.digest, teleop.mount_offset)
-    desk = SessionController(core, robot, planning, world, teleop.handling.lift, journal, package.period)
-    desk.begin(config.rate)
-    journal.await_begun()
-    return SessionParts(desk, package.digest, drawing, Shells.of(maps), robot, planning, journal)
+    controller = SessionController(core, robot, planning, world, teleop.handling.lift, log_writer, package.period)
+    controller.begin(config.rate)
+    log_writer.await_begun()
+    return SessionParts(controller, package.digest, drawing, Shells.of(maps), robot, planning, log_writer)
 
 
 def subject_of(simulation: Simulation, hardware: Hardware | None = None) -> Subject:
@@ -107,9 +107,9 @@ def robot_of(simulation: Simulation, hardware: Hardware | None) -> RobotProcess:
 
 def simulation_of(package: Package, teleop: Teleop, config: SessionConfig, joints: np.ndarray) -> Simulation:
     """The simulated robot, at rest at `joints` (7,), rad, with its arm straight."""
-    known = believed(config.preview, package.files)
+    belief = believed(config.preview, package.files)
     world = make_world(solids(config))
-    twin = compose_twin(known, world, config.thing, joints, package.straight, config.preview)
+    twin = compose_twin(belief, world, config.thing, joints, package.straight, config.preview)
     limits = limits_of(teleop.motors, package.rate_limit, len(package.straight))
     bodies, offset = drawn_bodies(twin.model), teleop.mount_offset
     return Simulation(twin, joints, package.straight, bodies, limits, package.digest, offset)

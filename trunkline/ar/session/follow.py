@@ -26,7 +26,7 @@ class FollowControl:
         """Nothing is followed; what is still being sought counts no more."""
         self.refused, self._begun, self._last = "", False, -np.inf
         self._times: dict[int, float] = {}  # of what is being sought
-        self._found: list[tuple[float, np.ndarray | None]] = []  # before the robot may follow
+        self._pending: list[tuple[float, np.ndarray | None]] = []  # before the robot may follow
         self._near: np.ndarray | None = None
 
     @property
@@ -52,10 +52,10 @@ class FollowControl:
     def begin(self) -> None:
         """The robot follows from now on, and hears what was found so far."""
         self._begun = True
-        while self._found:
-            self._tell(*self._found.pop(0))
+        while self._pending:
+            self._tell(*self._pending.pop(0))
 
-    def found(self, answer: FollowAnswer) -> None:
+    def answer(self, answer: FollowAnswer) -> None:
         """What was sought; of an older following it is nothing."""
         time = self._times.pop(answer.serial, None)
         if time is None:
@@ -66,7 +66,7 @@ class FollowControl:
         if self._begun:
             self._tell(time, answer.axes)
         else:
-            self._found.append((time, answer.axes))
+            self._pending.append((time, answer.axes))
 
     def _tell(self, time: float, axes: np.ndarray | None) -> None:
         self._hear(self._now - time, axes)

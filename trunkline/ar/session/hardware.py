@@ -45,10 +45,10 @@ class Hardware:
         """Of the robot, a Panda's where none is named."""
         return LIMITS["fr3" if self.robot == "fr3" else "panda"]
 
-    def kept_by(self, teleop: Teleop) -> Teleop:
+    def slow_enough(self, teleop: Teleop) -> Teleop:
         """`teleop` with plans that are slow enough for the robot: some of an FR3's limits are half of a Panda's."""
-        own, panda = self.limits, LIMITS["panda"]
-        most = min(np.min(getattr(own, what) / getattr(panda, what)) for what in ("velocity", "acceleration", "jerk"))
+        limits, panda = self.limits, LIMITS["panda"]
+        most = min(np.min(getattr(limits, what) / getattr(panda, what)) for what in ("velocity", "acceleration", "jerk"))
         share = min(teleop.motors.share, MARGIN * float(most))
         return replace(teleop, motors=replace(teleop.motors, share=share))
 

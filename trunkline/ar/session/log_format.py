@@ -147,25 +147,25 @@ def new_file(path: Path) -> BinaryIO:
 
 
 def run(
-    pipe, told, kept, path: Path, subject: Subject, zero: int, period: float, opened: Callable[[Path], BinaryIO]
+    pipe, fault, written, path: Path, subject: Subject, zero: int, period: float, opened: Callable[[Path], BinaryIO]
 ) -> None:  # fmt: skip
     """The process: until nobody holds the pipe's other end, be it that the server was killed. `told`: why it cannot
     write; `kept`: how many of the pipe's messages are in the file, from 0 on once it is open."""
     leave_signals_to_parent()
     try:
         with opened(path) as file:
-            book = LogFormat(file, subject, zero)
-            write(book, pipe, kept, period)
-            book.finish()
+            log = LogFormat(file, subject, zero)
+            write(log, pipe, written, period)
+            log.finish()
     except OSError as error:
         text = f"log: {path.name}: {(error.strerror or str(error)).lower()}; nothing is executed"
-        told.value = text.encode()[: TEXT - 1]
+        fault.value = text.encode()[: TEXT - 1]
 
 
-def write(book: LogFormat, pipe, kept, period: float) -> None:
+def write(log: LogFormat, pipe, written, period: float) -> None:
     """All that comes, on the disk every `period` s."""
     due, heard = time.monotonic() + period, 0
-    kept.value = heard
+    written.value = heard
     while True:
         if pipe.poll(max(due - time.monotonic(), 0.0)):
             try:
@@ -173,9 +173,9 @@ def write(book: LogFormat, pipe, kept, period: float) -> None:
             except (EOFError, OSError):
                 return
             for record in records:
-                book.write(record)
+                log.write(record)
             heard += 1
         if time.monotonic() >= due:
-            book.flush()
-            kept.value = heard
+            log.flush()
+            written.value = heard
             due = time.monotonic() + period

@@ -23,7 +23,7 @@ class LogStep(NamedTuple):
 
     time: float
     dt: float
-    given: bytes
+    input: bytes
     intent: bytes
 
 
@@ -49,10 +49,10 @@ class LogReader:
         Raises:
             InputError: there is none.
         """
-        found = next((event for event in self.events if event["event"] == "begin"), None)
-        if found is None:
+        event = next((event for event in self.events if event["event"] == "begin"), None)
+        if event is None:
             raise InputError(f"{self.path}: {EVENTS}: found no event 'begin', expected the log of a live session")
-        return found
+        return event
 
     @property
     def drawn(self) -> PoseStream | None:
@@ -87,14 +87,14 @@ def read_session_log(path: Path) -> LogReader:
 
 def _steps(log: Log) -> list[LogStep]:
     """A last input whose intent was lost is left out."""
-    found, since = [], None
+    steps, since = [], None
     for (heard, logged), (intent, _) in zip(_texts(log, INPUT), _texts(log, INTENT), strict=False):
-        before, there, given = heard.partition(INPUT_KEY)
+        before, there, input = heard.partition(INPUT_KEY)
         if not there:
             raise ValueError(f"{INPUT}: found no input in {heard[:40]!r}")
         since = logged if since is None else since
-        found.append(LogStep(1e-9 * (logged - since), float(before.removeprefix(b'{"dt":')), given[:-1], intent))
-    return found
+        steps.append(LogStep(1e-9 * (logged - since), float(before.removeprefix(b'{"dt":')), input[:-1], intent))
+    return steps
 
 
 def _texts(log: Log, topic: str) -> list[tuple[bytes, int]]:
@@ -103,10 +103,10 @@ def _texts(log: Log, topic: str) -> list[tuple[bytes, int]]:
     Raises:
         ValueError: one is no std_msgs/String.
     """
-    found = log.topics.get(topic)
-    if found is None:
+    messages = log.topics.get(topic)
+    if messages is None:
         return []
-    return [(_text(m, topic), int(t)) for m, t in zip(found.messages, found.log_times, strict=True)]
+    return [(_text(m, topic), int(t)) for m, t in zip(messages.messages, messages.log_times, strict=True)]
 
 
 def _text(message: bytes, topic: str) -> bytes:

@@ -123,7 +123,7 @@ class PreviewPlanner:
     def __init__(self, planner: Planner, foresight: Foresight, bodies: tuple[str, ...]) -> None:
         self.planner, self.foresight, self.bodies = planner, foresight, bodies
         self.known, self.previewing = foresight.known, foresight.settings
-        self._kept: tuple[tuple, Twin | None] = ((), None)
+        self._composed: tuple[tuple, Twin | None] = ((), None)
         self._grasped: Foreseen | None = None  # the last grasp: of a thing that is held, the one that was run
 
     @classmethod
@@ -150,9 +150,9 @@ class PreviewPlanner:
         digest = plan.digest()
         yield PlanAnswer(PlanReport(serial, digest, "", plan.package, plan.world), plan)
         way = self.foresight.whole(plan)
-        held = _held_object(order)
-        if held is not None and self._grasped is not None:
-            twin = self.foresight.carrying(held, order.world, way, None, self._grasped)
+        held_object = _held_object(order)
+        if held_object is not None and self._grasped is not None:
+            twin = self.foresight.carrying(held_object, order.world, way, None, self._grasped)
         else:
             twin = self._twin(order.world, _beside(order), way.joints[0], way.commands[0])
         phases = tuple((name, plan.step * row) for name, row in plan.phases)
@@ -160,8 +160,8 @@ class PreviewPlanner:
         yield PreviewBegun(serial, messages.PreviewMessage(digest, step, way.duration, step, phases))
         go_on()
         yield from self._shown(serial, twin, way, go_on)
-        for found in self._foreseen(order, plan, twin, way, go_on):
-            yield PredictionAnswer(serial, prediction_message(digest, found))
+        for prediction in self._foreseen(order, plan, twin, way, go_on):
+            yield PredictionAnswer(serial, prediction_message(digest, prediction))
 
     def prepare(self, order: Order) -> None:
         """Compose its twin, which the next order takes, where nothing has changed."""
@@ -169,52 +169,52 @@ class PreviewPlanner:
 
     def _twin(self, world: World, thing: Thing | None, joints: np.ndarray, commands: np.ndarray) -> Twin:
         """The last one where nothing has changed: to compile another takes longer than a piece of a preview."""
-        kept, twin = self._kept
-        if twin is not None and kept == (world.boxes, thing):
+        composed, twin = self._composed
+        if twin is not None and composed == (world.boxes, thing):
             twin = at_rest(twin, joints, commands, self.known.robot.mount_offset)
         else:
             twin = compose_twin(self.known, world, thing, joints, commands, self.previewing)
-        self._kept = (world.boxes, thing), twin
+        self._composed = (world.boxes, thing), twin
         return twin
 
     def _shown(self, serial: int, twin: Twin, way: Way, go_on: Callable[[], None]) -> Iterator[Answer]:
-        poses, first, held = BodyPoses(twin.model, self.bodies), 0, None
+        poses, first, piece_answer = BodyPoses(twin.model, self.bodies), 0, None
         for piece in nominal(twin, way):
-            if held is not None:
-                yield held
+            if piece_answer is not None:
+                yield piece_answer
             frames = poses.of_piece(piece)
-            held = PreviewPiece(serial, first, float(piece.time[0]), frames, False)
+            piece_answer = PreviewPiece(serial, first, float(piece.time[0]), frames, False)
             first += len(frames)
             if piece.time[-1] + 2 * FRAME < way.duration:  # not the last: it need not wait for the next
-                yield held
-                held = None
+                yield piece_answer
+                piece_answer = None
             go_on()
-        if held is not None:
-            yield PreviewPiece(serial, held.first, held.time, held.poses, True)
+        if piece_answer is not None:
+            yield PreviewPiece(serial, piece_answer.first, piece_answer.time, piece_answer.poses, True)
 
     def _foreseen(
         self, order: Order, plan: Plan, twin: Twin, way: Way, go_on: Callable[[], None]
     ) -> Iterator[Foreseen]:
         targets, serial = order.request.targets, order.request.serial
-        thing, held = order.world.thing(targets.thing) if targets.thing else None, _held_object(order)
-        if thing is not None and held is None:
-            for found in self.foresight.grasp(plan, targets, thing, order.world, None, serial, go_on):
-                self._grasped = found
-                yield found
-        elif held is not None and self._grasped is not None:
-            yield self.foresight.bring(plan, targets, held, order.world, None, self._grasped, serial, go_on)
+        thing, held_object = order.world.thing(targets.thing) if targets.thing else None, _held_object(order)
+        if thing is not None and held_object is None:
+            for prediction in self.foresight.grasp(plan, targets, thing, order.world, None, serial, go_on):
+                self._grasped = prediction
+                yield prediction
+        elif held_object is not None and self._grasped is not None:
+            yield self.foresight.bring(plan, targets, held_object, order.world, None, self._grasped, serial, go_on)
         else:
             yield self.foresight.free(twin, way, serial, go_on)
 
 
-def prediction_message(digest: str, found: Foreseen) -> messages.PredictionMessage:
+def prediction_message(digest: str, prediction: Foreseen) -> messages.PredictionMessage:
     """As clients hear it: times from the plan's beginning on."""
-    preview, stated = found.preview, found.preview.stated
+    preview, stated = prediction.preview, prediction.preview.stated
     low_high = preview.interval or (None, None)
     tips = tuple((float(x), float(y), float(z)) for x, y, z in stated.tips)
     return messages.PredictionMessage(
-        digest, preview.probability, *low_high, tuple(map(float, found.begins + stated.times)), tips,
-        tuple(map(float, stated.radii)), WITHIN, len(preview.draws), found.offer,
+        digest, preview.probability, *low_high, tuple(map(float, prediction.begins + stated.times)), tips,
+        tuple(map(float, stated.radii)), WITHIN, len(preview.draws), prediction.offer,
     )  # fmt: skip
 
 
@@ -248,8 +248,8 @@ class PreviewProcess:
         """With a pipe and a queue of its own: those of one that was killed may be locked for ever."""
         self._answers, theirs = self._context.Pipe(duplex=False)
         self._orders = self._context.Queue()
-        given = theirs, self._orders, self._newest, *self._setup
-        self._process = self._context.Process(target=self._run, args=given, daemon=True, name="foreseer")
+        arguments = theirs, self._orders, self._newest, *self._setup
+        self._process = self._context.Process(target=self._run, args=arguments, daemon=True, name="foreseer")
         self._process.start()
         theirs.close()
 
@@ -313,29 +313,29 @@ def run(
     threadpool_limits(1)  # matrices are small; threads that wait for each other cost more than they bring
     end_with_parent()
     package = read_package(path)
-    foreseer = PreviewPlanner.of(package, config, previewing, bodies)
-    warm(foreseer, package, world)
+    planner = PreviewPlanner.of(package, config, previewing, bodies)
+    warm(planner, package, world)
     answers.send(Ready())
-    serve(answers, orders, newest, foreseer)
+    serve(answers, orders, newest, planner)
 
 
-def warm(foreseer: PreviewPlanner, package: Package, world: World) -> None:
+def warm(planner: PreviewPlanner, package: Package, world: World) -> None:
     """Plan and preview once for nothing: what is compiled on its first call would keep the first user waiting, and so
     would the twin of the `world`."""
-    robot, straight = foreseer.known.robot, package.straight
+    robot, straight = planner.known.robot, package.straight
     joints = np.array(robot.ready)
     x, y, z = (float(value) for value in mount_pose(joints[None], robot.mount_offset)[0][0])
     targets = Targets(Target((x, y, z)), Target((x, y, z)), DOWN, 0.0, 0, 0.0)
     a, b, c = (float(value) for value in package.tip((x, y, z), targets, straight - PULL * np.eye(len(straight))[0]))
     request = Request(0, replace(targets, tip=Target((a, b, c))), "", package.digest)
     order = Order(request, World(""), joints, straight)
-    for answer in foreseer.answers(order):
+    for answer in planner.answers(order):
         if isinstance(answer, PreviewPiece):
             break
-    foreseer.prepare(replace(order, world=world))
+    planner.prepare(replace(order, world=world))
 
 
-def serve(answers, orders, newest, foreseer: PreviewPlanner) -> None:
+def serve(answers, orders, newest, planner: PreviewPlanner) -> None:
     """Orders in, answers out."""
     for number, order in (orders.get() for _ in itertools.count()):
 
@@ -346,7 +346,7 @@ def serve(answers, orders, newest, foreseer: PreviewPlanner) -> None:
         with suppress(Overtaken):
             go_on()
             try:
-                for answer in foreseer.answers(order, go_on):
+                for answer in planner.answers(order, go_on):
                     answers.send(answer)
             except (InputError, ArithmeticError, ValueError) as error:  # a plan without a preview is never confirmed
                 refused = f"preview: {type(error).__name__}: {error}".splitlines()[0]

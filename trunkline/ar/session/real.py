@@ -82,18 +82,18 @@ class RealRobot(RobotProcess):
     def ready(self) -> bool:
         return super().ready and self._drawn.hear()[0][READY] > 0
 
-    def standing(self) -> RobotState:
+    def robot_state(self) -> RobotState:
         poses = self._drawn.hear()[0][-POSE * (1 + self._drawn.bodies) :].reshape(-1, POSE)
-        return replace(super().standing(), thing=poses[0], bodies=poses[1:])
+        return replace(super().robot_state(), thing=poses[0], bodies=poses[1:])
 
     def state(self) -> ExecutorReport:
-        found, (drawn, said) = super().state(), self._drawn.hear()
+        report, (drawn, fault) = super().state(), self._drawn.hear()
         silent = time.monotonic() - drawn[TIME]
         if drawn[READY] > 0 and silent > UNSEEN:
-            said = f"silent for {silent:.2f} s"
-        if said and found.mode != "fault":
-            return ExecutorReport("fault", found.digest, f"the twin that is drawn: {said}")
-        return found
+            fault = f"silent for {silent:.2f} s"
+        if fault and report.mode != "fault":
+            return ExecutorReport("fault", report.digest, f"the twin that is drawn: {fault}")
+        return report
 
     def close(self) -> None:
         super().close()
@@ -200,9 +200,9 @@ def draw(channel: RobotChannel, machine: RobotChannel, simulation: Simulation) -
             now = np.append(plant.thing(), plant.poses())
             if np.abs(here - before).max() > LEAST or np.nanmax(np.abs(now - poses)) > STILL:
                 poses, since = now, due
-        told = np.zeros(channel.size)
-        told[TIME], told[READY] = time.monotonic(), 1.0
-        told[-POSE * (1 + channel.bodies) :] = poses
-        channel.tell(told, plant.fault)
+        numbers_out = np.zeros(channel.size)
+        numbers_out[TIME], numbers_out[READY] = time.monotonic(), 1.0
+        numbers_out[-POSE * (1 + channel.bodies) :] = poses
+        channel.tell(numbers_out, plant.fault)
         due = max(due + plant.tick, time.monotonic() - plant.tick)
         time.sleep(max(due - time.monotonic(), 0.0))

@@ -35,9 +35,9 @@ PERMIT, PERMITTED, STOPS = range(3)  # of what it is told
 POSE = 7
 
 
-def next_report_time(due: float, told: float) -> float:
+def next_report_time(due: float, reported: float) -> float:
     """The first s from `due` on at which a robot that told of itself at `told`, s, should have done so anew."""
-    return told + math.ceil((due - told) / TELLS) * TELLS + FRESH
+    return reported + math.ceil((due - reported) / TELLS) * TELLS + FRESH
 
 
 class RobotChannel:
@@ -46,7 +46,7 @@ class RobotChannel:
     def __init__(self, context: SpawnContext, tendons: int, bodies: int) -> None:
         self.tendons, self.bodies = tendons, bodies
         self.size = 5 + 2 * (JOINTS + tendons) + POSE * (1 + bodies)
-        self._told, self._number = context.RawArray(ctypes.c_double, self.size), context.RawValue(ctypes.c_uint64, 0)
+        self._numbers, self._number = context.RawArray(ctypes.c_double, self.size), context.RawValue(ctypes.c_uint64, 0)
         self._asked, self._fault = context.RawArray(ctypes.c_double, 3), context.RawArray(ctypes.c_char, TEXT)
         self.plans, self.wake = context.Queue(), context.Semaphore(0)
 
@@ -57,7 +57,7 @@ class RobotChannel:
     def tell(self, numbers: np.ndarray, fault: str) -> None:
         """Of the robot's process."""
         self._number.value += 1
-        np.ctypeslib.as_array(self._told)[:] = numbers
+        np.ctypeslib.as_array(self._numbers)[:] = numbers
         self._fault.value = fault.encode(errors="replace")[: TEXT - 1]
         self._number.value += 1
 
@@ -65,7 +65,7 @@ class RobotChannel:
         """The newest that was told whole."""
         for _ in range(1000):
             before = self._number.value
-            numbers, fault = np.ctypeslib.as_array(self._told).copy(), self._fault.value
+            numbers, fault = np.ctypeslib.as_array(self._numbers).copy(), self._fault.value
             if before % 2 == 0 and self._number.value == before:
                 return numbers, fault.decode(errors="replace")
         return numbers, fault.decode(errors="replace")  # its writer was killed within: the time in it is old
@@ -89,7 +89,7 @@ class RobotState:
     """
 
     time: float
-    held: float
+    hold_time: float
     joints: np.ndarray
     commands: np.ndarray
     thing: np.ndarray
@@ -128,7 +128,7 @@ class RobotProcess:
         """Whether it has told anything yet."""
         return self.channel.hear()[0][READY] > 0
 
-    def standing(self) -> RobotState:
+    def robot_state(self) -> RobotState:
         """The newest."""
         numbers = self.channel.hear()[0]
         joints, commands, measured, lengths, thing, bodies = (numbers[place] for place in self._places)
@@ -136,7 +136,7 @@ class RobotProcess:
         return RobotState(numbers[TIME], numbers[HOLD_TIME], joints, commands, thing, bodies, measured, lengths)
 
     def check(self, plan: Plan) -> str:
-        now = self.standing()
+        now = self.robot_state()
         return SimulatedRobot(now.joints, now.commands, self._limits, self._package).check(plan)
 
     def start(self, plan: Plan, digest: str) -> str:

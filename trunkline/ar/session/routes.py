@@ -64,5 +64,5 @@ class Routes:
 def read_page(folder: Path) -> dict[str, bytes]:
     """Contents by name of the files that a page may have; none where there is no index.html."""
     files = [file for file in folder.glob("*") if file.suffix in TYPES and file.is_file() and not file.is_symlink()]
-    found = {file.name: file.read_bytes() for file in files}
-    return found if "index.html" in found else {}
+    contents = {file.name: file.read_bytes() for file in files}
+    return contents if "index.html" in contents else {}

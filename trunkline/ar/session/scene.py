@@ -111,10 +111,10 @@ def _reach(maps: dict[str, np.ndarray]) -> dict | None:
     values = np.asarray(maps["rigid"], dtype=float)
     try:
         lattice = Lattice(np.array([x, y, z]), float(maps["rigid_spacing"]), values.shape)
-        found = surface(values, lattice, SHELL_TRIANGLES, "reachability")
+        mesh = surface(values, lattice, SHELL_TRIANGLES, "reachability")
     except InputError:
         return None
-    return {"vertices": _rounded(found.vertices), "faces": [int(value) for value in found.faces.ravel()]}
+    return {"vertices": _rounded(mesh.vertices), "faces": [int(value) for value in mesh.faces.ravel()]}
 
 
 def _rounded(values: np.ndarray) -> list[float]:

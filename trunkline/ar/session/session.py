@@ -112,22 +112,22 @@ async def opened(
     config = config or load_folder(SessionConfig, PROJECT / "conf/live")
     teleop = teleop or load_folder(Teleop, PROJECT / "conf/teleop")
     if hardware is not None:
-        teleop = hardware.kept_by(teleop)
+        teleop = hardware.slow_enough(teleop)
     alignment = alignment_for(hardware, config.alignment)
     anchors = Anchors(Path(alignment.anchors))
     made = await asyncio.to_thread(make, package, teleop, config, heard, hardware)
     try:
-        house = Composition(
-            made.desk, make_token(), address.origins, made.package, made.scene, made.shells, config.rate, PAGE, log,
+        composition = Composition(
+            made.controller, make_token(), address.origins, made.package, made.scene, made.shells, config.rate, PAGE, log,
             alignment, anchors,
         )  # fmt: skip
         while not (made.robot.ready and made.planning.ready.is_set()):
             if not (made.robot.alive and made.planning.alive):
                 raise InputError("a process of the session has ended before it began")
-            if made.journal.fault:
-                raise InputError(made.journal.fault)
+            if made.log_writer.fault:
+                raise InputError(made.log_writer.fault)
             await asyncio.sleep(0.05)
-        server = Server(house)
+        server = Server(composition)
         servers.append(server)
         gc.collect()
         gc.freeze()  # a collection of all that is loaded takes longer than a robot goes on without a permit
@@ -142,9 +142,9 @@ async def serve(options: argparse.Namespace, names: list[str], context: ssl.SSLC
     """Until it is interrupted or told to end: either way robot and log are closed in order."""
     task = asyncio.current_task()
     assert task is not None, "asyncio runs it"
-    for told in (signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(told) is not signal.SIG_IGN:  # `nohup` has it ignored
-            asyncio.get_running_loop().add_signal_handler(told, task.cancel)
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is not signal.SIG_IGN:  # `nohup` has it ignored
+            asyncio.get_running_loop().add_signal_handler(number, task.cancel)
     log = functools.partial(print, flush=True)
     hardware = hardware_of(
         options.robot, options.motors, options.bus, options.interface,
@@ -157,8 +157,8 @@ async def serve(options: argparse.Namespace, names: list[str], context: ssl.SSLC
     address = Address(options.port, options.host, tuple(names), context)
     expect_free(address)  # what a session needs takes long to load
     async with opened(options.package, address, log, hardware) as (server, made):
-        log(f"log: {made.journal.path}")
-        log(f"{address.url}/#token={server.house.token}")
+        log(f"log: {made.log_writer.path}")
+        log(f"{address.url}/#token={server.composition.token}")
         _pair(server, log, asyncio.get_running_loop())
         await asyncio.Event().wait()
 
