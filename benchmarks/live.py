@@ -127,7 +127,11 @@ async def plainly(package: Path, watchers: int, stops: int) -> tuple[list[Row], 
             ("the same while one more reads nothing", halves(rest.ages), "95th: 5"),
             ("frames that are held for it", str(looks.most(rest, deaf)), "3"),
         ]
-        holds, looks, asked = Holds(made, [made.robot.robot_state().hold_time]), Looks(server), made.controller.state.serial
+        holds, looks, asked = (
+            Holds(made, [made.robot.robot_state().hold_time]),
+            Looks(server),
+            made.controller.state.serial,
+        )
 
         def look() -> None:
             holds.look()

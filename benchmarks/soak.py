@@ -92,7 +92,9 @@ class Planning:
         told = messages.PredictionMessage(digest, None, None, None, (0.0,), ((0.0, 0.0, 0.0),), (0.0,), 0.9, 12)
         for answer in (
             preview_process.PlanAnswer(PlanReport(request.serial, digest, "", plan.package, plan.world), plan),
-            preview_process.PreviewBegun(request.serial, messages.PreviewMessage(digest, 0.02, 0.3, 0.02, (("approach", 0.0),))),
+            preview_process.PreviewBegun(
+                request.serial, messages.PreviewMessage(digest, 0.02, 0.3, 0.02, (("approach", 0.0),))
+            ),
             preview_process.PreviewPiece(request.serial, 0, 0.02, poses, False),
             preview_process.PreviewPiece(request.serial, 15, 0.32, poses, True),
             preview_process.PredictionAnswer(request.serial, told),

@@ -71,7 +71,7 @@ JUDGES = {  # by function, the test that has its table, and its file below tests
         "identification/test_converged.py",
         "test_only_a_search_whose_starts_agree_has_converged",
     ),
-    "trunkline.ar.session.preview_validation:_held": ("ar/session/test_hindsight.py", "test_what_came_of_a_grasp"),
+    "trunkline.ar.session.preview_validation:_grasped": ("ar/session/test_hindsight.py", "test_what_came_of_a_grasp"),
     "trunkline.ar.session.preview_validation:_holds": (
         "ar/session/test_hindsight.py",
         "test_whether_the_arm_holds_anything",
@@ -109,8 +109,6 @@ OTHERWISE = {  # what the word stands for there: no verdict
     "trunkline.identification.simulate.experiment:start_frames": "frames in which an arm is held before its release",
     "trunkline.identification.results.parameter_table:parameter_table": "looks a name up among those that were at a bound",
     "trunkline.kinematics.ik.training:pieces": "rows that are held out",
-    "trunkline.ar.session.controller_input:_controller": "buttons that are held down",
-    "trunkline.ar.session.preview_process:_held": "the thing that is in the arm, looked up in the world",
     "trunkline.recordings.preparation.proposal:_experiment": "whether motors hold in a log; a user confirms what is proposed",
     "trunkline.kinematics.reachability.tips:held_by": "lengths of cables",
     "trunkline.compute.scheduler:spread_rows": "shares rows out to workers",

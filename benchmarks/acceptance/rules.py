@@ -6,7 +6,7 @@ import numpy as np
 
 from benchmarks.acceptance.row import Row, p95
 from tests.support.links import clock_error
-from tests.support.touches import PLACES, TRUE, at_reach, directions, seen
+from tests.support.touches import PLACES, TRUE, at_reach, directions, observed
 from trunkline.ar.session.alignment import fit, in_base, inverse, suspect
 from trunkline.ar.session.auth import HEADERS
 from trunkline.ar.session.session import PAGE
@@ -21,7 +21,7 @@ def rows() -> list[Row]:
 def aligned() -> list[Row]:
     rng, off, named, others, alarms = np.random.default_rng(0), [], 0, 0, 0
     for trial in range(TRIALS):
-        touched, point = seen(PLACES, rng, SIGMA), at_reach(rng)
+        touched, point = observed(PLACES, rng, SIGMA), at_reach(rng)
         there = in_base(fit(touched, PLACES), in_base(inverse(TRUE), point))
         off.append(np.linalg.norm(there - point))
         alarms += suspect(touched, PLACES) is not None

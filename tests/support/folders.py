@@ -22,5 +22,5 @@ def demo_with(pattern: str) -> Path:
 def package() -> Path:
     """The Unity package that the stage made last."""
     pattern = "artifacts/package_unity/*.tgz"
-    (found,) = demo_with(pattern).glob(pattern)
-    return found
+    (path,) = demo_with(pattern).glob(pattern)
+    return path

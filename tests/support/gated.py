@@ -54,7 +54,7 @@ def stored(project):
     return json.loads((project / "tests" / "baseline.json").read_text())
 
 
-def found(project):
+def gate_failures(project):
     file = project / "tests" / "limits.yaml"
     return gate.failures(read_limits(file), baseline.read_baseline(baseline.baseline_file(file)), project)
 

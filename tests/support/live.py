@@ -81,7 +81,9 @@ class PlainPlanning:
     def order(self, order):
         if isinstance(order, preview_process.FollowRequest):
             self.heard(
-                preview_process.FollowAnswer(order.serial, *sought(self.planner, order.targets, order.joints, order.world))
+                preview_process.FollowAnswer(
+                    order.serial, *sought(self.planner, order.targets, order.joints, order.world)
+                )
             )
             return
         serial = order.request.serial
@@ -94,11 +96,12 @@ class PlainPlanning:
         self.plans.append(plan)
         poses = np.zeros((15, BODIES, 7), dtype=np.float32)
         preview = messages.PreviewMessage(digest, 0.02, PREVIEW, 0.02, (("approach", 0.0),))
-        found = messages.PredictionMessage(digest, None, None, None, (0.0,), ((0.0, 0.0, 0.0),), (0.0,), 0.9, 12)
+        prediction = messages.PredictionMessage(digest, None, None, None, (0.0,), ((0.0, 0.0, 0.0),), (0.0,), 0.9, 12)
         for answer in (
             preview_process.PlanAnswer(PlanReport(serial, digest, "", plan.package, plan.world), plan),
             preview_process.PreviewBegun(serial, preview), preview_process.PreviewPiece(serial, 0, 0.02, poses, False),
-            preview_process.PreviewPiece(serial, 15, 0.32, poses, True), preview_process.PredictionAnswer(serial, found),
+            preview_process.PreviewPiece(serial, 15, 0.32, poses, True),
+            preview_process.PredictionAnswer(serial, prediction),
         ):  # fmt: skip
             self.heard(answer)
 
@@ -123,7 +126,8 @@ class Laid:
         scene = {"bodies": ["a", "b", "c"]}
         origins = Origins.of(["127.0.0.1"], port, tls=False)
         self.server = Server(Composition(
-            self.controller, TOKEN, origins, PACKAGE, scene, None, rate, page, self.log.append, live().alignment, anchors
+            self.controller, TOKEN, origins, PACKAGE, scene, None, rate, page, self.log.append,
+            live().alignment, anchors,
         ))  # fmt: skip
         self.planning.heard = self.server.foreseen
         self.url, self.origin = f"http://127.0.0.1:{port}", f"http://127.0.0.1:{port}"
@@ -133,7 +137,7 @@ class Guest:
     """A client: it answers pings, acknowledges, and keeps what it hears."""
 
     def __init__(self, socket, reads=True):
-        self.socket, self.said, self.frames, self.received = socket, [], [], 0
+        self.socket, self.messages, self.frames, self.received = socket, [], [], 0
         self.task = asyncio.create_task(self._listen()) if reads else None
         self.left = self.right = None
         self.closed = asyncio.Event()
@@ -141,10 +145,10 @@ class Guest:
     async def _listen(self):
         async for message in self.socket:
             if message.type is WSMsgType.TEXT:
-                told = message.json()
-                self.said.append(told)
-                if told["type"] == "ping":
-                    await self.say(type="pong", number=told["number"], stamp=self.now())
+                content = message.json()
+                self.messages.append(content)
+                if content["type"] == "ping":
+                    await self.say(type="pong", number=content["number"], stamp=self.now())
             elif message.type is WSMsgType.BINARY:
                 self.received += 1
                 self.frames.append(message.data)
@@ -161,23 +165,23 @@ class Guest:
         """The newest message of this type with these fields, once there is one."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
-            for told in reversed(self.said):
-                if told["type"] == kind:
-                    if all(told[name] == value for name, value in fields.items()):
-                        return told
+            for message in reversed(self.messages):
+                if message["type"] == kind:
+                    if all(message[name] == value for name, value in fields.items()):
+                        return message
                     if kind in ("state", "lease"):
                         break
             await asyncio.sleep(0.005)
-        raise AssertionError(f"no {kind} with {fields}; heard {self.said[-5:]}")
+        raise AssertionError(f"no {kind} with {fields}; heard {self.messages[-5:]}")
 
     async def refused(self, word, seconds=3.0):
         end = time.monotonic() + seconds
         while time.monotonic() < end:
-            for told in self.said:
-                if told["type"] == "error" and word in told["reason"]:
-                    return told["reason"]
+            for message in self.messages:
+                if message["type"] == "error" and word in message["reason"]:
+                    return message["reason"]
             await asyncio.sleep(0.005)
-        raise AssertionError(f"no error with {word!r}; heard {self.said[-5:]}")
+        raise AssertionError(f"no error with {word!r}; heard {self.messages[-5:]}")
 
     async def stop(self):
         await self.socket.send_bytes(binary("stop", self.received, self.now()))

@@ -15,7 +15,11 @@ from trunkline.ar.drivers.simulated_motors import MotorParameters, SimulatedMoto
 from trunkline.pipeline.config import PROJECT, load_folder
 
 TICK = 0.001  # s
-PLANTS = (MotorParameters(), MotorParameters(side=-1, begins=8100, stiffness=300.0), MotorParameters(slack=0.03, begins=4000, stiffness=500.0))
+PLANTS = (
+    MotorParameters(),
+    MotorParameters(side=-1, begins=8100, stiffness=300.0),
+    MotorParameters(slack=0.03, begins=4000, stiffness=500.0),
+)
 
 
 def motor_settings() -> MotorSettings:

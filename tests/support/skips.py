@@ -103,20 +103,20 @@ class Skips:
 
     def faults(self, whole: bool) -> list[str]:
         """What is wrong with the skips, a line each. whole: whether every test was there to be run."""
-        told = [
+        lines = [
             f"{test} - skipped, and tests/skips.yaml does not allow it: {reason}"
             for test, reason in sorted(self.skipped.items())
             if not any(row.reason == reason and row.holds and row.names(test) for row in self.rows)
         ]
         if whole:
             ran = self.selected - set(self.skipped)
-            told += [f"tests/skips.yaml: no test has an id like {pattern}" for pattern in sorted(self.unmatched)]
-            told += [
+            lines += [f"tests/skips.yaml: no test has an id like {pattern}" for pattern in sorted(self.unmatched)]
+            lines += [
                 f"tests/skips.yaml: no test is skipped for {row.reason!r}, though it may be here"
                 for row in self.rows
                 if row.reason not in self.skipped.values() and row.holds and any(map(row.names, ran))
             ]
-        return told
+        return lines
 
 
 def _reason(report) -> str:

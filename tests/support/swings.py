@@ -25,12 +25,12 @@ def swing(amplitude: float = 0.05, decay: float = 4.0, turn: float = 12.0) -> np
 def experiment(positions: np.ndarray, measured: np.ndarray | None = None, kind: str = "release", **more) -> Experiment:
     """Of positions (T, S, 3), m, all of them measured if not said."""
     frames = len(positions)
-    seen = np.ones(positions.shape[:2], bool) if measured is None else measured
+    visible = np.ones(positions.shape[:2], bool) if measured is None else measured
     fit = PoseFit(np.zeros(6), np.full(3, 1e-3), 1, True)
     facts = {"name": "by hand", "kind": kind, "split": "identify", "frame_step": STEP, "fit": fit} | more
     return Experiment(
         gravity=np.array([0.0, 0.0, -9.81]), start=np.zeros(6), velocity=np.zeros(6), lead=STEP,
-        controls=np.zeros((frames, 0)), positions=positions, measured=seen,
+        controls=np.zeros((frames, 0)), positions=positions, measured=visible,
         **facts,
     )  # fmt: skip
 
@@ -38,10 +38,10 @@ def experiment(positions: np.ndarray, measured: np.ndarray | None = None, kind: 
 def trial(positions: np.ndarray, measured: np.ndarray | None = None, kind: str = "release", **more) -> Trial:
     """As `experiment`, a trial that begins with its first frame."""
     frames = len(positions)
-    seen = np.ones(positions.shape[:2], bool) if measured is None else measured
+    visible = np.ones(positions.shape[:2], bool) if measured is None else measured
     facts = {"name": "by hand", "experiment": kind, "split": "identify", "level": None} | more
     return Trial(
         gravity=np.array([0.0, 0.0, -9.81]), time=STEP * np.arange(frames), segments=SEGMENTS, positions=positions,
-        quaternions=None, measured=seen, tendons=(), commands=np.zeros((frames, 0)),
+        quaternions=None, measured=visible, tendons=(), commands=np.zeros((frames, 0)),
         tendon_positions=np.zeros((frames, 0)), **facts,
     )  # fmt: skip

@@ -8,16 +8,16 @@ from trunkline.recordings.logs.log import read_log
 
 def fed(log_writer, seconds, pace=0.01):
     """Times at which something was told, of the journal's clock."""
-    told, end = [], time.monotonic() + seconds
+    times, end = [], time.monotonic() + seconds
     while time.monotonic() < end:
-        told.append(time.monotonic())
-        log_writer.event("tick", number=len(told))
+        times.append(time.monotonic())
+        log_writer.event("tick", number=len(times))
         time.sleep(pace)
-    return told
+    return times
 
 
 def ticks(path):
     """What is in the file, whatever has become of it: numbers, and what is damaged."""
-    found = read_log(path)
-    texts = found.topics[EVENTS].messages if EVENTS in found.topics else []
-    return [int(text.partition(b'"number":')[2].rstrip(b"}\0")) for text in texts], found.damage
+    log = read_log(path)
+    texts = log.topics[EVENTS].messages if EVENTS in log.topics else []
+    return [int(text.partition(b'"number":')[2].rstrip(b"}\0")) for text in texts], log.damage

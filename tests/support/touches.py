@@ -12,15 +12,15 @@ PLACES = np.array(
 )  # m, to which the flange reaches
 
 
-def seen(places, rng, sigma):
+def observed(places, rng, sigma):
     """Places (..., 3) in the reference frame, with noise of `sigma`, m, along each axis."""
     return in_base(inverse(TRUE), places) + rng.normal(scale=sigma, size=places.shape)
 
 
 def directions(count, rng):
     """Unit vectors (count, 3)."""
-    found = rng.normal(size=(count, 3))
-    return found / np.linalg.norm(found, axis=1)[:, None]
+    points = rng.normal(size=(count, 3))
+    return points / np.linalg.norm(points, axis=1)[:, None]
 
 
 def at_reach(rng):

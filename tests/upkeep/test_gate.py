@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.gated import GOOD, LIMITS, METRICS, changed, commit, found, made, renew, stored, write
+from tests.support.gated import GOOD, LIMITS, METRICS, changed, commit, gate_failures, made, renew, stored, write
 from trunkline.errors import InputError
 from trunkline.pipeline.stage import write_json
 from upkeep import baseline, gate
@@ -26,26 +26,26 @@ def project(tmp_path):
 
 
 def test_good_metrics_pass(project, capsys):
-    assert found(project) == []
+    assert gate_failures(project) == []
     assert gate.main(project) == 0
     assert "5 metrics in 1 stages, 0 problems" in capsys.readouterr().out
 
 
 def test_metrics_that_no_row_names_are_let_alone(project):
     write(project, GOOD | {"new": 3, "unknown": None, "by": {"kind": [1.0]}})
-    assert found(project) == []
+    assert gate_failures(project) == []
 
 
 def test_a_missing_file_fails(project, capsys):
     (project / "artifacts" / "fit" / "metrics.json").unlink()
-    assert found(project) == ["fit: artifacts/fit/metrics.json is missing"]
+    assert gate_failures(project) == ["fit: artifacts/fit/metrics.json is missing"]
     assert gate.main(project) == 1
     assert "gate: FAIL fit: artifacts/fit/metrics.json is missing" in capsys.readouterr().out
 
 
 def test_a_file_that_is_not_json_fails(project):
     (project / "artifacts" / "fit" / "metrics.json").write_text('{"accuracy": 0.9')
-    assert "not JSON" in found(project)[0]
+    assert "not JSON" in gate_failures(project)[0]
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def test_a_file_that_is_not_json_fails(project):
 )
 def test_each_bad_value_fails_by_name(project, metrics, problem):
     write(project, metrics)
-    assert any(problem in line for line in found(project)), found(project)
+    assert any(problem in line for line in gate_failures(project)), gate_failures(project)
     assert gate.main(project) == 1
 
 
@@ -80,15 +80,15 @@ def test_each_bad_value_fails_by_name(project, metrics, problem):
 def test_a_number_that_is_not_finite_fails_under_whatever_key(project, key, value):
     last = key.rpartition(".")[2]
     write(project, changed(free=[1.0, value]) if last == "1" else changed(**{last: value}))
-    assert found(project) == [f"fit: {key}: found {value}, expected a finite number"]
+    assert gate_failures(project) == [f"fit: {key}: found {value}, expected a finite number"]
     assert gate.main(project) == 1
 
 
 def test_a_little_worse_and_better_pass(project):
     write(project, changed(validate=1.29, accuracy=0.936, spread=5.1))
-    assert found(project) == []
+    assert gate_failures(project) == []
     write(project, changed(validate=0.2, accuracy=1.0, spread=0.0))
-    assert found(project) == []
+    assert gate_failures(project) == []
 
 
 def test_many_commits_of_a_little_worse_fail_as_soon_as_they_sum_up(project):
@@ -104,7 +104,7 @@ def test_many_commits_of_a_little_worse_fail_as_soon_as_they_sum_up(project):
 
 def test_an_error_that_is_just_so_many_times_below_the_other_passes(project):
     write(project, changed(cad=5.0))
-    assert found(project) == []
+    assert gate_failures(project) == []
 
 
 @pytest.mark.parametrize(
@@ -121,9 +121,9 @@ def test_slack_counts_near_zero(project):
     commit(project)
     assert renew(project, "better") == 0
     write(project, changed(validate=0.0109))
-    assert found(project) == []
+    assert gate_failures(project) == []
     write(project, changed(validate=0.0112))
-    assert found(project) == ["fit: error.validate: found 0.0112, baseline 0.001, expected at most 0.011"]
+    assert gate_failures(project) == ["fit: error.validate: found 0.0112, baseline 0.001, expected at most 0.011"]
 
 
 @pytest.mark.parametrize(
@@ -227,14 +227,14 @@ def test_a_stage_that_never_ran_is_told_and_holds_nothing_until_it_did(project, 
     file = project / "artifacts" / "rare" / "metrics.json"
     file.parent.mkdir()
     file.write_text('{"rate": 0.4}')
-    assert found(project)[0].startswith("rare: rate: no baseline")
-    assert found(project)[1] == "rare: rate: found 0.4, expected at least 0.5"
+    assert gate_failures(project)[0].startswith("rare: rate: no baseline")
+    assert gate_failures(project)[1] == "rare: rate: found 0.4, expected at least 0.5"
     file.write_text('{"rate": 0.6}')
     commit(project)
     assert renew(project, "it ran") == 0
-    assert found(project) == []
+    assert gate_failures(project) == []
     file.unlink()
-    assert found(project) == ["rare: artifacts/rare/metrics.json is missing"]
+    assert gate_failures(project) == ["rare: artifacts/rare/metrics.json is missing"]
     assert gate.main(project) == 1
 
 
@@ -247,10 +247,10 @@ def test_of_the_project_s_stages_only_the_rehearsal_may_not_have_run():
 
 def test_a_row_without_a_baseline_fails_and_the_command_adds_it(project):
     (project / "tests" / "limits.yaml").write_text(LIMITS + "  error.cad: {better: lower}\n")
-    assert found(project) == ['fit: error.cad: no baseline, expected one (`make baseline REASON="..."`)']
+    assert gate_failures(project) == ['fit: error.cad: no baseline, expected one (`make baseline REASON="..."`)']
     commit(project)
     assert renew(project, "a new row") == 0
-    assert found(project) == []
+    assert gate_failures(project) == []
     assert stored(project)["metrics"]["fit"]["error.cad"] == 8.0
 
 

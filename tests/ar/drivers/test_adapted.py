@@ -51,10 +51,10 @@ def clock(monkeypatch):
 
 @pytest.fixture
 def driver(clock):
-    found = DriverClient(["adapter"], 7, PATIENCE, ASTRAY, ", expected it here")
-    yield found
-    found.close()
-    found.process.socket.close()
+    client = DriverClient(["adapter"], 7, PATIENCE, ASTRAY, ", expected it here")
+    yield client
+    client.close()
+    client.process.socket.close()
 
 
 @pytest.fixture
@@ -166,14 +166,14 @@ def test_a_fault_lasts_and_is_the_first(ready):
 def test_what_is_sent_comes_to_the_adapter(ready):
     for number in range(3):
         ready.send(BEGUN + 0.001 * number, READY + number)
-    found = [Setpoint.unpack(frame) for frame in ready.process.line.heard()]
-    assert found == [Setpoint(BEGUN + 0.001 * number, tuple(READY + number)) for number in range(3)]
+    setpoints = [Setpoint.unpack(frame) for frame in ready.process.line.heard()]
+    assert setpoints == [Setpoint(BEGUN + 0.001 * number, tuple(READY + number)) for number in range(3)]
 
 
 def test_an_adapter_that_takes_no_setpoints_is_a_fault_unless_it_has_told_one(clock):
-    for told, expected in (("", "its adapter has ended"), ("reflex", "reflex")):
+    for reason, expected in (("", "its adapter has ended"), ("reflex", "reflex")):
         driver = DriverClient(["adapter"], 7)
-        driver.process.tell(BEGUN, fault=told)
+        driver.process.tell(BEGUN, fault=reason)
         driver.process.socket.close()
         driver.send(BEGUN, READY)
         assert driver.fault == expected
@@ -207,7 +207,12 @@ def test_a_robots_joint_may_be_as_far_off_as_the_settings_say(clock):
     assert SETTINGS.arm.astray == ASTRAY
     for off, fault in ((ASTRAY - NEAR, ""), (ASTRAY + NEAR, "joint 4: found 0.05 rad from where it is sent, ")):
         driver = panda(SETTINGS.arm, "panda")
-        assert driver.process.command[1:5] == ["-m", "trunkline.ar.drivers.driver_process", "panda", SETTINGS.arm.address]
+        assert driver.process.command[1:5] == [
+            "-m",
+            "trunkline.ar.drivers.driver_process",
+            "panda",
+            SETTINGS.arm.address,
+        ]
         driver.process.tell(BEGUN, READY + off * np.eye(7)[3])
         driver.turn(BEGUN)
         assert driver.fault.startswith(fault)

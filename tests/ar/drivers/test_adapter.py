@@ -27,7 +27,7 @@ class Played:
 
     def __init__(self, monkeypatch, robot="panda"):
         ours, theirs = socket.socketpair()
-        self.line, self.theirs, self.now, self.told = FrameSocket(ours, DriverState.size(7)), theirs, 100.0, []
+        self.line, self.theirs, self.now, self.states = FrameSocket(ours, DriverState.size(7)), theirs, 100.0, []
         monkeypatch.setattr(driver_process, "time", SimpleNamespace(monotonic=lambda: self.now))
         self.adapter, self.joints, self.ended = driver_process.DriverProcess(robot, theirs), list(READY), False
 
@@ -40,14 +40,14 @@ class Played:
                 self.line.send(Setpoint(self.now + LEAD, tuple(way(self.now - begun))).pack())
             self.joints, self.ended = self.adapter.cycle(self.joints, self.joints, DT, None)
             if self.line.open:
-                self.told += [DriverState.unpack(frame) for frame in self.line.heard()]
+                self.states += [DriverState.unpack(frame) for frame in self.line.heard()]
             if self.ended:
                 break
         return self
 
     @property
     def fault(self):
-        return self.told[-1].fault
+        return self.states[-1].fault
 
 
 @pytest.fixture
@@ -66,9 +66,9 @@ def test_it_plays_what_it_is_sent_and_tells_of_the_robot_as_often_as_it_should(p
     played.play(0.5, turning)
     assert played.fault == ""
     np.testing.assert_allclose(played.joints, turning(0.5 - LEAD), atol=1e-3)
-    times = [told.time for told in played.told]
+    times = [state.time for state in played.states]
     np.testing.assert_allclose(np.diff(times), driver_process.TELL * DT)
-    np.testing.assert_allclose(played.told[-1].sent, played.joints, atol=driver_process.TELL * DT)
+    np.testing.assert_allclose(played.states[-1].sent, played.joints, atol=driver_process.TELL * DT)
 
 
 def test_where_setpoints_end_it_brakes_and_says_so(played):
@@ -118,9 +118,9 @@ def test_an_fr3_is_held_against_its_own_limits(monkeypatch):
 def test_why_control_has_ended_is_told_last(played):
     played.play(0.1)
     played.adapter.fail("ControlException: reflex")
-    (told,) = (DriverState.unpack(frame) for frame in played.line.heard())
-    assert told.fault == "ControlException: reflex"
-    assert told.sent == tuple(played.joints)
+    (state,) = (DriverState.unpack(frame) for frame in played.line.heard())
+    assert state.fault == "ControlException: reflex"
+    assert state.sent == tuple(played.joints)
 
 
 # --- as a process
@@ -128,11 +128,11 @@ def test_why_control_has_ended_is_told_last(played):
 
 @pytest.fixture
 def arm():
-    found = panda(SETTINGS, "fake")
-    until(lambda: found.ready or found.fault, lambda: found.turn(time.monotonic()))
-    assert found.fault == ""
-    yield found
-    found.close()
+    client = panda(SETTINGS, "fake")
+    until(lambda: client.ready or client.fault, lambda: client.turn(time.monotonic()))
+    assert client.fault == ""
+    yield client
+    client.close()
 
 
 @pytest.mark.realtime

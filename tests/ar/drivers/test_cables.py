@@ -46,11 +46,11 @@ def test_where_setpoints_end_they_hold_and_follow_no_more():
     played.play(0.5, lambda t: 0.03 * t)
     played.play(LEAD + SILENT)
     assert played.cables.fault.startswith("heard no setpoint for 5")
-    held = played.cables.sent
-    np.testing.assert_allclose(held, 0.015, atol=1e-6)
+    pulls = played.cables.sent
+    np.testing.assert_allclose(pulls, 0.015, atol=1e-6)
     played.play(0.3, lambda t: 0.05)
-    np.testing.assert_array_equal(played.cables.sent, held)
-    np.testing.assert_allclose(played.bench.pulls, held, atol=5e-4)
+    np.testing.assert_array_equal(played.cables.sent, pulls)
+    np.testing.assert_allclose(played.bench.pulls, pulls, atol=5e-4)
     assert all(played.bench.currents)
 
 

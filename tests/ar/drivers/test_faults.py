@@ -74,8 +74,8 @@ def test_a_cable_may_be_so_far_from_where_it_shall_be(cable, sign):
         bench = homed()
         pulls = np.array(bench.motors.pulls)
         currents = bench.motors.currents(pulls + sign * off * np.eye(3)[cable], np.zeros(3), bench.now)
-        said = f"motor {cable + 1}: found 20 mm from where its cable shall be, expected at most 20"
-        assert bench.motors.fault == (said if faulty else "")
+        fault = f"motor {cable + 1}: found 20 mm from where its cable shall be, expected at most 20"
+        assert bench.motors.fault == (fault if faulty else "")
         assert faulty == (not any(currents.values()))
 
 
@@ -157,10 +157,10 @@ def link(monkeypatch):
 
 @pytest.fixture
 def arm(link):
-    found = RosArm(ROS)
-    found.turn(100.0)
-    assert found.ready
-    return found
+    arm = RosArm(ROS)
+    arm.turn(100.0)
+    assert arm.ready
+    return arm
 
 
 @pytest.mark.parametrize("sign", [-1, 1])
@@ -172,8 +172,8 @@ def test_a_joint_may_be_so_far_from_where_its_controller_is_sent(arm, link, join
     for beyond, faulty in ((-NEAR, False), (NEAR, True)):
         link.joints = READY + (ROS.astray + beyond) * off
         arm.turn(100.01)
-        said = f"{ROS.names[joint]}: found 0.1 rad from where it is sent, expected at most 0.1"
-        assert arm.fault == (said if faulty else "")
+        fault = f"{ROS.names[joint]}: found 0.1 rad from where it is sent, expected at most 0.1"
+        assert arm.fault == (fault if faulty else "")
 
 
 @pytest.mark.parametrize("joint", JOINTS)
@@ -198,12 +198,12 @@ def test_a_controller_has_to_be_there_within_its_time(link, missing, late, fault
         link.listeners = 0
     else:
         link.joints = None
-    found = RosArm(ROS)
-    found.turn(100.0 + late)
-    assert not found.ready
+    arm = RosArm(ROS)
+    arm.turn(100.0 + late)
+    assert not arm.ready
     side = "found nobody who listens" if missing == "listeners" else "found no state of panda_joint1 and others"
     topic = ROS.trajectory if missing == "listeners" else ROS.states
-    assert found.fault == (f"{topic}: {side} within 20 s" if faulty else "")
+    assert arm.fault == (f"{topic}: {side} within 20 s" if faulty else "")
 
 
 @pytest.mark.parametrize("sign", [-1, 1])
@@ -211,12 +211,12 @@ def test_a_controller_has_to_be_there_within_its_time(link, missing, late, fault
 def test_no_joint_is_sent_faster_than_it_may_go(link, joint, sign):
     for share, faulty in ((1 - 1e-4, False), (1 + 1e-4, True)):
         link.joints, link.sent = READY, []
-        found = RosArm(ROS)
-        found.turn(100.0)
+        arm = RosArm(ROS)
+        arm.turn(100.0)
         there = READY + sign * share * ROUNDING * VELOCITY[joint] * LEAD * np.eye(7)[joint]
-        found.send(100.02 + LEAD, there)
-        found.turn(100.02)
-        assert found.fault.startswith(f"setpoint: {ROS.names[joint]} asks for ") == faulty
+        arm.send(100.02 + LEAD, there)
+        arm.turn(100.02)
+        assert arm.fault.startswith(f"setpoint: {ROS.names[joint]} asks for ") == faulty
         assert len(link.sent) == (0 if faulty else 1)
 
 
@@ -240,7 +240,7 @@ def test_a_point_that_cannot_be_sent_is_a_fault(arm, link):
 # --- both limbs
 
 
-class Told:
+class FailedDriver:
     """A limb that is told what to be. `ahead`: s from its clock to when each setpoint is due."""
 
     def __init__(self, ready=True, fault="", at=READY):
@@ -263,7 +263,7 @@ class Told:
      (None, "hot", "motors: hot"), ("reflex", None, "robot: reflex"), (None, None, "")],
 )  # fmt: skip
 def test_a_fault_of_either_limb_is_the_machines_and_has_its_name(arm, motors, fault):
-    drivers = [None if said is None else Told(fault=said) for said in (arm, motors)]
+    drivers = [None if fault is None else FailedDriver(fault=fault) for fault in (arm, motors)]
     assert HardwareRobot(*drivers, np.full(3, 0.5), lambda: 100.0).fault == fault
 
 
@@ -276,7 +276,7 @@ def waits(monkeypatch):
 
 
 def test_a_machine_begins_once_both_limbs_are_ready(waits):
-    arm, motors = Told(ready=False), Told(ready=False, at=np.zeros(3))
+    arm, motors = FailedDriver(ready=False), FailedDriver(ready=False, at=np.zeros(3))
     waits += [lambda: setattr(arm, "ready", True), lambda: None, lambda: setattr(motors, "ready", True)]
     made = HardwareRobot(arm, motors, np.full(3, 0.5), lambda: 100.0)
     np.testing.assert_array_equal(made.begin(np.ones(7)), READY)
@@ -284,35 +284,35 @@ def test_a_machine_begins_once_both_limbs_are_ready(waits):
     assert (arm.turns, motors.turns) == (3, 3)
 
 
-@pytest.mark.parametrize(("limb", "said"), [("arm", "robot: no robot"), ("motors", "motors: no robot")])
-def test_a_machine_whose_limb_fails_does_not_begin(waits, driver, said):
-    drivers = {"arm": Told(ready=False), "motors": Told(ready=False)}
+@pytest.mark.parametrize(("driver", "fault"), [("arm", "robot: no robot"), ("motors", "motors: no robot")])
+def test_a_robot_whose_driver_fails_does_not_begin(waits, driver, fault):
+    drivers = {"arm": FailedDriver(ready=False), "motors": FailedDriver(ready=False)}
     waits += [lambda: setattr(drivers[driver], "fault", "no robot")]
-    with pytest.raises(InputError, match=f"^{said}$"):
+    with pytest.raises(InputError, match=f"^{fault}$"):
         HardwareRobot(**drivers, straight=np.full(3, 0.5), clock=lambda: 100.0).begin(np.ones(7))
 
 
 def test_a_machine_that_is_ready_and_has_failed_does_not_begin():
     with pytest.raises(InputError, match="^robot: reflex$"):
-        HardwareRobot(Told(fault="reflex"), Told(), np.full(3, 0.5), lambda: 100.0).begin(np.ones(7))
+        HardwareRobot(FailedDriver(fault="reflex"), FailedDriver(), np.full(3, 0.5), lambda: 100.0).begin(np.ones(7))
 
 
 @pytest.mark.parametrize("ready", [True, False])
 def test_a_machine_that_nobody_wants_any_more_does_not_begin(ready):
     with pytest.raises(InputError, match="^the session is gone$"):
-        HardwareRobot(Told(ready=ready), None, np.full(3, 0.5), lambda: 100.0).begin(np.ones(7), lambda: True)
+        HardwareRobot(FailedDriver(ready=ready), None, np.full(3, 0.5), lambda: 100.0).begin(np.ones(7), lambda: True)
 
 
 @pytest.mark.parametrize("limbs", [(True, True), (True, False), (False, True)])
 def test_each_limb_that_is_there_is_given_back(drivers):
-    made = [Told() if there else None for there in drivers]
+    made = [FailedDriver() if there else None for there in drivers]
     HardwareRobot(*made, np.full(3, 0.5), lambda: 100.0).close()
     assert [driver.closed for driver in made if driver is not None] == [True] * sum(drivers)
 
 
 def test_moves_that_are_due_anew_are_not_made_up_for():
     now = [100.0]
-    made = HardwareRobot(Told(), None, np.full(3, 0.5), lambda: now[0])
+    made = HardwareRobot(FailedDriver(), None, np.full(3, 0.5), lambda: now[0])
     made.begin(READY)
     made.move(READY, np.full(3, 0.5))
     assert made.behind == 0.0  # the first

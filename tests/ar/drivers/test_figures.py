@@ -129,9 +129,9 @@ def test_no_figure_with_a_unit_is_left_out(page):
     spans = [match.span() for sentence, _ in FIGURES[page] for match in re.finditer(sentence, text)]
     spans += [(at, at + len(words)) for words in OTHERS[page] for at in (text.find(words),) if at >= 0]
     left = [
-        text[max(found.start() - 40, 0) : found.end() + 10]
-        for found in re.finditer(rf"\d[\d.]*\s{UNITS}", text)
-        if not any(low <= found.start() < high for low, high in spans)
+        text[max(match.start() - 40, 0) : match.end() + 10]
+        for match in re.finditer(rf"\d[\d.]*\s{UNITS}", text)
+        if not any(low <= match.start() < high for low, high in spans)
     ]
     assert left == []
 

@@ -81,11 +81,11 @@ def test_no_joint_goes_beyond_a_limit_though_it_keeps_all_others(robot, kind, jo
     assert not stream.fault.startswith("setpoint:")
     stream, sent = played(way(made(limits, joint, 1 + SMALL), joint, sign), robot)
     most = getattr(limits, kind)[joint]
-    said = rf"setpoint: joint {joint + 1} asks for [\d.e+]+ {unit}, expected at most {re.escape(f'{most:.3g}')}"
-    assert re.fullmatch(said, stream.fault)
+    pattern = rf"setpoint: joint {joint + 1} asks for [\d.e+]+ {unit}, expected at most {re.escape(f'{most:.3g}')}"
+    assert re.fullmatch(pattern, stream.fault)
     for order, name in enumerate(KINDS, 1):
-        found = np.abs(np.diff(sent, order, axis=0)).max(axis=0) / DT**order
-        assert (found < 1.03 * getattr(limits, name)).all()  # braking begins with what it has
+        rates = np.abs(np.diff(sent, order, axis=0)).max(axis=0) / DT**order
+        assert (rates < 1.03 * getattr(limits, name)).all()  # braking begins with what it has
 
 
 @pytest.mark.parametrize("side", ["low", "high"])
@@ -160,9 +160,9 @@ def test_a_plan_that_leaves_the_robots_own_range_is_refused_and_its_targets_are_
         there[joint] = border + sign * beyond
         plan = Plan(0.01, np.array([start, there, start]), np.full((3, 3), 0.5), (("approach", 0),), "p", "w")
         robot = TimeScaledRobot(start, np.full(3, 0.5), generous, "p", lambda q, c, _: None, limits)
-        found = robot.check(plan)
-        said = f"plan: joint {joint + 1} leaves this robot's range at {there[joint]:.3f} rad"
-        assert found == (said if beyond > 0 else "")
+        reason = robot.check(plan)
+        expected = f"plan: joint {joint + 1} leaves this robot's range at {there[joint]:.3f} rad"
+        assert reason == (expected if beyond > 0 else "")
         robot.follow(Following(0.0, 0.0, 0.05), DT)
         robot.hear(0.0, np.append(there, np.full(3, 0.5)))
         assert robot._follower.goal[joint] == (start if beyond > 0 else there)[joint]

@@ -73,11 +73,11 @@ def test_the_current_keeps_its_limit():
     winch = replace(motor_settings().reel, most=0.3)
     bench = Workbench(settings=replace(motor_settings(), reel=winch)).home()
     assert bench.motors.homed
-    found = []
+    zeros = []
     for _ in range(300):
         bench.tick(0.019, 0.0)
-        found.append(np.abs(bench.currents).max())
-    assert max(found) == pytest.approx(0.3, abs=1e-3)
+        zeros.append(np.abs(bench.currents).max())
+    assert max(zeros) == pytest.approx(0.3, abs=1e-3)
 
 
 def test_without_commands_the_bank_drives_no_current():

@@ -85,21 +85,21 @@ class Played:
 
 @pytest.fixture
 def driven(monkeypatch):
-    found = Played(monkeypatch, homed()).turn(0.3)
-    assert found.currents.min() > 0.05
-    assert found.driver.fault == ""
-    return found
+    played = Played(monkeypatch, homed()).turn(0.3)
+    assert played.currents.min() > 0.05
+    assert played.driver.fault == ""
+    return played
 
 
 def test_motors_that_are_heard_are_homed_and_driven(monkeypatch):
-    found = Played(monkeypatch, Workbench())
+    played = Played(monkeypatch, Workbench())
     for _ in range(10_000):
-        found.turn()
-        if found.driver.motors.homed:
+        played.turn()
+        if played.driver.motors.homed:
             break
-    assert found.driver.motors.homed
-    assert found.driver.fault == ""
-    assert found.bus.filters == FILTERS
+    assert played.driver.motors.homed
+    assert played.driver.fault == ""
+    assert played.bus.filters == FILTERS
 
 
 def test_a_bus_that_gives_nothing_but_errors_ends_all_current_at_once(driven):
@@ -160,12 +160,12 @@ def test_of_the_frames_of_a_motor_that_wait_the_newest_counts(driven):
 
 
 def test_an_error_frame_is_no_feedback(monkeypatch):
-    found = Played(monkeypatch, Workbench())
+    played = Played(monkeypatch, Workbench())
     frame = can.Message(arbitration_id=0x205, data=bytes(8), is_extended_id=False, is_error_frame=True)
     waits = [frame, None]
-    found.bus.recv = lambda timeout: waits.pop(0)
-    found.driver.turn([0.0] * 3, [0.0] * 3)
-    assert found.bench.motors.winches[0].heard is None
+    played.bus.recv = lambda timeout: waits.pop(0)
+    played.driver.turn([0.0] * 3, [0.0] * 3)
+    assert played.bench.motors.winches[0].heard is None
 
 
 def test_a_closed_driver_leaves_no_current_and_no_bus(driven):
@@ -184,12 +184,12 @@ def test_a_driver_that_stops_sending_leaves_no_current(driven):
 
 
 def test_where_one_frame_is_not_taken_the_other_still_is(monkeypatch):
-    found = Played(monkeypatch, Workbench())
-    driver = BusMotors(replace(motor_settings(), numbers=(1, 5, 6)), found.bus)
-    found.bus.deaf = 0x1FE
+    played = Played(monkeypatch, Workbench())
+    driver = BusMotors(replace(motor_settings(), numbers=(1, 5, 6)), played.bus)
+    played.bus.deaf = 0x1FE
     driver.turn([0.01] * 3, [0.0] * 3)
     assert driver.fault == "bus: full"
-    assert found.bus.sent == [(0x2FE, bytes(8))]
+    assert played.bus.sent == [(0x2FE, bytes(8))]
 
 
 # --- on a bus of python-can

@@ -61,8 +61,8 @@ def test_a_plan_that_another_robot_could_not_run_is_refused():
     turn = np.eye(10)[5] * (0.4 - START[5])
     plan, still = planned(turn), lambda q, c, _: None
     assert TimeScaledRobot(READY, START[7:], PLANNED, "package", still, PANDA).check(plan) == ""
-    found = TimeScaledRobot(READY, START[7:], PLANNED, "package", still, FR3).start(plan, plan.digest())
-    assert found == "plan: joint 6 leaves this robot's range at 0.400 rad"
+    reason = TimeScaledRobot(READY, START[7:], PLANNED, "package", still, FR3).start(plan, plan.digest())
+    assert reason == "plan: joint 6 leaves this robot's range at 0.400 rad"
 
 
 def test_without_a_stop_the_plan_is_run_to_its_end():
@@ -115,7 +115,7 @@ def test_it_stays_at_the_last_targets_that_its_range_has():
 
 def test_a_smoothed_step_becomes_a_way_of_continuous_acceleration():
     smoother = Smoother(np.zeros(1), 10)
-    found = np.array([smoother.next(np.array([max(0.0, n * TICK)]))[0] for n in range(-5, 60)])
-    gain = np.diff(found, 2) / TICK**2
+    values = np.array([smoother.next(np.array([max(0.0, n * TICK)]))[0] for n in range(-5, 60)])
+    gain = np.diff(values, 2) / TICK**2
     assert np.abs(np.diff(gain)).max() / TICK <= 1 / (10 * TICK) ** 2 * 1.01  # jerk of a speed that jumps by 1
-    np.testing.assert_allclose(found[-1], (59 - 9) * TICK)
+    np.testing.assert_allclose(values[-1], (59 - 9) * TICK)

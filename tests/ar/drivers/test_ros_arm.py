@@ -78,11 +78,11 @@ class Played:
 
     def assert_it_stands(self):
         """At a place on its way, whatever it is sent; it was never asked for more than its joints may do."""
-        held, points = self.controller._last[0], len(self.controller.points)
+        joints, points = self.controller._last[0], len(self.controller.points)
         self.play(0.5)
-        assert self.turned == held
+        assert self.turned == joints
         assert len(self.controller.points) == points
-        assert self._way(self.controller.points[-1]) <= held <= self._way(self.controller.points[-1] + LEAD)
+        assert self._way(self.controller.points[-1]) <= joints <= self._way(self.controller.points[-1] + LEAD)
         assert max(self.controller.asked) <= ROUNDING * VELOCITY[0]
 
 

@@ -83,7 +83,7 @@ class Stub:
 @pytest.fixture
 def stub(monkeypatch):
     stub = Stub()
-    own = {
+    environment = {
         "rclpy": {"Context": object, "init": stub.init, "shutdown": lambda context: stub.ended.append("context")},
         "rclpy.executors": {"SingleThreadedExecutor": stub.executor},
         "rclpy.node": {"Node": stub.node},
@@ -94,7 +94,7 @@ def stub(monkeypatch):
     }
     for package in ("builtin_interfaces", "sensor_msgs", "trajectory_msgs"):
         monkeypatch.setitem(sys.modules, package, ModuleType(package))
-    for name, holds in own.items():
+    for name, holds in environment.items():
         module = ModuleType(name)
         vars(module).update(holds)
         monkeypatch.setitem(sys.modules, name, module)

@@ -36,11 +36,11 @@ def play(seconds, heard=lambda now: True, at=way, dt=lambda now: DT, robot=PANDA
 
 def shares(sent, robot=PANDA):
     """Largest velocity, acceleration and jerk, as shares of the robot's."""
-    found, rates = [], sent
+    played, rates = [], sent
     for most in (robot.velocity, robot.acceleration, robot.jerk):
         rates = np.diff(rates, axis=0) / DT
-        found.append(float((np.abs(rates) / most).max()))
-    return found
+        played.append(float((np.abs(rates) / most).max()))
+    return played
 
 
 def test_setpoints_are_followed_when_they_are_due():
@@ -177,7 +177,7 @@ def lossy(tells, at=way):
             missed += 1
         else:
             if tells:
-                stream.found(made.place, made.speed, made.gain)
+                stream.synchronize(made.place, made.speed, made.gain)
             made.hear(stream.cycle(now, (1 + missed) * DT))
             missed = 0
         went.append(made.place)
@@ -205,8 +205,8 @@ def test_it_brakes_from_where_lost_commands_left_it():
 def test_frames_come_back():
     setpoint = Setpoint(12.5, tuple(READY))
     assert Setpoint.unpack(setpoint.pack()) == setpoint
-    told = DriverState(1.0, tuple(READY), tuple(READY + 1), "reflex: é")
-    assert DriverState.unpack(told.pack()) == told
+    state = DriverState(1.0, tuple(READY), tuple(READY + 1), "reflex: é")
+    assert DriverState.unpack(state.pack()) == state
     assert len(DriverState(1.0, (0.0,) * 3, (0.0,) * 3, "é" * 200).pack()) == DriverState.size(3)
 
 
@@ -221,11 +221,11 @@ def line():
 
 def test_frames_are_cut_however_they_come(line):
     ours, theirs = line
-    data, found = b"".join(Setpoint(n, tuple(READY)).pack() for n in range(9)), []
+    data, frames = b"".join(Setpoint(n, tuple(READY)).pack() for n in range(9)), []
     for begin in range(0, len(data), 50):
         theirs.send(data[begin : begin + 50])
-        found += ours.heard()
-    assert [Setpoint.unpack(frame).due for frame in found] == list(range(9))
+        frames += ours.heard()
+    assert [Setpoint.unpack(frame).due for frame in frames] == list(range(9))
     assert ours.open
     theirs.close()
     assert ours.heard() == []
@@ -243,5 +243,5 @@ def test_frames_that_are_missed_are_missed_whole(line):
         got += theirs.recv(3000)
         with contextlib.suppress(BlockingIOError):
             ours.send(next(frames))
-    found = {bytes(got[n : n + 3000]) for n in range(0, len(got) - 2999, 3000)}
-    assert all(len(set(frame)) == 1 for frame in found)
+    blocks = {bytes(got[n : n + 3000]) for n in range(0, len(got) - 2999, 3000)}
+    assert all(len(set(frame)) == 1 for frame in blocks)

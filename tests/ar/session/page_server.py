@@ -115,7 +115,7 @@ class Robot:
         self.figure, self.robot = figure, SimulatedRobot(np.array(READY_JOINTS), STRAIGHT, LIMITS, PACKAGE)
         self.start, self.stop, self.hear = self.robot.start, self.robot.stop, self.robot.hear
         self.last, self.fault = time.monotonic(), ""
-        self.kept: RobotState | None = None
+        self.frozen: RobotState | None = None
         self.is_silent = False
 
     def permit(self) -> None:
@@ -128,15 +128,15 @@ class Robot:
         return ExecutorReport("fault", "", self.fault) if self.fault else self.robot.state()
 
     def robot_state(self) -> RobotState:
-        if self.is_silent and self.kept is not None:
-            return self.kept
+        if self.is_silent and self.frozen is not None:
+            return self.frozen
         now = time.monotonic()
         while self.last + TICK <= now:
             self.robot.advance(TICK)
             self.last += TICK
         poses = self.figure.poses(self.robot.joints, self.robot.commands)
-        self.kept = RobotState(now, 0.0, self.robot.joints, self.robot.commands, np.full(7, np.nan), poses)
-        return self.kept
+        self.frozen = RobotState(now, 0.0, self.robot.joints, self.robot.commands, np.full(7, np.nan), poses)
+        return self.frozen
 
 
 def within(targets: Targets) -> Targets:
@@ -159,7 +159,9 @@ class Planning:
     def order(self, order: preview_process.Order | preview_process.FollowRequest) -> None:
         if isinstance(order, preview_process.FollowRequest):
             targets = order.targets and within(order.targets)
-            self.heard(preview_process.FollowAnswer(order.serial, *sought(self.planner, targets, order.joints, order.world)))
+            self.heard(
+                preview_process.FollowAnswer(order.serial, *sought(self.planner, targets, order.joints, order.world))
+            )
             return
         serial = order.request.serial
         try:
@@ -178,11 +180,15 @@ class Planning:
         self.heard(preview_process.PreviewBegun(serial, preview))
         for first in range(0, len(times), 18):
             piece = poses[first : first + 18]
-            self.heard(preview_process.PreviewPiece(serial, first, float(times[first]), piece, first + 18 >= len(times)))
+            self.heard(
+                preview_process.PreviewPiece(serial, first, float(times[first]), piece, first + 18 >= len(times))
+            )
         spread = tuple(float(share) for share in 0.004 + 0.018 * shares)
         path = tuple(tuple(map(float, tip)) for tip in tips)
-        told = messages.PredictionMessage(digest, 0.84, 0.68, 0.93, tuple(map(float, times[::9])), path, spread, 0.9, 32)
-        self.heard(preview_process.PredictionAnswer(serial, told))
+        prediction = messages.PredictionMessage(
+            digest, 0.84, 0.68, 0.93, tuple(map(float, times[::9])), path, spread, 0.9, 32
+        )
+        self.heard(preview_process.PredictionAnswer(serial, prediction))
 
     def leave(self) -> None:
         pass
@@ -193,8 +199,8 @@ def drawing(figure: Figure) -> dict:
     maps = {"rigid": np.ones((4, 4, 4)), "rigid_origin": np.zeros(3), "rigid_spacing": np.array(0.1)}
     ball = icosphere(subdivisions=3, radius=REACH).apply_translation(CENTRE)
     reach = {"vertices": ball.vertices.ravel().tolist(), "faces": ball.faces.ravel().tolist()}
-    found = pictured.scene(figure.model, figure.bodies, maps, LENGTH)
-    return found | {"reach": reach, "shell": {"around": AROUND, "along": ALONG}}
+    scene = pictured.scene(figure.model, figure.bodies, maps, LENGTH)
+    return scene | {"reach": reach, "shell": {"around": AROUND, "along": ALONG}}
 
 
 async def listen(runner: web.AppRunner, port: int) -> web.TCPSite:

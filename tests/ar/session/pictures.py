@@ -206,13 +206,13 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("package", nargs="?", type=Path)
     parser.add_argument("--folder", type=Path, default=PROJECT / "docs")
-    given = parser.parse_args(arguments)
-    pictures = asyncio.run(session(given.package or only_package()))
+    args = parser.parse_args(arguments)
+    pictures = asyncio.run(session(args.package or only_package()))
     missing = [mode for mode in get_args(Mode) if mode not in pictures]
     if missing:
         raise InputError(f"states: found no picture of {', '.join(missing)}, expected one of each")
     for mode, png in pictures.items():
-        path = given.folder / f"live-{mode}.png"
+        path = args.folder / f"live-{mode}.png"
         picture = Image.open(io.BytesIO(png)).convert("RGB")
         picture.quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
         print(f"{path}: {path.stat().st_size / 1000:.0f} kB")

@@ -39,8 +39,10 @@ def received(left=None, right=None, flags=BOTH):
     ("value", "is_held"), [(0.0, False), (PRESSED - NEAR, False), (PRESSED, True), (1.0, True), (np.nan, False)]
 )
 def test_a_button_is_held_from_half_its_way_on_and_no_other_with_it(name, value, is_held):
-    found = _controller(row(**{name: value}), True)
-    assert {button: getattr(found, button) for button in BUTTONS} == dict.fromkeys(BUTTONS, False) | {name: is_held}
+    controller = _controller(row(**{name: value}), True)
+    assert {button: getattr(controller, button) for button in BUTTONS} == dict.fromkeys(BUTTONS, False) | {
+        name: is_held
+    }
     assert (buttons(received(row(**{name: value}))) != buttons(received())) == is_held
 
 
@@ -64,16 +66,16 @@ def test_no_other_button_does(name):
      (("visible",), False, False), (("left_tracked", "right_tracked"), False, False), ((), False, False)],
 )  # fmt: skip
 def test_a_hand_is_tracked_where_its_controller_is_and_the_page_is_seen(flags, left, right):
-    given = received(flags=flags)
-    assert [hand.tracked for hand in controllers(given)] == [left, right]
-    assert [controller_pose(given, side) is not None for side in ("left", "right")] == [left, right]
+    message = received(flags=flags)
+    assert [hand.tracked for hand in controllers(message)] == [left, right]
+    assert [controller_pose(message, side) is not None for side in ("left", "right")] == [left, right]
 
 
 @pytest.mark.parametrize("name", HAND[:7])
 def test_what_is_no_pose_is_left_for_the_core_to_refuse_and_touches_nothing(name):
-    given = received(row(**{name: np.nan}))
-    assert controller_pose(given, "left") is None
-    assert controllers(given)[0].tracked
+    message = received(row(**{name: np.nan}))
+    assert controller_pose(message, "left") is None
+    assert controllers(message)[0].tracked
 
 
 @pytest.mark.parametrize(

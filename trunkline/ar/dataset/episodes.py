@@ -107,7 +107,7 @@ def _judged(recording: Recording, judged: list[Execution], step: Step) -> tuple[
     if not same:
         return "refused by the robot", False
     found = min(same, key=lambda one: abs(one.time - since))
-    if found.grasped is False:
+    if found.success is False:
         return "not held", False
     return found.end, found.end == "done"
 

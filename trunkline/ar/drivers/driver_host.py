@@ -35,7 +35,9 @@ DriverSettings = MotorsOnBus | RosSettings
 DRIVER_SETTINGS: TypeAdapter[DriverSettings] = TypeAdapter(DriverSettings)
 
 
-def start_driver(settings: DriverSettings, program: Sequence[str] = ("-m", "trunkline.ar.drivers.driver_host")) -> DriverClient:
+def start_driver(
+    settings: DriverSettings, program: Sequence[str] = ("-m", "trunkline.ar.drivers.driver_host")
+) -> DriverClient:
     """The limb of these settings, in a process of its own: Python's, which runs the `program`."""
     patience = CONNECTING if isinstance(settings, RosSettings) else HOMING
     command = [sys.executable, *program, DRIVER_SETTINGS.dump_json(settings).decode()]

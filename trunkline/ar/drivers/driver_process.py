@@ -97,7 +97,10 @@ class DriverProcess:
     """Between the socket and the device."""
 
     def __init__(self, robot: str, channel: socket.socket) -> None:
-        self._limits, self._line = LIMITS["fr3" if robot == "fr3" else "panda"], FrameSocket(channel, Setpoint.size(AXES))
+        self._limits, self._line = (
+            LIMITS["fr3" if robot == "fr3" else "panda"],
+            FrameSocket(channel, Setpoint.size(AXES)),
+        )
         self._stream, self._count = None, 0
 
     def cycle(

@@ -136,7 +136,8 @@ def motor_parameters(settings: MotorSettings) -> list[MotorParameters]:
     """Simulated motors that are as the settings have them."""
     winch = settings.reel
     return [
-        MotorParameters(inertia=winch.inertia, radius=winch.radius, stiffness=winch.stiffness, side=side) for side in settings.sides
+        MotorParameters(inertia=winch.inertia, radius=winch.radius, stiffness=winch.stiffness, side=side)
+        for side in settings.sides
     ]
 
 

@@ -116,7 +116,9 @@ def measures(settings: MotorSettings) -> list[Row]:
         rate, late = 1 / periods.mean(), 1e3 * np.quantile(periods, (0.5, 0.99, 1.0))
         result = f"{rate:.0f} Hz; periods {late[0]:.2f} / {late[1]:.2f} / {late[2]:.2f} ms median, 99 %, most"
         rows.append(("loop", "≥ 950 Hz", result, bool(rate >= 950)))
-        jump = float(np.abs(np.array(trial.simulated.reeled[-1][1]) - zeros - np.array(trial.driver.motors.pulls)).max())
+        jump = float(
+            np.abs(np.array(trial.simulated.reeled[-1][1]) - zeros - np.array(trial.driver.motors.pulls)).max()
+        )
         rows.append(("encoder wrapped: counted pull from the true one", "no jump", f"{1e3 * jump:.2f} mm", jump < 1e-3))
 
         trial.simulated.lost = LOST

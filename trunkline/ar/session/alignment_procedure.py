@@ -105,7 +105,9 @@ class AlignmentProcedure:
         words = NEXT[self.step].format(len(self._base) + 1, self.settings.places)
         anchor = self.anchor or (self.stored if self.step == "place" else None)
         id = anchor.id if anchor is not None else ""
-        return messages.AlignmentProgress(self.step, words, self.message, self.place, self.expected, self.residual, id, self.fasten)
+        return messages.AlignmentProgress(
+            self.step, words, self.message, self.place, self.expected, self.residual, id, self.fasten
+        )
 
     # --- what the user wants
 

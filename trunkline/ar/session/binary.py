@@ -61,8 +61,12 @@ FROM_CLIENT = {
         19, POSE, ("tracked",), "1: the viewer's eyes, in the client's reference frame",
         "binary messages received so far, on this connection", "s of the client's clock at which they were there",
     ),
-    "ack": BinaryMessage(17, (), (), "0", "binary messages received so far, on this connection", "s of the client's clock"),
-    "stop": BinaryMessage(18, (), (), "0", "binary messages received so far, on this connection", "s of the client's clock"),
+    "ack": BinaryMessage(
+        17, (), (), "0", "binary messages received so far, on this connection", "s of the client's clock"
+    ),
+    "stop": BinaryMessage(
+        18, (), (), "0", "binary messages received so far, on this connection", "s of the client's clock"
+    ),
 }  # fmt: skip
 
 _CODES = {"u8": "B", "u16": "H", "u32": "I", "f64": "d"}

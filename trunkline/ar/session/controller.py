@@ -363,11 +363,14 @@ def _rounded(targets: Targets | None) -> Targets | None:
     def round_target(target: Target) -> Target:
         offer, by = target.offer, target.outside_by
         return replace(
-            target, position=round_vector(target.position), outside_by=round(by, DIGITS), offer=offer and round_vector(offer)
+            target,
+            position=round_vector(target.position),
+            outside_by=round(by, DIGITS),
+            offer=offer and round_vector(offer),
         )
 
     turned = None if targets.turned is None else round(targets.turned, DIGITS)
     return replace(
-        targets, rigid=round_target(targets.rigid), tip=round_target(targets.tip), pointing=round_vector(targets.pointing),
-        heading=round(targets.heading, DIGITS), turned=turned,
+        targets, rigid=round_target(targets.rigid), tip=round_target(targets.tip),
+        pointing=round_vector(targets.pointing), heading=round(targets.heading, DIGITS), turned=turned,
     )  # fmt: skip

@@ -17,7 +17,9 @@ class FollowControl:
     """`order` asks for axes; `hear` takes them, with the s since their targets. refused: why the newest targets are
     not followed, "" where they are."""
 
-    def __init__(self, order: Callable[[FollowRequest], None], hear: Callable[[float, np.ndarray | None], None]) -> None:
+    def __init__(
+        self, order: Callable[[FollowRequest], None], hear: Callable[[float, np.ndarray | None], None]
+    ) -> None:
         self._order, self._hear = order, hear
         self._now, self._serial = 0.0, 0
         self.end()

@@ -48,7 +48,9 @@ class Hardware:
     def slow_enough(self, teleop: Teleop) -> Teleop:
         """`teleop` with plans that are slow enough for the robot: some of an FR3's limits are half of a Panda's."""
         limits, panda = self.limits, LIMITS["panda"]
-        most = min(np.min(getattr(limits, what) / getattr(panda, what)) for what in ("velocity", "acceleration", "jerk"))
+        most = min(
+            np.min(getattr(limits, what) / getattr(panda, what)) for what in ("velocity", "acceleration", "jerk")
+        )
         share = min(teleop.motors.share, MARGIN * float(most))
         return replace(teleop, motors=replace(teleop.motors, share=share))
 

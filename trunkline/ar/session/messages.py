@@ -261,10 +261,32 @@ class WorldMessage:
     type: Literal["world"] = "world"
 
 
-ServerMessage = Welcome | Refusal | Ping | Clock | Lease | AlignmentProgress | StateMessage | PreviewMessage | PredictionMessage | WorldMessage
+ServerMessage = (
+    Welcome
+    | Refusal
+    | Ping
+    | Clock
+    | Lease
+    | AlignmentProgress
+    | StateMessage
+    | PreviewMessage
+    | PredictionMessage
+    | WorldMessage
+)
 
 CLIENT_MESSAGES: tuple[type, ...] = (Hello, Pong, LeaseRequest, AlignmentByEye, TouchRequest, AnchorPose, PreviewShown)
-SERVER_MESSAGES: tuple[type, ...] = (Welcome, Refusal, Ping, Clock, Lease, AlignmentProgress, StateMessage, PreviewMessage, PredictionMessage, WorldMessage)
+SERVER_MESSAGES: tuple[type, ...] = (
+    Welcome,
+    Refusal,
+    Ping,
+    Clock,
+    Lease,
+    AlignmentProgress,
+    StateMessage,
+    PreviewMessage,
+    PredictionMessage,
+    WorldMessage,
+)
 
 _CLIENT_MESSAGE: TypeAdapter[ClientMessage] = TypeAdapter(Annotated[ClientMessage, Field(discriminator="type")])
 _SERVER_MESSAGES = {kind: TypeAdapter(kind) for kind in SERVER_MESSAGES}

@@ -1,8 +1,9 @@
 """Plans and their previews, in a process of its own: what takes longer than a frame.
 
-One order at a time; a newer one ends the one before within a quarter of a simulated second. An order is answered by
-`PlanAnswer`, then, if there is a plan, `PreviewBegun`, pieces of the nominal twin's motion, each as soon as it is simulated, and
-`PredictionAnswer`, what the batch of futures says; once more where the assistant has an offer.
+One order at a time; a newer order ends the one before within a quarter of a simulated second. The answers to an order
+are a `PlanAnswer`; then, if there is a plan, a `PreviewBegun`, each `PreviewPiece` of the nominal twin's motion as soon
+as it is simulated, and a `PredictionAnswer`, the result of the batch of rollouts, again where the assistant has an
+offer.
 """
 
 import itertools

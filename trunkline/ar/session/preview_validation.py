@@ -34,7 +34,7 @@ class Execution:
     end: what the robot said at last. median, worst: distance of the tip from the preview's, m, over `seconds` of it;
     delay: s by which the robot was later; NaN where no path was kept. within: whether the tip ended within the spread;
     None where it did not come so far. probability: of the grasp as foreseen; held: whether it came about. None where
-    nothing was to be grasped, or it was not tried to its end. seen: whether anybody saw the arm; where not, distances
+    nothing was to be success, or it was not tried to its end. seen: whether anybody saw the arm; where not, distances
     are the mount's, and `within` and `held` are None.
     """
 
@@ -47,7 +47,7 @@ class Execution:
     delay: float
     within: bool | None
     probability: float | None
-    grasped: bool | None
+    success: bool | None
     visible: bool = True
 
 
@@ -71,9 +71,9 @@ def executions(log: LogReader) -> Iterator[Execution]:
         if visible and prediction is not None and last is not None and prediction["spread"]:
             within = bool(np.linalg.norm(last - np.array(prediction["tip"][-1])) <= prediction["spread"][-1])
         probability = None if prediction is None else prediction["probability"]
-        grasped = _grasped(events[:index], later) if visible and done and probability is not None else None
+        success = _grasped(events[:index], later) if visible and done and probability is not None else None
         since_begin = since - begin["time"]
-        yield Execution(digest, since_begin, end, seconds, median, worst, delay, within, probability, grasped, visible)
+        yield Execution(digest, since_begin, end, seconds, median, worst, delay, within, probability, success, visible)
 
 
 def _is_of(event: dict, kind: str, digest: str) -> bool:
@@ -153,12 +153,12 @@ def _compared(
 
 def _grasped(before: list[dict], later: list[dict]) -> bool:
     """Whether the arm holds something that it did not, as believed until the next plan is asked for."""
-    grasped = _holds(before)
+    success = _holds(before)
     for event in later:
         if event["event"] == "request":
             break
-        grasped = _holds([event]) if event["event"] == "world" else grasped
-    return grasped
+        success = _holds([event]) if event["event"] == "world" else success
+    return success
 
 
 def _holds(events: list[dict]) -> bool:
@@ -172,23 +172,30 @@ def lines(results: list[Execution]) -> list[str]:
     for execution in results:
         parts = [f"{execution.time:8.1f} s  {execution.digest[:12]}  {execution.end}"]
         if np.isfinite(execution.median):
-            apart = f"{'tip' if execution.visible else 'mount'} {1e3 * execution.median:.1f} mm, at most {1e3 * execution.worst:.1f} mm"
-            parts.append(f"{apart} from the preview over {execution.seconds:.1f} s, {1e3 * execution.delay:.0f} ms later")
+            point = "tip" if execution.visible else "mount"
+            apart = f"{point} {1e3 * execution.median:.1f} mm, at most {1e3 * execution.worst:.1f} mm"
+            parts.append(
+                f"{apart} from the preview over {execution.seconds:.1f} s, {1e3 * execution.delay:.0f} ms later"
+            )
         if execution.within is not None:
             parts.append("ended within the spread" if execution.within else "ended beyond the spread")
         if execution.probability is not None:
-            came = "not tried to its end" if execution.grasped is None else "held" if execution.grasped else "not held"
+            came = "not tried to its end" if execution.success is None else "held" if execution.success else "not held"
             came = came if execution.visible else "which nobody saw"
             parts.append(f"grasp foreseen at {execution.probability:.2f}, {came}")
         report.append("; ".join(parts))
-    judged = [(execution.probability, execution.grasped) for execution in results if execution.probability is not None and execution.grasped is not None]
+    judged = [
+        (execution.probability, execution.success)
+        for execution in results
+        if execution.probability is not None and execution.success is not None
+    ]
     ended = [execution.within for execution in results if execution.within is not None]
     report.append(f"{len(results)} executed")
     if ended:
         report[-1] += f"; {sum(ended)} of {len(ended)} tips ended within the spread"
     if judged:
-        agreed = sum((probability >= 0.5) == grasped for probability, grasped in judged)
-        brier = sum((probability - grasped) ** 2 for probability, grasped in judged) / len(judged)
+        agreed = sum((probability >= 0.5) == success for probability, success in judged)
+        brier = sum((probability - success) ** 2 for probability, success in judged) / len(judged)
         report[-1] += f"; outcome as foreseen in {agreed} of {len(judged)}, Brier score {brier:.3f}"
     if not all(execution.visible for execution in results):
         report.append("nobody saw the arm: its shape, its tip and its grasps are not judged")

@@ -30,7 +30,9 @@ LOOKS = 0.005  # s
 RESTING = 0.5  # s that braking may take before its process is ended
 TEXT = 240  # bytes of a fault
 MODES = ("idle", "running", "done", "fault")
-TIME, MODE, SERIAL, HOLD_TIME, READY = range(5)  # of what the robot tells, before axes, sent and measured, thing and bodies
+TIME, MODE, SERIAL, HOLD_TIME, READY = range(
+    5
+)  # of what the robot tells, before axes, sent and measured, thing and bodies
 PERMIT, PERMITTED, STOPS = range(3)  # of what it is told
 POSE = 7
 

@@ -68,7 +68,9 @@ class Server:
         self.clients: dict[str, Client] = {}
         self._procedures: dict[str, AlignmentProcedure] = {}  # of clients that may come again
         self.broadcast = Broadcast(composition.controller, composition.shells)
-        self._routes = Routes(composition.origins, composition.token, composition.scene, composition.page, composition.log)
+        self._routes = Routes(
+            composition.origins, composition.token, composition.scene, composition.page, composition.log
+        )
         self._world, self._unwritten, self._gc_policy = None, "", GCPolicy()
         self._ticked = now()
 
@@ -162,11 +164,17 @@ class Server:
         anchors = self.composition.anchors
         while len(self._procedures) >= MOST_CLIENTS:
             self._procedures.pop(next(iter(self._procedures)))
-        return AlignmentProcedure(self.composition.alignment, anchors.find(anchors.newest) if anchors is not None else None)
+        return AlignmentProcedure(
+            self.composition.alignment, anchors.find(anchors.newest) if anchors is not None else None
+        )
 
     def _greet(self, client: Client) -> None:
         controller, say = self.controller, client.outbox.say
-        say(messages.tell(messages.Welcome(client.id, self.composition.token, self.composition.package, self.composition.rate)))
+        say(
+            messages.tell(
+                messages.Welcome(client.id, self.composition.token, self.composition.package, self.composition.rate)
+            )
+        )
         if client.procedure is not None:
             say(messages.tell(client.procedure.progress()))
         say(messages.tell(messages.WorldMessage(controller.world)))
@@ -277,7 +285,9 @@ class Server:
         else:
             self._refuse(client, "hello: was said before")
 
-    def _align(self, client: Client, message: messages.AlignmentByEye | messages.TouchRequest | messages.AnchorPose) -> None:
+    def _align(
+        self, client: Client, message: messages.AlignmentByEye | messages.TouchRequest | messages.AnchorPose
+    ) -> None:
         procedure, anchors, reason = client.procedure, self.composition.anchors, ""
         if procedure is None:
             self._refuse(client, "alignment: your poses are in the base frame")
@@ -286,7 +296,9 @@ class Server:
         if isinstance(message, messages.TouchRequest):
             procedure.touch()
         elif isinstance(message, messages.AnchorPose):
-            reason = procedure.anchored(message.id, message.pose, anchors.find(message.id) if anchors is not None else None)
+            reason = procedure.anchored(
+                message.id, message.pose, anchors.find(message.id) if anchors is not None else None
+            )
         elif message.pose is None:
             procedure.reset()
         else:

@@ -118,8 +118,8 @@ async def opened(
     made = await asyncio.to_thread(make, package, teleop, config, heard, hardware)
     try:
         composition = Composition(
-            made.controller, make_token(), address.origins, made.package, made.scene, made.shells, config.rate, PAGE, log,
-            alignment, anchors,
+            made.controller, make_token(), address.origins, made.package, made.scene, made.shells, config.rate, PAGE,
+            log, alignment, anchors,
         )  # fmt: skip
         while not (made.robot.ready and made.planning.ready.is_set()):
             if not (made.robot.alive and made.planning.alive):
