@@ -71,13 +71,16 @@ JUDGES = {  # by function, the test that has its table, and its file below tests
         "identification/test_converged.py",
         "test_only_a_search_whose_starts_agree_has_converged",
     ),
-    "trunkline.ar.session.preview_validation:_grasped": ("ar/session/test_hindsight.py", "test_what_came_of_a_grasp"),
+    "trunkline.ar.session.preview_validation:_grasped": (
+        "ar/session/test_preview_validation.py",
+        "test_what_came_of_a_grasp",
+    ),
     "trunkline.ar.session.preview_validation:_holds": (
-        "ar/session/test_hindsight.py",
+        "ar/session/test_preview_validation.py",
         "test_whether_the_arm_holds_anything",
     ),
     "trunkline.ar.session.preview_validation:lines": (
-        "ar/session/test_hindsight.py",
+        "ar/session/test_preview_validation.py",
         "test_whether_the_outcome_agreed_with_what_was_foreseen",
     ),
     "trunkline.kinematics.panda.inverse:solve": (
@@ -107,9 +110,9 @@ JUDGES = {  # by function, the test that has its table, and its file below tests
 }
 OTHERWISE = {  # what the word stands for there: no verdict
     "trunkline.identification.simulate.experiment:start_frames": "frames in which an arm is held before its release",
-    "trunkline.identification.results.parameter_table:parameter_table": "looks a name up among those that were at a bound",
+    "trunkline.identification.results.parameter_table:parameter_table": "looks a name up in those at a bound",
     "trunkline.kinematics.ik.training:pieces": "rows that are held out",
-    "trunkline.recordings.preparation.proposal:_experiment": "whether motors hold in a log; a user confirms what is proposed",
+    "trunkline.recordings.preparation.proposal:_experiment": "whether motors hold in a log; a user confirms it",
     "trunkline.kinematics.reachability.tips:held_by": "lengths of cables",
     "trunkline.compute.scheduler:spread_rows": "shares rows out to workers",
     "trunkline.ar.teleop.correction:_rest": "where an arm rests",

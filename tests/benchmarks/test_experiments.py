@@ -12,7 +12,7 @@ from benchmarks.experiments.judging import BEFORE, done_again
 from rehearsal.experiments.result import Result, as_row
 from rehearsal.session import RATE, REFERENCE
 from studies.rows import Rows
-from tests.ar.session.test_hindsight import Clocked
+from tests.ar.session.test_preview_validation import Clocked
 from tests.ar.teleop.test_plan import START, STRAIGHT
 from tests.rehearsal.test_session import THING, Sent
 from tests.support.operator import Operator

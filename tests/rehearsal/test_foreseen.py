@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tests.ar.session.test_foreseer import made, order
+from tests.ar.session.test_preview_process import made, order
 from trunkline.ar.session.preview_process import PredictionAnswer, prediction_message
 
 

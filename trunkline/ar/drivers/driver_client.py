@@ -1,7 +1,7 @@
-"""A limb, seen from the machine's process: its adapter, a process of its own.
+"""A hardware driver in a process of its own, as the robot's process uses it.
 
-An adapter is started with a socket, over which it tells of itself every few ms, and hears where its axes shall be. Once
-nobody is at the other end, it brings its limb to rest, and gives it back.
+The driver process is started with a socket, over which it sends its state every few ms and receives setpoints. Once the
+other end is closed, it brings the hardware to rest and releases it.
 """
 
 import math
@@ -24,7 +24,7 @@ from trunkline.ar.drivers.driver_process import AXES
 from trunkline.errors import InputError
 
 ROOT = Path(__file__).parents[3]
-SILENT = 0.1  # s without a frame of the adapter
+SILENT = 0.1  # s without a frame of the driver process
 CLOSING = 3.0  # s
 
 
@@ -39,10 +39,10 @@ class ArmSettings:
 
 
 class DriverClient:
-    """A `Limb` of so many `axes` whose adapter is this `command`, with the socket's descriptor behind it.
+    """A `Driver` of so many `axes` whose process is this `command`, with the socket's descriptor as last argument.
 
     Attributes:
-        told: the adapter's newest frame, None before the first.
+        state: newest frame of the driver process, None before the first.
 
     Raises:
         OSError: the command is not there.
@@ -53,8 +53,8 @@ class DriverClient:
     def __init__(
         self, command: Sequence[str], axes: int, patience: float = CONNECTING, astray: float = math.inf, at: str = ""
     ) -> None:
-        """patience: s that the adapter has to be ready. astray: rad that a joint may be from where it is sent. at: what
-        is said of where the limb should be."""
+        """patience: s within which the driver process has to be ready. astray: rad that a joint may be from where it
+        is sent. at: added to the fault, where the hardware should be."""
         self._axes, self._astray, self._at, self.fault, self.state = axes, astray, at, "", None
         self._patience, self._until = patience, time.monotonic() + patience
         ours, theirs = socket.socketpair()
@@ -85,11 +85,11 @@ class DriverClient:
         try:
             self.line.send(Setpoint(due, tuple(axes.tolist())).pack())
         except OSError as error:
-            self._hear()  # an adapter that has ended has told why
+            self._hear()  # the last frame of a driver process that has ended has the reason
             self._fail(f"its adapter takes no setpoints ({error.strerror})")
 
     def turn(self, now: float) -> None:
-        """Hear what the adapter tells, at `now`, s."""
+        """Read the frames of the driver process, at `now`, s."""
         self._hear()
         if self.state is None:
             if now > self._until:
@@ -99,7 +99,7 @@ class DriverClient:
             self._fail(f"its adapter is silent for {1e3 * silent:.0f} ms")
 
     def close(self) -> None:
-        """The adapter hears no more: it brings its limb to rest, and gives it back."""
+        """Close the socket: the driver process brings the hardware to rest and releases it."""
         self.line.close()
         try:
             self.process.wait(CLOSING)

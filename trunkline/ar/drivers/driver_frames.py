@@ -1,7 +1,7 @@
-"""Frames between the machine's process and a limb's adapter, over a socket: of one size each way, little-endian.
+"""Frames between the robot's process and a driver process, over a socket: of one size each way, little-endian.
 
-This, `adapter`, `limb`, `stream` and `urgency` run in an environment of the robot's own library: they import the
-standard library, numpy, each other and `trunkline.kinematics.panda` alone.
+This, `driver_process`, `driver`, `setpoint_filter` and `realtime_priority` run in an environment of the robot's own
+library: they import the standard library, numpy, each other and `trunkline.kinematics.panda` alone.
 """
 
 import contextlib
@@ -15,7 +15,7 @@ LAST = 1.0  # s that the last frame may take
 
 @dataclass(frozen=True)
 class Setpoint:
-    """Where the limb's `axes` shall be, rad or m, at `due`, s of the clock that all processes have (time.monotonic)."""
+    """Where the driver's `axes` shall be, rad or m, at `due`, s of the clock of all processes (time.monotonic)."""
 
     due: float
     axes: tuple[float, ...]

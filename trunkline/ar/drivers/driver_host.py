@@ -1,8 +1,8 @@
-"""The adapter of what runs in this environment: the tendons' motors, or a controller of ROS 2.
+"""The driver process of hardware that runs in this environment: the tendons' motors, or a controller of ROS 2.
 
     python -m trunkline.ar.drivers.driver_host SETTINGS DESCRIPTOR
 
-SETTINGS: of either, as JSON. DESCRIPTOR: of the socket to the machine's process, which starts it; by hand it is of
+SETTINGS: of either, as JSON. DESCRIPTOR: of the socket to the robot's process, which starts it; by hand it is of
 no use.
 """
 
@@ -28,7 +28,7 @@ from trunkline.ar.drivers.ros_settings import RosSettings
 from trunkline.errors import InputError
 
 LATE = 0.02  # s that turns may be behind before some are left out
-SETTLES = 0.2  # s for which a limb that nobody sends is held before it is given back
+SETTLES = 0.2  # s for which a driver without setpoints holds before it is released
 STARTING = 5.0  # s that a process has to start
 
 DriverSettings = MotorsOnBus | RosSettings
@@ -38,7 +38,7 @@ DRIVER_SETTINGS: TypeAdapter[DriverSettings] = TypeAdapter(DriverSettings)
 def start_driver(
     settings: DriverSettings, program: Sequence[str] = ("-m", "trunkline.ar.drivers.driver_host")
 ) -> DriverClient:
-    """The limb of these settings, in a process of its own: Python's, which runs the `program`."""
+    """The driver of these settings, in a process of its own: Python's, which runs the `program`."""
     patience = CONNECTING if isinstance(settings, RosSettings) else HOMING
     command = [sys.executable, *program, DRIVER_SETTINGS.dump_json(settings).decode()]
     return DriverClient(command, settings.axes, patience + STARTING)
@@ -64,7 +64,7 @@ def driver_of(settings: DriverSettings) -> Driver:
 
 
 def run_driver(driver: Driver, line: FrameSocket) -> None:
-    """Turn the limb until nobody is at the other end, and SETTLES s more."""
+    """Turn the driver until nobody is at the other end, and SETTLES s more."""
     due, gone, turns, fault = time.monotonic(), math.inf, 0, ""
     while (now := time.monotonic()) - gone < SETTLES:
         for frame in line.heard():
@@ -89,7 +89,7 @@ def main(arguments: list[str]) -> int:
                 gc.freeze()
                 raise_priority()
                 run_driver(driver, line)
-        except Exception as error:  # whatever a library raises is the fault that is told, once the limb is given back
+        except Exception as error:  # whatever a library raises is the fault that is told, once the driver is closed
             reason = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
             unknown = (math.nan,) * settings.axes
             line.end(DriverState(time.monotonic(), unknown, unknown, " ".join(reason.split())))

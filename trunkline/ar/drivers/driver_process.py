@@ -1,5 +1,5 @@
-"""The Panda's adapter: a process in the environment of the robot's own library, that speaks to nothing but the robot
-and, over a socket, the process that started it.
+"""The Panda's driver process, in the environment of the robot's own library. It speaks to nothing but the robot and,
+over a socket, the process that started it.
 
     python -m trunkline.ar.drivers.driver_process ROBOT ADDRESS DESCRIPTOR
 

@@ -38,7 +38,7 @@ class MotorSettings:
 
 @dataclass(frozen=True)
 class MotorsOnBus:
-    """`motors` on a `bus` of python-can's `interface`; on the bus `bank.SIMULATED`, simulated ones."""
+    """`motors` on a `bus` of python-can's `interface`; on the bus `simulated_motors.SIMULATED`, simulated ones."""
 
     motors: MotorSettings
     bus: str

@@ -1,4 +1,4 @@
-"""Motors, or a bank of simulated ones, on a CAN bus. Both are turned from outside, RATE times a second."""
+"""Motors, real or simulated, on a CAN bus. Both are turned from outside, RATE times a second."""
 
 import random
 import threading
@@ -103,8 +103,8 @@ class SimulatedMotorsOnBus:
 
 
 class SimulatedBusMotors(BusMotors):
-    """Motors before a `bank` of simulated ones, which turns when they do: python-can's bus "virtual" is of one process
-    only, and two threads of it would wait for each other."""
+    """The driver's side of a bus with `simulated` motors, which turn when it does: python-can's bus "virtual" is of
+    one process only, and two threads of it would wait for each other."""
 
     def __init__(self, settings: MotorSettings, bus: can.BusABC, simulated: SimulatedMotorsOnBus) -> None:
         super().__init__(settings, bus)
@@ -142,8 +142,8 @@ def motor_parameters(settings: MotorSettings) -> list[MotorParameters]:
 
 
 class SimulatedMotorsThread(SimulatedMotorsOnBus):
-    """A bank that turns by itself. `reeled`: (s, (m, …)) of every turn. `driven`: s of the last turn that ended with a
-    motor driven."""
+    """Simulated motors that turn in a thread. `reeled`: (s, (m, …)) of every turn. `driven`: s of the last turn that
+    ended with a motor driven."""
 
     def __init__(self, plants: Sequence[MotorParameters], bus: can.BusABC, seed: int = 0) -> None:
         super().__init__(plants, bus, seed)

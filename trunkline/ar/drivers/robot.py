@@ -1,8 +1,8 @@
-"""Panda and motors as one machine, on one clock.
+"""Panda and motors as one robot, on one clock.
 
 Every tick both are sent where they shall be LEAD s later, and each plays that by the same clock: a process that is late
-by less moves nothing otherwise. What ends one of them is the machine's fault, which lasts, and whoever turns the
-machine stops it along its plan. So the limb that is well comes to rest where the plan has it, and holds.
+by less moves nothing otherwise. What ends one of them is the robot's fault, which lasts, and the caller stops the robot
+along its plan. So the driver without a fault comes to rest where the plan has it, and holds.
 """
 
 import math
@@ -53,7 +53,7 @@ class HardwareRobot:
             Where the joints are, (7,), rad.
 
         Raises:
-            InputError: a limb is not there, or cannot be homed, or nobody waits any more.
+            InputError: a driver is not there, or cannot be homed, or nobody waits any more.
         """
         while not (self.fault or left() or all(driver.ready for driver in self._drivers.values())):
             time.sleep(TICK)

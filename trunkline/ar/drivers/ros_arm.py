@@ -61,7 +61,7 @@ def link_of(settings: RosSettings) -> Link:
 
 
 class RosArm:
-    """A `Limb` of the Panda's joints, rad, that a controller moves, and whose states are told.
+    """A `Driver` of the Panda's joints, rad, that a controller moves, and whose states are told.
 
     After a fault nothing is sent: the controller stands at the last point, which is on the way, at most the setpoints'
     lead from where the joints are. Any other point, such as where they are measured, would turn them back.

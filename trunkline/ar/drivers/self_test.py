@@ -29,7 +29,7 @@ Row = tuple[str, str, str, bool]
 
 
 class MotorTrial:
-    """Motors and bank, joined by a bus, and the driver's loop."""
+    """Motors and simulated ones, joined by a bus, and the driver's loop."""
 
     def __init__(self, settings: MotorSettings, plants: list[MotorParameters]) -> None:
         name = f"check {id(self)}"

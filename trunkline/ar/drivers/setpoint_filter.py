@@ -1,4 +1,4 @@
-"""What the Panda is sent, cycle by cycle: the adapter's own logic, without robot, socket and clock.
+"""What the Panda is sent, cycle by cycle: the driver process's own logic, without robot, socket and clock.
 
 Setpoints are stamped with when they are due, and come some time before. They are played by the robot's time, which is
 drawn towards this machine's, and every cycle is held against the robot's limits before it is sent. Where setpoints run

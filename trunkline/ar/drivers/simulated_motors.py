@@ -1,4 +1,4 @@
-"""Motors that are not there: a bank of simulated GM6020 on reels, the other end of a bus.
+"""Simulated motors: GM6020 with spools of cable, the other end of a bus.
 
 Each has a rotor with dry and viscous friction, and a cable that is a spring from a slack length on:
 

@@ -1,4 +1,4 @@
-"""The tendons' motors as a limb: homed first, then on their way through what they are sent."""
+"""The tendons' motors as a driver: homed first, then on their way through what they are sent."""
 
 import math
 from collections import deque
@@ -11,7 +11,7 @@ from trunkline.ar.drivers.on_bus import BusMotors
 
 
 class TendonDriver:
-    """A `Limb` whose axes are the cables' pulls from zero, m.
+    """A `Driver` whose axes are the cables' pulls from zero, m.
 
     Where setpoints end, or this process is late itself, the cables hold at the last one, and follow no more. Where a
     motor fails, none is driven.

@@ -1,4 +1,4 @@
-"""A motor as a reel of cable: its encoder in, a current out.
+"""A motor with a spool of cable: its encoder in, a current out.
 
 A pull x is the cable reeled in since zero, in m. The motor has no position mode, so the loop is ours. With e = x_d - x,
 the mass of the turning parts as the cable feels it, m = J / r², and ω the angular frequency at which the loop's gain
@@ -93,8 +93,8 @@ class Winch:
     def home(self, now: float) -> float:
         """A, on the way to zero: where the tension is the pretension. To be called until `homed`, or a `fault`.
 
-        The reel goes in until the motor bears twice the pretension, then out until it bears it no longer. Friction adds
-        to the one and takes from the other, so zero is the middle of both places where it bore the pretension.
+        The winch goes in until the motor bears twice the pretension, then out until it bears it no longer. Friction
+        adds to the one and takes from the other, so zero is the middle of both places where it bore the pretension.
         """
         dt = min(now - self._stepped, LONGEST) if self._stepped is not None else 0.0
         settings, speed = self._settings, self._settings.homing

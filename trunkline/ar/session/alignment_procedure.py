@@ -57,7 +57,7 @@ class ControllerPose(NamedTuple):
 
 
 class AlignmentProcedure:
-    """Of one client. `known`: its anchor of another day, to be restored; None where there is none.
+    """Of one client. `stored`: its anchor of another day, to be restored; None where there is none.
 
     `alignment`: pose of the reference frame in the base, None where it must not be relied on. `expected`: error where
     it is told, m; None where nothing tells.
@@ -147,7 +147,7 @@ class AlignmentProcedure:
                 self._checked(touched, mark) if self.step == "check" else self._touched(touched, mark)
 
     def anchored(self, id: str, pose: Pose | None, stored: Anchor | None) -> str:
-        """The anchor `id` is at `seen` of the reference frame, None where it is lost; `known`: what is kept of it. Why
+        """The anchor `id` is at `pose` of the reference frame, None where it is lost; `stored`: its stored form. Why
         that does not count. One that nobody asked for does nothing."""
         if pose is not None and not _is_pose(pose):
             return "anchor: found what is no pose"

@@ -72,8 +72,8 @@ class HandInput:
 
 
 class SessionController:
-    """One robot, one core. `lift`: m by which a thing is lifted by a grasp. `journal`: what is told all of it.
-    `period`: s, of the arm's slowest swing."""
+    """One robot, one core. `lift`: m by which a thing is lifted by a grasp. `log_writer`: of the session.
+    `period`: s, of the arm's slowest vibration mode."""
 
     def __init__(
         self,

@@ -17,7 +17,7 @@ from rosbags.typesys import Stores, get_typestore
 from trunkline.compute.processes import leave_signals_to_parent
 
 POSES, STATIC = "/tf", "/tf_static"
-TWIN = "/tf_twin"  # poses that a twin drew of a real machine: nobody measured them
+TWIN = "/tf_twin"  # poses of the twin of a real robot: not measured
 JOINTS_SENT, JOINTS = "/joints/command", "/joint_states"  # the latter: ROS's name for what is measured
 TENDONS_SENT, TENDONS = "/tendons/command", "/tendons/state"
 HEADSET, PARTS = "/headset/", ("left", "right", "view")
@@ -38,8 +38,8 @@ TYPES = {
 
 
 class Record(NamedTuple):
-    """What is to be written to `topic`: text, or numbers as `Journal` has them, of a time `stamp`, s, told at `logged`,
-    s. frame: that poses are in."""
+    """What is to be written to `topic`: text, or numbers as `LogWriter` has them, of a time `stamp`, s, logged at
+    `logged`, s. frame: that poses are in."""
 
     topic: str
     stamp: float
@@ -149,8 +149,8 @@ def new_file(path: Path) -> BinaryIO:
 def run(
     pipe, fault, written, path: Path, subject: Subject, zero: int, period: float, opened: Callable[[Path], BinaryIO]
 ) -> None:  # fmt: skip
-    """The process: until nobody holds the pipe's other end, be it that the server was killed. `told`: why it cannot
-    write; `kept`: how many of the pipe's messages are in the file, from 0 on once it is open."""
+    """The process: until nobody holds the pipe's other end, be it that the server was killed. `fault`: why it cannot
+    write; `written`: how many of the pipe's messages are in the file, from 0 on once it is open."""
     leave_signals_to_parent()
     try:
         with opened(path) as file:

@@ -30,8 +30,8 @@ class LogStep(NamedTuple):
 @dataclass(frozen=True)
 class LogReader:
     """`damage`: what is lost, in sentences. zero: ns since 1970 at 0 s of the events' `time`. events: in their order,
-    each with its kind as `event`. poses: of the robot's bodies; of a real machine None, as nobody sees them. twin: as a
-    twin drew them of a real machine. joints: the rigid robot's, as measured."""
+    each with its kind as `event`. poses: of the robot's bodies; None of a real robot, where they are not measured.
+    twin: poses of the twin of a real robot. joints: the rigid robot's, as measured."""
 
     path: Path
     damage: list[str]
@@ -56,7 +56,7 @@ class LogReader:
 
     @property
     def drawn(self) -> PoseStream | None:
-        """The bodies as a page draws them: as they were seen, or where nobody saw them, as a twin drew them."""
+        """The bodies as a page draws them: as measured, or else those of the twin."""
         return self.poses if self.twin is None else self.twin
 
     @property

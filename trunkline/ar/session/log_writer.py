@@ -54,7 +54,7 @@ LOOKS = 0.05  # s between looks at whether it writes
 
 
 class LogWriter:
-    """Takes what a session of `subject` has to tell, as records for `keep`. By itself it keeps none. Times are s of
+    """Turns what happens in a session of `subject` into records for `keep`, which does nothing here. Times are s of
     `now`."""
 
     fault = ""  # why it is not written any more, in one line

@@ -16,7 +16,7 @@ LATEST = ("robot", "shell")  # of these the newest wins
 
 @dataclass
 class Outbox:
-    """`sent`, `received`: binary messages so far. `said`: JSON that waits; `states`: of each kind the newest that
+    """`sent`, `received`: binary messages so far. `messages`: JSON that waits; `states`: of each kind the newest that
     waits."""
 
     sent: int = 0

@@ -1,11 +1,11 @@
-"""What was foreseen in a live session against what happened, from its log alone.
+"""Predictions of a live session compared with what happened, from its log alone.
 
     python -m trunkline.ar.session.preview_validation LOG…
 
 A line for each plan that was executed: how far the tip was from the preview's, whether it ended within the spread, and
-what was said of the grasp against what came of it. The robot begins a plan some ms after it was told to; by how many,
-is where both paths are nearest, and is said. Of a real machine nobody sees the arm: the mount stands in for the tip, by
-the joints as measured, and neither spread nor grasp is judged.
+the predicted and the actual outcome of the grasp. The robot begins a plan some ms after the command; this delay is the
+one for which both paths are nearest, and is printed. On a real robot the arm is not measured: the mount, from the
+measured joints, is compared in place of the tip, and neither spread nor grasp is judged.
 """
 
 import argparse
@@ -31,11 +31,11 @@ FEWEST = 5  # poses of a path that is compared
 class Execution:
     """Of a plan, `digest`, begun at `time`, s since the session began.
 
-    end: what the robot said at last. median, worst: distance of the tip from the preview's, m, over `seconds` of it;
-    delay: s by which the robot was later; NaN where no path was kept. within: whether the tip ended within the spread;
-    None where it did not come so far. probability: of the grasp as foreseen; held: whether it came about. None where
-    nothing was to be success, or it was not tried to its end. seen: whether anybody saw the arm; where not, distances
-    are the mount's, and `within` and `held` are None.
+    end: last state of the robot. median, worst: distance of the tip from the preview's, m, over `seconds` of it;
+    delay: s by which the robot was later; NaN without a path. within: whether the tip ended within the spread;
+    None where it did not come so far. probability: predicted, of the grasp; success: whether the arm
+    holds the object. None where nothing was to be grasped, or the plan did not end. visible: whether the arm was
+    measured; if not, distances are the mount's, and `within` and `success` are None.
     """
 
     digest: str
@@ -81,7 +81,7 @@ def _is_of(event: dict, kind: str, digest: str) -> bool:
 
 
 def _visible_path(log: LogReader, body: str, place) -> tuple[np.ndarray, np.ndarray]:
-    """Times of the journal's clock, s (T,), and the tip as it was seen (T, 3)."""
+    """Times of the log's clock, s (T,), and the tip from the logged poses (T, 3)."""
     poses = log.poses
     if poses is None or body not in poses.names or poses.quaternions is None:
         return np.empty(0), np.empty((0, 3))
@@ -92,7 +92,7 @@ def _visible_path(log: LogReader, body: str, place) -> tuple[np.ndarray, np.ndar
 
 
 def _measured(log: LogReader, mount_offset: float) -> tuple[np.ndarray, np.ndarray]:
-    """Times of the journal's clock, s (T,), and the mount by the joints as measured (T, 3); none where nobody does."""
+    """Times of the log's clock, s (T,), and the mount from the measured joints (T, 3); none without them."""
     joints = log.joints
     if joints is None or not set(JOINTS) <= set(joints.names):
         return np.empty(0), np.empty((0, 3))
@@ -115,7 +115,7 @@ def _preview(before: list[dict], digest: str, rows: str, place) -> tuple[np.ndar
 
 
 def _end(later: list[dict], digest: str, last: float) -> tuple[str, float]:
-    """What the robot said at the end of a plan, and when it did something else, s."""
+    """State of the robot at the end of a plan, and the time, s, until which that plan ran."""
     end, until = "the log ends", last
     for event in later:
         if event["event"] == "execute":

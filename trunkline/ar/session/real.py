@@ -1,6 +1,6 @@
-"""A real machine's process, and what is drawn of it: the calls are those of the simulated robot.
+"""A real robot's process, and what is drawn of it: the calls are those of the simulated robot.
 
-The machine's process turns 1000 times a second and knows no physics. What is drawn is the twin, moved in a process of
+The robot's process turns 1000 times a second and simulates nothing. What is drawn is the twin, moved in a process of
 its own by what the axes are sent: nothing measures the soft arm's shape here, nor where a thing is.
 """
 
@@ -49,7 +49,7 @@ class Beginning:
 
 
 class HardwarePlant(HardwareRobot):
-    """A machine as `Loop` turns it; it knows no poses."""
+    """A real robot as `Loop` turns it, without poses."""
 
     def poses(self) -> np.ndarray:
         return np.empty((0, POSE))
@@ -59,7 +59,7 @@ class HardwarePlant(HardwareRobot):
 
 
 class RealRobot(RobotProcess):
-    """An `Executor` whose robot is a machine."""
+    """An `Executor` whose robot is real."""
 
     def __init__(self, hardware: Hardware, simulation: Simulation) -> None:
         begins = Beginning(simulation.joints, simulation.commands, simulation.limits, simulation.package)

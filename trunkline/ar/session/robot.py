@@ -32,7 +32,7 @@ TEXT = 240  # bytes of a fault
 MODES = ("idle", "running", "done", "fault")
 TIME, MODE, SERIAL, HOLD_TIME, READY = range(
     5
-)  # of what the robot tells, before axes, sent and measured, thing and bodies
+)  # of the robot's report, before axes, sent and measured, object and bodies
 PERMIT, PERMITTED, STOPS = range(3)  # of what it is told
 POSE = 7
 
@@ -86,8 +86,8 @@ class RobotState:
     """What the robot does at `time`, s.
 
     `joints` (7,), rad, and `commands` (K,), m, as they are sent, and poses of the `thing` (7,), NaN where there is
-    none, and of the `bodies` (N, 7). held: s at which it was last commanded to hold. As measured: `measured` (7,), rad,
-    of the joints, and `lengths` (K,), m, of the cables; NaN or None where nothing measures them.
+    none, and of the `bodies` (N, 7). hold_time: s at which it was last commanded to hold. As measured: `measured`
+    (7,), rad, of the joints, and `lengths` (K,), m, of the cables; NaN or None where nothing measures them.
     """
 
     time: float

@@ -388,7 +388,7 @@ class Server:
             await asyncio.wait_for(asyncio.gather(*ends), PARTING)
 
     async def _run(self) -> None:
-        """Ticks at the house's rate, each once the robot has told of itself; one that is late is not made up for."""
+        """Ticks at the session's rate, each once the robot has told of itself; one that is late is not made up for."""
         period = 1 / self.composition.rate
         self._ticked = self.now()
         due = self._ticked + period

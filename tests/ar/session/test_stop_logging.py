@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tests.ar.session.test_desk import DIGEST, PACKAGE, STRAIGHT, ToldRobot, controller_of, intent, some_plan
+from tests.ar.session.test_controller import DIGEST, PACKAGE, STRAIGHT, ToldRobot, controller_of, intent, some_plan
 from tests.ar.session.test_permits import FOLLOWING, LIMITS, Played, plan_of
 from trunkline.ar.session import messages, preview_process
 from trunkline.ar.session.robot import DEAD_MAN, HOLD_TIME, MODE, MODES, READY, SERIAL, STOPS, Goal

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.ar.session.test_journal import NAMES, REAL, SUBJECT, ZERO
+from tests.ar.session.test_log import NAMES, REAL, SUBJECT, ZERO
 from tests.ar.teleop.test_plan import OFFSET, START, STRAIGHT
 from tests.support.operator import Operator
 from trunkline.ar.preview.world_model import make_world

@@ -5,7 +5,7 @@ from contextlib import suppress
 
 import pytest
 
-from tests.ar.drivers.test_adapted import BEGUN, READY, clock, driver, ready  # noqa: F401
+from tests.ar.drivers.test_driver_client import BEGUN, READY, clock, driver, ready  # noqa: F401
 
 
 def test_nobody_else_has_the_adapters_end(driver):  # noqa: F811
