@@ -66,7 +66,7 @@ def ready(driver):
     return driver
 
 
-def test_an_adapter_that_tells_of_itself_is_no_fault_however_long(ready):
+def test_a_driver_process_that_tells_of_itself_is_no_fault_however_long(ready):
     for now in np.arange(BEGUN, BEGUN + 100.0, 0.5 * SILENT):
         ready.process.tell(now)
         ready.turn(now)
@@ -80,7 +80,7 @@ def test_an_adapter_that_tells_of_itself_is_no_fault_however_long(ready):
     [(0.0, ""), (SILENT - NEAR, ""), (SILENT + NEAR, "its adapter is silent for 100 ms"),
      (10.0, "its adapter is silent for 10000 ms")],
 )  # fmt: skip
-def test_an_adapter_that_is_silent_is_a_fault_after_so_long(ready, silent, fault):
+def test_a_driver_process_that_is_silent_is_a_fault_after_so_long(ready, silent, fault):
     ready.turn(BEGUN + silent)
     assert ready.fault == fault
 
@@ -95,7 +95,7 @@ def test_what_it_told_long_ago_does_not_count_as_told_when_it_is_heard(ready):
     ("late", "fault"),
     [(0.0, ""), (PATIENCE - NEAR, ""), (PATIENCE + NEAR, "its adapter is not ready after 5 s, expected it here")],
 )  # fmt: skip
-def test_an_adapter_has_to_be_ready_within_its_time(driver, late, fault):
+def test_a_driver_process_has_to_be_ready_within_its_time(driver, late, fault):
     driver.turn(BEGUN + late)
     assert not driver.ready
     assert driver.fault == fault
@@ -129,20 +129,20 @@ def test_a_joint_that_is_nowhere_is_a_fault(driver, value, joint):
     assert driver.fault.startswith(f"joint {joint + 1}: found ")
 
 
-def test_the_fault_that_an_adapter_tells_is_the_limbs(ready):
+def test_the_fault_that_a_driver_process_tells_is_the_drivers(ready):
     ready.process.tell(BEGUN, fault="reflex: too fast")
     ready.turn(BEGUN)
     assert ready.fault == "reflex: too fast"
 
 
-def test_an_adapter_that_fails_before_it_is_ready_never_is(driver):
+def test_a_driver_process_that_fails_before_it_is_ready_never_is(driver):
     driver.process.tell(BEGUN, fault="no robot")
     driver.turn(BEGUN)
     assert driver.fault == "no robot"
     assert not driver.ready
 
 
-def test_an_adapter_that_ends_is_a_fault_and_why_it_did_comes_first(clock):
+def test_a_driver_process_that_ends_is_a_fault_and_why_it_did_comes_first(clock):
     for fault, expected in (("", "its adapter has ended"), ("no robot", "no robot")):
         driver = DriverClient(["adapter"], 7)
         driver.process.tell(BEGUN, fault=fault)
@@ -163,14 +163,14 @@ def test_a_fault_lasts_and_is_the_first(ready):
     assert ready.fault == "reflex"
 
 
-def test_what_is_sent_comes_to_the_adapter(ready):
+def test_what_is_sent_comes_to_the_driver_process(ready):
     for number in range(3):
         ready.send(BEGUN + 0.001 * number, READY + number)
     setpoints = [Setpoint.unpack(frame) for frame in ready.process.line.heard()]
     assert setpoints == [Setpoint(BEGUN + 0.001 * number, tuple(READY + number)) for number in range(3)]
 
 
-def test_an_adapter_that_takes_no_setpoints_is_a_fault_unless_it_has_told_one(clock):
+def test_a_driver_process_that_takes_no_setpoints_is_a_fault_unless_it_has_told_one(clock):
     for reason, expected in (("", "its adapter has ended"), ("reflex", "reflex")):
         driver = DriverClient(["adapter"], 7)
         driver.process.tell(BEGUN, fault=reason)
@@ -186,7 +186,7 @@ def test_an_adapter_that_takes_no_setpoints_is_a_fault_unless_it_has_told_one(cl
 
 
 @pytest.mark.parametrize("ends", [True, False])
-def test_an_adapter_that_does_not_end_is_killed_after_a_while(clock, ends):
+def test_a_driver_process_that_does_not_end_is_killed_after_a_while(clock, ends):
     driver = DriverClient(["adapter"], 7)
     driver.process.ends = ends
     driver.close()
@@ -197,7 +197,7 @@ def test_an_adapter_that_does_not_end_is_killed_after_a_while(clock, ends):
     assert len(driver.process.waited) == (1 if ends else 2)  # none is left behind that has ended
 
 
-def test_ctrl_c_is_for_whoever_sends_and_not_for_the_adapter(driver):
+def test_ctrl_c_is_for_whoever_sends_and_not_for_the_driver_process(driver):
     assert driver.process.how["start_new_session"] is True
     assert driver.process.how["stdin"] == subprocess.DEVNULL
 
@@ -221,14 +221,14 @@ def test_a_robots_joint_may_be_as_far_off_as_the_settings_say(clock):
 
 
 @pytest.mark.parametrize(
-    ("limb_of", "patience"),
+    ("driver_of", "patience"),
     [(lambda: panda(SETTINGS.arm, "fr3"), CONNECTING),
      (lambda: start_driver(MotorsOnBus(SETTINGS.motors, "can0", "socketcan")), HOMING + STARTING),
      (lambda: start_driver(SETTINGS.ros), CONNECTING + STARTING)],
 )  # fmt: skip
-def test_how_long_each_limb_is_waited_for(clock, limb_of, patience):
+def test_how_long_each_driver_is_waited_for(clock, driver_of, patience):
     """Motors have to be homed until then, a robot has to be there."""
-    driver = limb_of()
+    driver = driver_of()
     driver.turn(BEGUN + patience - NEAR)
     assert driver.fault == ""
     driver.turn(BEGUN + patience + NEAR)

@@ -113,7 +113,7 @@ def _end():
     raise Ended
 
 
-def test_motors_that_cannot_be_homed_are_a_fault_of_the_limb(monkeypatch):
+def test_motors_that_cannot_be_homed_are_a_fault_of_the_driver(monkeypatch):
     bench = Workbench()
     bench.simulated.motors[1].silent = True
     made = Played(monkeypatch, bench).play(seconds=2.0)
@@ -134,7 +134,7 @@ def test_a_fault_is_told_at_once(played):
     assert played.bench.currents == [0.0, 0.0, 0.0]
 
 
-def test_an_adapter_that_is_killed_is_a_fault(played):
+def test_a_driver_process_that_is_killed_is_a_fault(played):
     played.play(played.send(lambda t: 0.0), 0.1)
     assert played.client.fault == ""
     played.theirs.close()
@@ -143,7 +143,7 @@ def test_an_adapter_that_is_killed_is_a_fault(played):
 
 
 @pytest.mark.parametrize(("late", "fault"), [(SILENT - 2 * TELL * TICK, ""), (SILENT, "its adapter is silent for")])
-def test_an_adapter_that_hangs_is_a_fault_after_a_while(played, late, fault):
+def test_a_driver_process_that_hangs_is_a_fault_after_a_while(played, late, fault):
     played.play(played.send(lambda t: 0.0), 0.1)
     assert played.client.fault == ""
     played.client.turn(played.bench.now + late)
@@ -161,7 +161,7 @@ def test_it_holds_the_cables_for_a_while_once_nobody_is_there_and_then_gives_the
     assert min(driven) > 0.05
 
 
-def test_an_adapter_that_is_late_tells_of_its_limb_and_goes_on(played):
+def test_a_driver_process_that_is_late_tells_of_its_driver_and_goes_on(played):
     """By less than a setpoint may be missed; turns are not made up for without end."""
     played.play(played.send(lambda t: 0.0), 0.2)
     turns, turn = [], played.driver.turn
@@ -234,8 +234,8 @@ def test_a_robot_alone_needs_no_library_of_motors():
 
 
 def test_a_library_that_is_not_there_is_one_line():
-    program = ("-c", "import sys; sys.modules['can'] = None; from trunkline.ar.drivers import hosting; "
-               "sys.exit(hosting.main(sys.argv[1:]))")  # fmt: skip
+    program = ("-c", "import sys; sys.modules['can'] = None; from trunkline.ar.drivers import driver_host; "
+               "sys.exit(driver_host.main(sys.argv[1:]))")  # fmt: skip
     client = start_driver(MotorsOnBus(motor_settings(), "can0", "socketcan"), program)
     until(lambda: client.fault, lambda: client.turn(time.monotonic()))
     assert client.fault == "found no library can, expected the extra motors to be installed"
@@ -255,7 +255,7 @@ class Failing:
         self._done.append("given back")
 
 
-def test_a_limb_that_fails_is_given_back_before_anything_waits(monkeypatch):
+def test_a_driver_that_fails_is_given_back_before_anything_waits(monkeypatch):
     ours, theirs = socket.socketpair()
     done, settings = [], MotorsOnBus(motor_settings(), SIMULATED, "virtual")
     monkeypatch.setattr(driver_host, "driver_of", lambda settings: Failing(done))

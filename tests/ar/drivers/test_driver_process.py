@@ -157,7 +157,7 @@ def test_it_gives_the_robot_back_once_nobody_speaks_to_it(arm):
 
 
 @pytest.mark.realtime
-def test_an_adapter_that_is_killed_is_a_fault(arm):
+def test_a_driver_process_that_is_killed_is_a_fault(arm):
     arm.process.kill()
     arm.process.wait(SOON)
     arm.turn(time.monotonic())

@@ -262,7 +262,7 @@ class FailedDriver:
     [("", "", ""), ("reflex", "", "robot: reflex"), ("", "hot", "motors: hot"), ("reflex", "hot", "robot: reflex"),
      (None, "hot", "motors: hot"), ("reflex", None, "robot: reflex"), (None, None, "")],
 )  # fmt: skip
-def test_a_fault_of_either_limb_is_the_machines_and_has_its_name(arm, motors, fault):
+def test_a_fault_of_either_driver_is_the_robots_and_has_its_name(arm, motors, fault):
     drivers = [None if fault is None else FailedDriver(fault=fault) for fault in (arm, motors)]
     assert HardwareRobot(*drivers, np.full(3, 0.5), lambda: 100.0).fault == fault
 
@@ -275,7 +275,7 @@ def waits(monkeypatch):
     return done
 
 
-def test_a_machine_begins_once_both_limbs_are_ready(waits):
+def test_a_robot_begins_once_both_drivers_are_ready(waits):
     arm, motors = FailedDriver(ready=False), FailedDriver(ready=False, at=np.zeros(3))
     waits += [lambda: setattr(arm, "ready", True), lambda: None, lambda: setattr(motors, "ready", True)]
     made = HardwareRobot(arm, motors, np.full(3, 0.5), lambda: 100.0)
@@ -303,8 +303,8 @@ def test_a_machine_that_nobody_wants_any_more_does_not_begin(ready):
         HardwareRobot(FailedDriver(ready=ready), None, np.full(3, 0.5), lambda: 100.0).begin(np.ones(7), lambda: True)
 
 
-@pytest.mark.parametrize("limbs", [(True, True), (True, False), (False, True)])
-def test_each_limb_that_is_there_is_given_back(drivers):
+@pytest.mark.parametrize("drivers", [(True, True), (True, False), (False, True)])
+def test_each_driver_that_is_there_is_given_back(drivers):
     made = [FailedDriver() if there else None for there in drivers]
     HardwareRobot(*made, np.full(3, 0.5), lambda: 100.0).close()
     assert [driver.closed for driver in made if driver is not None] == [True] * sum(drivers)

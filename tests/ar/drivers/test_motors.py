@@ -80,7 +80,7 @@ def test_the_current_keeps_its_limit():
     assert max(zeros) == pytest.approx(0.3, abs=1e-3)
 
 
-def test_without_commands_the_bank_drives_no_current():
+def test_without_commands_simulated_motors_drive_no_current():
     bench = homed()
     bench.rest(0.3, pull=0.01)
     assert min(np.abs(bench.currents)) > 0.05

@@ -379,7 +379,7 @@ class PlayedRobot(SimulatedRobot):
 
 
 class Played:
-    """Desk, core, planner and robot, and a client that controls, whose clock is ours. `left`, `right`: its buttons."""
+    """Controller, core, planner, robot and a client that controls, on our clock. `left`, `right`: its buttons."""
 
     def __init__(self):
         self.now, self.robot, self.planning = 100.0, PlayedRobot(), PlainPlanning()

@@ -373,11 +373,11 @@ SESSION = """
 import sys, time
 from pathlib import Path
 if __name__ == "__main__":
-    from trunkline.ar.session.log_writer import NOTHING, JournalProcess
-    journal = JournalProcess(Path(sys.argv[1]), NOTHING, 60.0)
+    from trunkline.ar.session.log_writer import NOTHING, LogWriterProcess
+    log_writer = LogWriterProcess(Path(sys.argv[1]), NOTHING, 60.0)
     for number in range(1, 301):
-        journal.event("tick", number=number)
-    while journal._waiting:
+        log_writer.event("tick", number=number)
+    while log_writer._waiting:
         time.sleep(0.01)
     time.sleep(0.1)
     print("told", flush=True)
@@ -435,13 +435,13 @@ import sys, time
 from pathlib import Path
 from tests.support.ticking import fed
 if __name__ == "__main__":
-    from trunkline.ar.session.log_writer import NOTHING, JournalProcess
-    journal = JournalProcess(Path(sys.argv[1]), NOTHING, 0.5)
-    journal.await_begun()
-    print(journal.pid, flush=True)
-    fed(journal, 4.0)
-    print(repr(journal.fault), flush=True)
-    journal.close()
+    from trunkline.ar.session.log_writer import NOTHING, LogWriterProcess
+    log_writer = LogWriterProcess(Path(sys.argv[1]), NOTHING, 0.5)
+    log_writer.await_begun()
+    print(log_writer.pid, flush=True)
+    fed(log_writer, 4.0)
+    print(repr(log_writer.fault), flush=True)
+    log_writer.close()
 """
 
 

@@ -208,7 +208,7 @@ def executed(probability, grasped, within=None, visible=True):
 
 
 @pytest.mark.parametrize(
-    ("probability", "held", "said"),
+    ("probability", "grasped", "verdict"),
     [
         (1.0, True, "outcome as foreseen in 1 of 1, Brier score 0.000"),
         (1.0, False, "outcome as foreseen in 0 of 1, Brier score 1.000"),

@@ -122,7 +122,7 @@ def still(rig, seconds=0.1):
     return np.array_equal(rig.sent[-1], first) and np.abs(rig.pulls[-1] - pulls).max() < 1e-3
 
 
-def test_both_limbs_run_the_plan_on_one_clock(rig):
+def test_both_drivers_run_the_plan_on_one_clock(rig):
     shares = []
     while rig.mode != "done":
         rig.tick()
@@ -197,7 +197,7 @@ def test_a_fault_lasts(rig):
     assert still(rig)
 
 
-def test_both_limbs_follow_and_rest_as_they_are_let_go(rig):
+def test_both_drivers_follow_and_rest_as_they_are_let_go(rig):
     """Seen from another place than where its plan would have led."""
     rig.channel.asked[STOPS] += 1
     rig.rest(BRAKE + LATE + 0.05)

@@ -62,7 +62,7 @@ def synchronized(round_trip=0.0) -> ClientClock:
 
 
 @pytest.mark.parametrize(
-    ("late", "said"),
+    ("late", "reason"),
     [
         (0.0, ""),
         (-FORWARD + NEAR, ""),
