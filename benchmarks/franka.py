@@ -80,7 +80,7 @@ def moved(machine: HardwareRobot, arm: DriverClient, mover: TimeScaledRobot, pla
             mover.stop()
         mover.advance(TICK)
         rest += TICK if mover.state().mode != "running" else 0.0
-        told = arm.told
+        told = arm.state
         if told is not None and (not times or told.time > times[-1]):
             times.append(told.time)
             off.append(np.abs(np.subtract(told.measured, told.sent)).max())

@@ -10,12 +10,12 @@ HUSH = 0.05  # s
 
 
 class Hushed(on_bus.SimulatedMotorsOnBus):
-    """Such a bank. `until`: s until which its first motor is silent."""
+    """Such motors. `until`: s until which its first motor is silent."""
 
     until = 0.0
 
     def turn(self) -> None:
-        self.bank.motors[0].silent = time.monotonic() < Hushed.until
+        self.simulated.motors[0].silent = time.monotonic() < Hushed.until
         super().turn()
 
 

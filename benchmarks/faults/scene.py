@@ -107,7 +107,7 @@ def serve(pipe: Connection, witness: Witness, package: Path, motors: bool) -> No
     robot's process tells the witness too, and that its bank, if it has one, has a motor that can be silent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     robot.RobotChannel, real.run = functools.partial(Watched, witness=witness), machine
-    real.Channel = functools.partial(Watched, witness=None)  # the twin's: the class itself is not found by its name now
+    real.RobotChannel = functools.partial(Watched, witness=None)  # the twin's: its class has another name now
     asyncio.run(_serve(pipe, package, motors))
 
 
