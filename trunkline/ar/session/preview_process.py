@@ -123,7 +123,7 @@ class PreviewPlanner:
 
     def __init__(self, planner: Planner, foresight: Foresight, bodies: tuple[str, ...]) -> None:
         self.planner, self.foresight, self.bodies = planner, foresight, bodies
-        self.known, self.previewing = foresight.known, foresight.settings
+        self.belief, self.previewing = foresight.known, foresight.settings
         self._composed: tuple[tuple, Twin | None] = ((), None)
         self._grasped: Foreseen | None = None  # the last grasp: of a thing that is held, the one that was run
 
@@ -172,9 +172,9 @@ class PreviewPlanner:
         """The last one where nothing has changed: to compile another takes longer than a piece of a preview."""
         composed, twin = self._composed
         if twin is not None and composed == (world.boxes, thing):
-            twin = at_rest(twin, joints, commands, self.known.robot.mount_offset)
+            twin = at_rest(twin, joints, commands, self.belief.robot.mount_offset)
         else:
-            twin = compose_twin(self.known, world, thing, joints, commands, self.previewing)
+            twin = compose_twin(self.belief, world, thing, joints, commands, self.previewing)
         self._composed = (world.boxes, thing), twin
         return twin
 
@@ -323,7 +323,7 @@ def run(
 def warm(planner: PreviewPlanner, package: Package, world: World) -> None:
     """Plan and preview once for nothing: what is compiled on its first call would keep the first user waiting, and so
     would the twin of the `world`."""
-    robot, straight = planner.known.robot, package.straight
+    robot, straight = planner.belief.robot, package.straight
     joints = np.array(robot.ready)
     x, y, z = (float(value) for value in mount_pose(joints[None], robot.mount_offset)[0][0])
     targets = Targets(Target((x, y, z)), Target((x, y, z)), DOWN, 0.0, 0, 0.0)
