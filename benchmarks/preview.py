@@ -17,14 +17,15 @@ import numpy as np
 
 from trunkline.ar.hybrid.compose import Placed, compose
 from trunkline.ar.hybrid.grasps import CABLES, Grasp, object_in_base
-from trunkline.ar.hybrid.objects import Thing
-from trunkline.ar.hybrid.payload import HOOK_ABOVE, LEVEL
-from trunkline.ar.hybrid.posterior import read_doubts
+from trunkline.ar.hybrid.objects import GraspObject
+from trunkline.ar.hybrid.posterior import read_posterior
 from trunkline.ar.hybrid.preview import Holding, nominal, preview
-from trunkline.ar.hybrid.rollouts import Twin, Way
-from trunkline.ar.hybrid.settings import HybridSettings
-from trunkline.ar.hybrid.worlds import World
+from trunkline.ar.hybrid.rollouts import CommandTrajectory, ComposedTwin
+from trunkline.ar.hybrid.settings import HybridModelSettings
+from trunkline.ar.hybrid.worlds import WorldGeometry
+from trunkline.ar.teleop.minimum_jerk import minimum_jerk
 from trunkline.compute.threads import thread_count
+from trunkline.identification.stages import STAGES
 from trunkline.kinematics.panda.kinematics import mount_pose
 from trunkline.kinematics.panda.mounts import PandaRobot
 from trunkline.model.arm.contact_geometry import read_geometry
@@ -32,10 +33,11 @@ from trunkline.pipeline.config import PROJECT, load_folder
 from trunkline.pipeline.inputs import read_spec
 from upkeep.results import recorded
 
-STAGES = ("identify_stiffness", "identify_damping", "identify_control")
 STEPS = (1 / 480, 1 / 240, 1 / 200)  # s; joint limits and contacts, of 0.01 s, allow no longer one than 5 ms
 CLOSE, LET_GO, LENGTH, PULL, LIFT = 1.0, 1.75, 4.0, 0.2, 0.3  # s, s, s, m of cable, rad of the Panda's second joint
 PAID_OUT, PAY_TIME = 0.2, 0.3  # m and s, of cables that do not pull
+HOOK_ABOVE = 0.15  # m, of the cylinder's upper side: the length of what it hangs by
+LEVEL = (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0)  # turns an object's z to base y
 
 
 @dataclass(frozen=True)
@@ -53,9 +55,9 @@ class Placing:
 @recorded("preview")
 def main(path: Path, count: int) -> None:
     twin, way = grasp(path)
-    doubts = read_doubts([path.parents[1] / stage / "parameters.json" for stage in STAGES])
+    doubts = read_posterior([path.parents[1] / stage / "parameters.json" for stage in STAGES])
     holding = Holding(LET_GO, sag=0.25)
-    list(nominal(twin, Way(way.step, way.joints[:100], way.commands[:100])))  # names are looked up once
+    list(nominal(twin, CommandTrajectory(way.step, way.joints[:100], way.commands[:100])))  # names are looked up once
     print(f"{path}: {twin.model.nv} degrees of freedom, {count} futures of {LENGTH:g} s, {thread_count()} threads")
     first = None
     for step in STEPS:
@@ -70,7 +72,7 @@ def main(path: Path, count: int) -> None:
             f"all {spent:.1f} s ({(spent - shown[-1]) / count:.2f} s a future); "
             f"holds with {found.probability:.2f} ({low:.2f} to {high:.2f})"
         )
-        same = int(np.sum(found.held == first.held))
+        same = int(np.sum(found.success == first.success))
         frames = [int(np.argmin(np.abs(motion.time - LET_GO))) for motion in (found.motion, first.motion)]
         tips = [motion.tip[:, frame] for motion, frame in zip((found.motion, first.motion), frames, strict=True)]
         apart = 1e3 * np.median(np.linalg.norm(tips[0] - tips[1], axis=1))
@@ -81,9 +83,13 @@ def main(path: Path, count: int) -> None:
         )
 
 
-def grasp(path: Path, placing: Placing | None = None) -> tuple[Twin, Way]:
+def grasp(path: Path, placing: Placing | None = None) -> tuple[ComposedTwin, CommandTrajectory]:
     """The Panda in its ready pose with the arm beside the cylinder, and the motion."""
-    p, spec, robot = placing or Placing(), read_spec(path), load_folder(HybridSettings, PROJECT / "conf/hybrid").robot
+    p, spec, robot = (
+        placing or Placing(),
+        read_spec(path),
+        load_folder(HybridModelSettings, PROJECT / "conf/hybrid").robot,
+    )
     middle = object_in_base(read_geometry(spec), p.diameter, Grasp(p.wrap, p.gap), "dorsal")
     assert isinstance(robot, PandaRobot)
     ready = np.array(robot.ready)
@@ -91,12 +97,12 @@ def grasp(path: Path, placing: Placing | None = None) -> tuple[Twin, Way]:
     base = turns[0] @ np.diag([1.0, -1.0, -1.0])
     center = mounts[0] + base @ (middle + [0, p.beside, 0])
     hook = [float(value) for value in center + [0, 0, p.diameter / 2 + HOOK_ABOVE]]
-    thing = Thing("cylinder", p.diameter, 0.12, p.mass, "plastic")
+    thing = GraspObject("cylinder", p.diameter, 0.12, p.mass, "plastic")
     level = np.zeros(4)
     mujoco.mju_mat2Quat(level, base.ravel())
     mujoco.mju_mulQuat(level, level.copy(), np.array(LEVEL))
     placed = Placed(thing, center, (level[0], level[1], level[2], level[3]), True)
-    model = compose(spec, robot, World(None, {}, hook), placed).compile()
+    model = compose(spec, robot, WorldGeometry(None, {}, hook), placed).compile()
     model.geom_contype[model.geom("hook").id] = 0  # a string: the rod above the hook's end would stand in the flange
     arm, time_step = spec.compile(), 0.002
     times = time_step * np.arange(round(LENGTH / time_step) + 1)[:, None]
@@ -105,8 +111,8 @@ def grasp(path: Path, placing: Placing | None = None) -> tuple[Twin, Way]:
     drawn = np.where(pulls > 0, -PULL * np.minimum(times / CLOSE, 1), PAID_OUT * np.minimum(times / PAY_TIME, 1))
     share = np.clip((times - LET_GO) / 1.5, 0, 1)
     joints = np.tile(ready, (len(times), 1))
-    joints[:, 1:2] -= LIFT * share**3 * (10 - 15 * share + 6 * share**2)
-    return Twin(model, arm), Way(time_step, joints, straight + drawn, LET_GO)
+    joints[:, 1:2] -= minimum_jerk(share, LIFT)
+    return ComposedTwin(model, arm), CommandTrajectory(time_step, joints, straight + drawn, LET_GO)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from trunkline.ar.teleop.config import Config
+from trunkline.ar.teleop.config import TeleoperationConfig
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.messages import Controller, Input, Pose, World, to_json
 from trunkline.ar.teleop.reach import MapReach
@@ -29,7 +29,7 @@ PLACES = {"within reach": ((0.0, -0.4, 0.0), (0.1, -0.75, -0.1)), "out of reach"
 
 @recorded("teleop_step")
 def main(path: Path) -> None:
-    config = load_folder(Config, PROJECT / "conf/teleop")
+    config = load_folder(TeleoperationConfig, PROJECT / "conf/teleop")
     started = time.perf_counter()
     with np.load(path) as arrays:
         reach = MapReach.from_arrays(dict(arrays))

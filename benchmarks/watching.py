@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from aiohttp import ClientSession, TCPConnector, WSMessage, WSMsgType
 
-from benchmarks.guests import HZ, RIGID, SEEN, TIP, Guest, hands_at, knock
+from qualification.guests import HZ, RIGID, SEEN, TIP, Guest, hands_at, knock
 from trunkline.ar.session import binary
 from trunkline.errors import InputError
 

@@ -23,6 +23,7 @@ from demo.plants.choice import plant_of
 from demo.plants.stranger import Stranger
 from demo.rig import ROOT as LAB
 from demo.rig import Config as Lab
+from rehearsal.operator.hands import as_hands_move
 from rehearsal.robot.scene import Object, Scene, Surface
 from rehearsal.robot.stand_in import SUBSTEPS, StandIn, StandInRobot, Truth
 from trunkline.frames import wxyz_from_rotation
@@ -98,12 +99,6 @@ def joints_for(place: np.ndarray, rotation: np.ndarray, offset: float, start: np
     return least_squares(off, start, bounds=(Q_MIN, Q_MAX)).x
 
 
-def smooth(share: float) -> float:
-    """From 0 to 1 with least jerk."""
-    s = min(max(share, 0.0), 1.0)
-    return s**3 * (10 - 15 * s + 6 * s**2)
-
-
 class Trial:
     """One placement: the scene, the robot in it, and pictures of the way."""
 
@@ -138,7 +133,7 @@ class Trial:
 
     def go(self, duration: float, start: np.ndarray, end: np.ndarray, pulls: tuple[np.ndarray, np.ndarray]) -> None:
         for n in range(round(duration / TIME_STEP)):
-            share = smooth((n + 1) * TIME_STEP / duration)
+            share = as_hands_move((n + 1) * TIME_STEP / duration)
             self.robot.send(start + share * (end - start), pulls[0] + share * (pulls[1] - pulls[0]))
             self.robot.advance(TIME_STEP)
 

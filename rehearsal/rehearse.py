@@ -14,7 +14,7 @@ from rehearsal.runs import Source, make, source_of, wanted
 from trunkline.ar.preview.package import only_package
 from trunkline.compute.threads import thread_count
 from trunkline.errors import nearest
-from trunkline.pipeline.stage import run_stage, write_json
+from trunkline.pipeline.stage import run_stage, write_metrics
 from trunkline.settings import settings
 from upkeep.limits import read_limits
 from upkeep.rehearsal_table import rehearsal_table
@@ -41,7 +41,7 @@ def main(config: Config) -> None:
     results = make(wanted(config.runs, config.of_variants), package, source, OUT / "runs.csv", thread_count())
     rewrite_results(OUT / "runs.csv", results)
     metrics = metrics_of(source, results)
-    write_json(OUT / "metrics.json", metrics)
+    write_metrics(OUT, metrics)
     draw(results, OUT / "rehearsal.png")
     goals = read_limits(Path("tests/limits.yaml"))["rehearse"]
     print(rehearsal_table(metrics, goals, f"with package `{source.package}`", variants=True))

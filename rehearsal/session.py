@@ -13,10 +13,10 @@ import numpy as np
 from rehearsal.operator.hands import RayHand
 from rehearsal.robot.sensors import Seen
 from rehearsal.robot.stand_in import StandInRobot
-from trunkline.ar.preview.grasp_preview import Foreseen, Foresight
+from trunkline.ar.preview.grasp_preview import GraspPreviewer, PlanPrediction
 from trunkline.ar.preview.package import Package
-from trunkline.ar.preview.world_model import believe
-from trunkline.ar.teleop.config import Config
+from trunkline.ar.preview.world_model import update_world
+from trunkline.ar.teleop.config import TeleoperationConfig
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.executor import SimulatedRobot
 from trunkline.ar.teleop.following import Follower, Following, sought
@@ -59,12 +59,12 @@ class Session:
     def __init__(
         self,
         package: Package,
-        config: Config,
+        config: TeleoperationConfig,
         robot: StandInRobot,
         hands: tuple[RayHand, RayHand],
         world: World,
         place: Place,
-        foresight: Foresight | None = None,
+        foresight: GraspPreviewer | None = None,
     ) -> None:
         self.package, self.config, self.robot, self.hands = package, config, robot, hands
         self.world, self.place, self.foresight = world, place, foresight
@@ -80,8 +80,8 @@ class Session:
         self.fault, self.shown, self.showing, self.since = "", "", "", 0.0
         self.previewed: np.ndarray | None = None
         self.now, self.rays, self.moved, self.began = 0.0, (None, None), False, 0.0
-        self.foreseen: Foreseen | None = None
-        self.grasped: Foreseen | None = None  # of the grasp of what the arm holds
+        self.foreseen: PlanPrediction | None = None
+        self.grasped: PlanPrediction | None = None  # of the grasp of what the arm holds
         self.straight: list[np.ndarray] = []  # m, readings of the straight arm's tip in its base frame, (3,) each
         self.believed = ""  # digest of the newest plan of whose end the world tells
         self.tips: list[tuple[float, np.ndarray]] = []  # s since a plan began, and where its tip is seen, m
@@ -97,7 +97,7 @@ class Session:
         Its y is how far it is beside the bending plane."""
         return np.mean(self.straight, axis=0)
 
-    def foresee(self) -> Foreseen | None:
+    def foresee(self) -> PlanPrediction | None:
         """What a page tells of where the tip of the newest plan goes, which grasps nothing; None without `foresight`.
         Nothing here waits for it, so it is computed when it is asked for."""
         if self.foresight is None or self.plan is None or self.report is None:
@@ -142,7 +142,7 @@ class Session:
         if report.mode == "done" and report.digest != self.believed and self.plan is not None:
             self.believed, phases = report.digest, tuple(dict(self.plan.phases))
         pose = np.append(seen.thing, seen.thing_quaternion)
-        self.world = believe(self.world, pose, phases, self.config.handling.lift)
+        self.world = update_world(self.world, pose, phases, self.config.handling.lift)
 
     def _plan(self, intent: Intent) -> None:
         request = intent.request

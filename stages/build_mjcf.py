@@ -6,7 +6,7 @@ from trunkline.model.arm.cad import CadArm
 from trunkline.model.arm.kinds import Description, described_arm
 from trunkline.model.statics.chain import read_chain
 from trunkline.pipeline.config import own_or_project
-from trunkline.pipeline.stage import output_folder, run_stage, write_json
+from trunkline.pipeline.stage import output_folder, run_stage, write_metrics
 from trunkline.report.figures.arm import arm_figure
 from trunkline.report.figures.style import save_figure
 
@@ -27,7 +27,7 @@ def main(config: Config) -> None:
     with output_folder(ARTIFACTS) as folder:
         (folder / "arm.xml").write_text(arm.spec.to_xml())
         save_figure(arm_figure(model), folder / "arm.png")
-        write_json(folder / "metrics.json", arm.metrics)
+        write_metrics(folder, arm.metrics)
 
 
 if __name__ == "__main__":

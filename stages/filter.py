@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from trunkline.compute.progress import progress
-from trunkline.pipeline.stage import output_folder, run_stage, write_json
+from trunkline.pipeline.stage import output_folder, run_stage, write_metrics
 from trunkline.recordings.filtering.effect import summary
 from trunkline.recordings.filtering.filter import Filter, filter_take
 from trunkline.recordings.trials.raw_trial import read_takes
@@ -31,7 +31,7 @@ def main(config: Filter) -> None:
             bar.update(1, trial=take.name)
     with output_folder(PROCESSED) as processed, output_folder(ARTIFACTS) as artifacts:
         write_trials(processed, trials)
-        write_json(artifacts / "metrics.json", summary(trials, effects))
+        write_metrics(artifacts, summary(trials, effects))
         shown = max(range(len(trials)), key=lambda i: np.ptp(trials[i].positions, axis=0).sum())
         save_figure(filter_figure(takes[shown], trials[shown]), artifacts / "filter.png")
 

@@ -7,7 +7,7 @@ from trunkline.kinematics.dataset.gather import Sampling, gather
 from trunkline.kinematics.dataset.report import summary, unevenness_table
 from trunkline.model.statics.chain import read_chain
 from trunkline.pipeline.inputs import read_model
-from trunkline.pipeline.stage import output_folder, run_stage, write_json
+from trunkline.pipeline.stage import output_folder, run_stage, write_metrics
 from trunkline.report.figures.dataset import density_figure, deviation_figure
 from trunkline.report.figures.style import save_figure
 from trunkline.settings import settings
@@ -35,7 +35,7 @@ def main(config: Config) -> None:
         save_figure(deviation_figure(found.deviation), folder / "deviation.png")
         unevenness_table(found.densities).to_csv(folder / "density.csv", index=False, float_format="%.6g")
         found.deviation.to_csv(folder / "deviation.csv", index=False, float_format="%.6g")
-        write_json(folder / "metrics.json", summary(found))
+        write_metrics(folder, summary(found))
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from trunkline.compute.progress import progress
 from trunkline.errors import InputError
-from trunkline.pipeline.stage import output_folder, run_stage, write_json
+from trunkline.pipeline.stage import output_folder, run_stage, write_json, write_metrics
 from trunkline.recordings.cleaning.checks import Limits
 from trunkline.recordings.cleaning.loading import take_in
 from trunkline.recordings.cleaning.quality import by_sentence, clock_facts, judge, remarks, report, summary
@@ -47,7 +47,7 @@ def main(config: Config) -> None:
     with output_folder(PROCESSED) as processed, output_folder(ARTIFACTS) as artifacts:
         write_takes(processed, gathered.takes)
         write_json(artifacts / "quality.json", report(qualities, gathered) | ({"clocks": clocks} if clocks else {}))
-        write_json(artifacts / "metrics.json", summary(qualities, gathered))
+        write_metrics(artifacts, summary(qualities, gathered))
         save_figure(quality_figure(qualities, gathered), artifacts / "quality.png")
     for reason in gathered.refused.values():
         print(f"ingest: warning: left out: {reason}", file=sys.stderr)

@@ -10,7 +10,7 @@ from pydantic import Field
 from trunkline.ar.conformance.vectors import vectors, with_shared_vectors
 from trunkline.ar.teleop.settings import Teleop
 from trunkline.kinematics.panda.mounts import Robot
-from trunkline.pipeline.stage import output_folder, run_stage, write_json
+from trunkline.pipeline.stage import output_folder, run_stage, write_metrics
 from trunkline.report.figures.package import roundtrip_figure
 from trunkline.report.figures.style import save_figure
 from trunkline.settings import settings
@@ -61,7 +61,7 @@ def main(config: Config) -> None:
             "shared_vectors": vectors(packed),
         }
         metrics |= started(models["calibrated"], packed, np.radians(config.start_tilts_deg).tolist())
-        write_json(out / "metrics.json", metrics)
+        write_metrics(out, metrics)
 
 
 if __name__ == "__main__":

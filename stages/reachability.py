@@ -12,7 +12,7 @@ from trunkline.kinematics.reachability.survey import Survey, survey
 from trunkline.kinematics.sdf.mesh import write_obj
 from trunkline.model.statics.chain import read_chain
 from trunkline.pipeline.inputs import read_model
-from trunkline.pipeline.stage import output_folder, run_stage, write_json
+from trunkline.pipeline.stage import output_folder, run_stage, write_metrics
 from trunkline.report.figures.maps import heldout_figure, maps_figure, slices_figure
 from trunkline.report.figures.style import save_figure
 from trunkline.settings import settings
@@ -45,7 +45,7 @@ def main(config: Config) -> None:
         save_figure(maps_figure(maps, tips), folder / "maps.png")
         save_figure(slices_figure(maps, tips, check), folder / "slices.png")
         save_figure(heldout_figure(heldout, config.spot_check.outside), folder / "heldout.png")
-        write_json(folder / "metrics.json", summary(maps, check))
+        write_metrics(folder, summary(maps, check))
 
 
 if __name__ == "__main__":

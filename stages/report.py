@@ -4,11 +4,12 @@ import json
 from pathlib import Path
 
 from trunkline.errors import existing
+from trunkline.identification.stages import STAGES
 from trunkline.pipeline.inputs import load_rig, read_model
-from trunkline.pipeline.stage import output_folder, run_stage, write_json
+from trunkline.pipeline.stage import output_folder, run_stage, write_json, write_metrics
 from trunkline.recordings.trials.splits import DECIDING
 from trunkline.recordings.trials.trial import read_trials
-from trunkline.report.certificate.certificate import Asked, certify, digest_of_code, digests
+from trunkline.report.certificate.certificate import CertificateSettings, certify, digest_of_code, digests
 from trunkline.report.certificate.page import page
 from trunkline.report.figures.certificate import pose_figure, uncertainty_figure
 from trunkline.report.figures.style import save_figure
@@ -16,12 +17,11 @@ from trunkline.settings import read_yaml, settings
 
 ARTIFACTS, TRIALS = Path("artifacts"), Path("data/processed/filter")
 MODEL = ARTIFACTS / "identify_control/arm.xml"
-STAGES = ("identify_stiffness", "identify_damping", "identify_control")
 CHECKOUT = Path(__file__).resolve().parent.parent
 
 
 @settings
-class Config(Asked):
+class Config(CertificateSettings):
     """See conf/report/config.yaml."""
 
     rig: str | None
@@ -45,7 +45,7 @@ def main(config: Config) -> None:
         pictures = {name: (folder / f"{name}.png").read_bytes() for name in ("uncertainty", "poses")}
         (folder / "certificate.html").write_text(page(facts, found.replays, pictures), encoding="utf-8")
         write_json(folder / "facts.json", facts)
-        write_json(folder / "metrics.json", found.metrics)
+        write_metrics(folder, found.metrics)
 
 
 def code() -> list[str]:

@@ -12,7 +12,7 @@ from trunkline.errors import existing
 from trunkline.identification.evaluation.error_tables import segment_table, trial_table
 from trunkline.identification.results.scoring import Compared, score
 from trunkline.pipeline.inputs import read_spec
-from trunkline.pipeline.stage import output_folder, run_stage, write_json
+from trunkline.pipeline.stage import output_folder, run_stage, write_metrics
 from trunkline.recordings.trials.splits import IDENTIFY, TEST
 from trunkline.recordings.trials.trial import read_trials, sessions_of
 from trunkline.report.figures.scoring import segment_figure, trial_figure
@@ -51,7 +51,7 @@ def main(config: Config) -> None:
     if unscored:
         print(f"score: {', '.join(sorted(unscored))}: no stage's `reported` has it, so nothing of it is scored")
     with output_folder(ARTIFACTS / "score") as folder:
-        write_json(folder / "metrics.json", metrics)
+        write_metrics(folder, metrics)
         for name, tables in (("trials", of_trials), ("segments", along)):
             whole = pd.concat([table.assign(stage=stage) for stage, table in tables.items()])
             whole.to_csv(folder / f"{name}.csv", index=False, float_format="%.6g")

@@ -11,7 +11,7 @@ from trunkline.kinematics.ik.learn import Learning, learn
 from trunkline.kinematics.ik.report import histogram, summary
 from trunkline.model.statics.chain import read_chain
 from trunkline.pipeline.inputs import load_rig, read_model
-from trunkline.pipeline.stage import output_folder, run_stage, write_json
+from trunkline.pipeline.stage import output_folder, run_stage, write_metrics
 from trunkline.report.figures.network import error_map_figure, learning_figure, tip_error_figure
 from trunkline.report.figures.style import save_figure
 from trunkline.settings import settings
@@ -46,7 +46,7 @@ def main(config: Config) -> None:
         save_figure(tip_error_figure(positions, chain.length), folder / "tip_error.png")
         located = learned.held_out.assign(error_mm=positions["held out"] * 1e3)
         save_figure(error_map_figure(located), folder / "error_map.png")
-        write_json(folder / "metrics.json", summary(learned, chain.length))
+        write_metrics(folder, summary(learned, chain.length))
 
 
 if __name__ == "__main__":

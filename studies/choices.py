@@ -14,6 +14,7 @@ kept once it is whole. Progress goes to stderr.
 import argparse
 import contextlib
 import sys
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -22,8 +23,7 @@ from pathlib import Path
 
 import mujoco
 
-from benchmarks.identification.case import STAGES, require_demo, spread
-from benchmarks.identification.timing import Stopwatch
+from studies.demo_session import STAGES, require_demo, spread
 from studies.rows import Rows, digest
 from trunkline.errors import in_one_line
 from trunkline.identification.evaluation.evaluation import replay, scores
@@ -174,9 +174,9 @@ def next_link(
     """One stage more, from `model`; `before`: CPU seconds of the stages that led to it."""
     model, experiments, fit = set_up(config, trials, model)
     experiments = fewer(experiments, QUICK_TRIALS) if is_quick else experiments
-    clock = Stopwatch()
+    begun = time.process_time()
     result = identify(stage, model, [e for e in experiments if e.kind in config.experiments], fit)
-    spent = [*before, clock.read().cpu]
+    spent = [*before, time.process_time() - begun]
     for line in [*doubts(result, fit.parameters), result.values]:
         print(f"{stage}: {line}")
     return Chain(result.models["identified"], experiments, fit, spent, result)

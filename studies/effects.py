@@ -23,10 +23,10 @@ from importlib import import_module
 import mujoco
 import numpy as np
 
-from benchmarks.identification.case import STAGES, require_demo
 from stages.build_mjcf import Config as CadConfig
 from stages.build_mjcf import cad_arm
 from studies.choices import Chain, next_link
+from studies.demo_session import STAGES, require_demo
 from studies.rows import Rows, digest
 from trunkline.errors import in_one_line
 from trunkline.identification.evaluation.evaluation import Prediction, replay

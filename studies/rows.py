@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from trunkline.files import written_whole
 from upkeep.origin import Origin, origin_of
 from upkeep.results import FOLDER, command_line, modules_of
 
@@ -67,9 +68,8 @@ class Rows:
         attempt = 1 + sum(row.get(self.key) == key for row in rows)
         last = {"made_of": self.made_of, "commit": self.origin.commit, "code": self.origin.digest, "attempt": attempt}
         self.folder.mkdir(parents=True, exist_ok=True)
-        part = self.path.with_suffix(".part")
-        part.write_text(_text([*rows, {self.key: key, **cells, **last}]), encoding="utf-8")
-        part.replace(self.path)
+        with written_whole(self.path) as part:
+            part.write_text(_text([*rows, {self.key: key, **cells, **last}]), encoding="utf-8")
 
     def attempts(self) -> str:
         """A line that says what is in the table beside the rows that count; "" where there is nothing."""

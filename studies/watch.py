@@ -21,7 +21,6 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from benchmarks.identification.case import require_demo
 from demo.experiments import Experiments, Motion, Pull
 from demo.instruments import measure
 from demo.laboratory import Laboratory
@@ -32,17 +31,18 @@ from demo.record import Config
 from demo.recorder import write_log, write_session
 from demo.rig import ROOT
 from demo.truth import Truth
+from studies.demo_session import require_demo
 from studies.rows import Rows, digest
 from trunkline.compute.progress import progress
 from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.config import load_config
 from trunkline.recordings.trials.splits import DECIDING
 from trunkline.recordings.trials.trial import read_trials
-from trunkline.tools.monitor.attribution import explain
+from trunkline.tools.monitor.attribution import attribute_change
 from trunkline.tools.monitor.baseline import Baseline
 from trunkline.tools.monitor.chart import Chart, chart_of
-from trunkline.tools.monitor.history import read_score, told
-from trunkline.tools.monitor.loading import take
+from trunkline.tools.monitor.history import read_score, score_row
+from trunkline.tools.monitor.loading import load_logs
 from trunkline.tools.monitor.monitor import LEARN, scorer_of
 from trunkline.tools.monitor.scores import Score, Scorer
 from upkeep.results import recorded
@@ -107,7 +107,7 @@ def scored(lab: Laboratory, config: Config, kind: str, rng: np.random.Generator,
         session = Path(name)
         write_log(session / f"{truth.name}.mcap", measurement)
         write_session(session, [measurement], config.instruments)
-        taken = take(session, {f"{truth.name}.mcap"}, Path("."))
+        taken = load_logs(session, {f"{truth.name}.mcap"}, Path("."))
     if not taken.trials:
         raise InputError(next(iter(taken.refused.values())))
     return scorer.score(taken.trials[truth.name])
@@ -144,7 +144,7 @@ def collect(rows: Rows, trials: list[tuple[str, str, int]], scorer: Scorer) -> N
 
 def packed(score: Score) -> str:
     """A score in few bytes: the curvature is symmetric."""
-    row = told(score)
+    row = score_row(score)
     upper = score.curvature[np.triu_indices(len(score.slope))]
     row |= {"slope": [f"{value:.5g}" for value in score.slope], "curvature": [f"{value:.5g}" for value in upper]}
     return json.dumps({"trial": score.name} | row)
@@ -206,7 +206,8 @@ def found_lines(
         if not cases:
             continue
         found = [outcome(empty, case) for empty, case in cases]
-        told = [(when, explain(chart.suspects(), chart.baseline, list(chart.lines))) for when, chart in found if when]
+        alarmed = [(when, chart) for when, chart in found if when]
+        told = [(when, attribute_change(c.suspects(), c.baseline, list(c.lines))) for when, c in alarmed]
         cells = [str(sum(when == n for when, _ in found)) for n in range(1, LATEST + 1)]
         cells.append(str(sum(not when for when, _ in found)))
         right = [one for _, one in told if names[one.best.parameter] == "stiffness"]

@@ -4,21 +4,15 @@ import os
 import subprocess
 import sys
 import tomllib
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
-from trunkline.__main__ import VERBS, Verb, main
-from trunkline.program import called
+from trunkline.__main__ import RENAMED, VERBS, Verb, main
 
 ROOT = Path(__file__).parents[1]
 HEAVY = ("numpy", "mujoco", "torch", "pandas", "dvc", "rich")
-
-
-@pytest.fixture(autouse=True)
-def argv(monkeypatch):
-    """What the command writes into it ends with the test."""
-    monkeypatch.setattr(sys, "argv", ["pytest"])
 
 
 def test_help_lists_every_verb_with_a_line_each(capsys):
@@ -27,7 +21,8 @@ def test_help_lists_every_verb_with_a_line_each(capsys):
     for name, verb in VERBS.items():
         assert [line for line in lines if line.split()[:1] == [name] and line.endswith(f"  {verb.line}")], name
     assert max(map(len, lines)) <= 100
-    assert {"inspect", "check", "evaluate", "suggest", "watch", "report"} <= set(VERBS)
+    assert {"inspect", "check", "evaluate", "suggest", "monitor", "report"} <= set(VERBS)
+    assert not [line for line in lines if line.split()[:1] and line.split()[0] in RENAMED], "new names alone"
 
 
 def test_without_a_verb_it_says_which_there_are_and_fails(capsys):
@@ -39,27 +34,51 @@ def test_help_imports_nothing_heavy():
     code = (
         f"from trunkline.__main__ import main; main(['-h']); import sys; print(sorted(set({HEAVY}) & set(sys.modules)))"
     )
-    said = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    assert said.splitlines()[-1] == "[]"
+    output = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert output.splitlines()[-1] == "[]"
 
 
 @pytest.mark.parametrize("name", VERBS)
-def test_a_verb_s_own_help_names_it_as_it_was_called(name, capsys):
+def test_a_verb_s_own_help_names_it(name, capsys):
     with pytest.raises(SystemExit) as ended:
         main([name, "--help"])
     assert ended.value.code == 0
-    module = VERBS[name].module.removesuffix(".__main__")  # which a verb that does not ask `called` goes by
-    assert capsys.readouterr().out.startswith((f"usage: trunkline {name} ", f"usage: python -m {module} "))
+    assert capsys.readouterr().out.startswith(f"usage: trunkline {name} ")
 
 
-def test_called_as_a_module_a_verb_s_help_names_the_module():
-    assert called("trunkline.tools.preflight") == "python -m trunkline.tools.preflight"
+@pytest.mark.parametrize("name", ["describe", "worker"])
+def test_run_as_a_module_a_verb_has_the_same_help(name, capsys):
+    with pytest.raises(SystemExit):
+        import_module(VERBS[name].module).main(["--help"])
+    assert capsys.readouterr().out.startswith(f"usage: trunkline {name} ")
 
 
-@pytest.mark.parametrize(("typed", "meant"), [("chek", "check"), ("sugest", "suggest"), ("randomize", "randomise")])
-def test_a_mistyped_verb_names_the_nearest(typed, meant, capsys):
+@pytest.mark.parametrize(("old", "new"), RENAMED.items())
+def test_an_old_name_still_works_and_names_the_new_one(old, new, capsys):
+    with pytest.raises(SystemExit):
+        main([old, "--help"])
+    printed = capsys.readouterr()
+    assert printed.out.startswith(f"usage: trunkline {new} ")
+    (line,) = printed.err.splitlines()
+    assert line.startswith(f"trunkline {old} is now `trunkline {new}`")
+
+
+@pytest.mark.parametrize(("script", "verb"), [("inspect", "inspect"), ("motive", "import-motive")])
+def test_an_old_script_still_works_and_names_the_verb(script, verb, monkeypatch, capsys):
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    module, _, function = project["scripts"][f"trunkline-{script}"].partition(":")
+    monkeypatch.setattr(sys, "argv", [f"trunkline-{script}", "--help"])
+    with pytest.raises(SystemExit):
+        getattr(import_module(module), function)()
+    printed = capsys.readouterr()
+    assert printed.out.startswith(f"usage: trunkline {verb} ")
+    assert printed.err.startswith(f"trunkline-{script} is now `trunkline {verb}`")
+
+
+@pytest.mark.parametrize(("typed", "nearest"), [("chek", "check"), ("sugest", "suggest"), ("randomiz", "randomize")])
+def test_a_mistyped_verb_names_the_nearest(typed, nearest, capsys):
     assert main([typed]) == 1
-    assert capsys.readouterr().err == f"error: trunkline: found {typed!r}, no such verb, did you mean {meant!r}?\n"
+    assert capsys.readouterr().err == f"error: trunkline: found {typed!r}, no such verb, did you mean {nearest!r}?\n"
 
 
 def test_a_verb_that_is_like_none_names_all(capsys):

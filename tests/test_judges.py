@@ -45,8 +45,7 @@ JUDGES = {  # by function, the test that has its table, and its file below tests
         "test_the_first_grasps_hold_what_is_lifted_does_not_slip_and_does_not_hang",
     ),
     "trunkline.ar.hybrid.preview:Holding.holds": ("ar/hybrid/test_preview.py", "test_what_counts_as_held"),
-    "trunkline.ar.hybrid.released:Resting.holds": ("ar/hybrid/test_resting.py", "test_what_rests"),
-    "trunkline.ar.hybrid.trials:Tried.held": ("ar/hybrid/test_preview.py", "test_what_counts_as_held_in_a_trial"),
+    "trunkline.ar.hybrid.released:RestCriterion.holds": ("ar/hybrid/test_released.py", "test_what_rests"),
     "trunkline.identification.fit.identify:_at_bound": (
         "identification/test_bounds.py",
         "test_a_parameter_is_at_a_bound_within_a_share_of_its_own_range",
@@ -110,13 +109,11 @@ JUDGES = {  # by function, the test that has its table, and its file below tests
 }
 OTHERWISE = {  # what the word stands for there: no verdict
     "trunkline.identification.simulate.experiment:start_frames": "frames in which an arm is held before its release",
-    "trunkline.identification.results.parameter_table:parameter_table": "looks a name up in those at a bound",
+    "trunkline.identification.results.parameter_table:parameter_table": "looks names up among those at a bound",
     "trunkline.kinematics.ik.training:pieces": "rows that are held out",
-    "trunkline.recordings.preparation.proposal:_experiment": "whether motors hold in a log; a user confirms it",
+    "trunkline.recordings.preparation.proposal:_experiment": "whether motors hold in a log, as proposed",
     "trunkline.kinematics.reachability.tips:held_by": "lengths of cables",
     "trunkline.compute.scheduler:spread_rows": "shares rows out to workers",
-    "trunkline.ar.teleop.correction:_rest": "where an arm rests",
-    "trunkline.ar.teleop.vibration:swings": "which actuators have a state of their own",
 }
 
 

@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[1]
 TABLE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").partition("<!-- packages -->")[2]
 PACKAGES = re.findall(r"^\| `(\w+)` \|", TABLE.partition("<!-- /packages -->")[0], re.MULTILINE)
 GROUND = {file.stem for file in (ROOT / "trunkline").glob("*.py")}
-OUTSIDE = {"stages", "demo", "studies", "benchmarks", "examples", "rehearsal", "upkeep", "tests"}
+OUTSIDE = {"stages", "demo", "studies", "benchmarks", "qualification", "examples", "rehearsal", "upkeep", "tests"}
 
 
 def _modules_imported(file: Path) -> set[str]:

@@ -1,6 +1,6 @@
 """Motion-capture logs in, a calibrated digital twin of a tendon-driven soft arm out.
 
-Each verb tells its own options: `trunkline VERB --help`. `python -m trunkline` is the same command.
+Each verb describes its own options: `trunkline VERB --help`. `python -m trunkline` is the same.
 """
 
 import sys
@@ -8,12 +8,12 @@ from importlib import import_module
 from typing import NamedTuple
 
 from trunkline.errors import InputError, in_one_line, nearest
-from trunkline.program import COMMAND, set_called
+from trunkline.program import COMMAND, program_name
 from trunkline.version import __version__
 
 
 class Verb(NamedTuple):
-    """module: whose `main` takes the verb's arguments. extra: of pyproject.toml, what it needs besides `pipeline`."""
+    """module: its `main` takes the verb's arguments. extra: of pyproject.toml, needed besides `pipeline`."""
 
     module: str
     line: str
@@ -21,25 +21,27 @@ class Verb(NamedTuple):
 
 
 VERBS = {
-    "inspect": Verb("trunkline.recordings.preparation.inspect", "what logs hold, and a session.yaml for them"),
-    "motive": Verb("trunkline.recordings.preparation.motive", "OptiTrack Motive's CSV exports as logs of a session"),
-    "describe": Verb("trunkline.tools.describe.__main__", "what an arm's description gives, in words and drawn"),
-    "check": Verb("trunkline.tools.preflight.__main__", "what a session will and will not tell, before hours of fits"),
+    "inspect": Verb("trunkline.recordings.preparation.inspect", "topics, bodies and gaps of logs, and a session.yaml"),
+    "import-motive": Verb("trunkline.recordings.preparation.motive", "logs from OptiTrack Motive's CSV exports"),
+    "describe": Verb("trunkline.tools.describe.__main__", "units, tendons and markers of an arm, with a drawing"),
+    "check": Verb("trunkline.tools.preflight.__main__", "what a session can identify, before hours of fits"),
     "suggest": Verb("trunkline.tools.design.__main__", "which experiments to record next"),
     "evaluate": Verb("trunkline.tools.evaluate.__main__", "how far a model is from a session, without a fit"),
     "report": Verb("trunkline.pipeline.report", "the certificate: one page on how far the twin can be trusted"),
-    "watch": Verb("trunkline.tools.monitor.__main__", "whether the arm has changed since it was identified"),
-    "fleet": Verb("trunkline.tools.batch.__main__", "several arms beside each other"),
-    "randomise": Verb(
-        "trunkline.tools.randomize.__main__", "what was identified, as domain randomisation for learning"
-    ),
+    "monitor": Verb("trunkline.tools.monitor.__main__", "whether the arm has changed since it was identified"),
+    "batch": Verb("trunkline.tools.batch.__main__", "the pipeline for several arms, and one table over all of them"),
+    "randomize": Verb("trunkline.tools.randomize.__main__", "domain randomization from the identified parameters"),
     "live": Verb("trunkline.ar.session.__main__", "a session in a browser or a headset", "live,hybrid,teleop"),
-    "demonstrations": Verb(
-        "trunkline.ar.dataset.__main__",
-        "what operators did in live sessions, as a dataset for LeRobot",
-        "live,teleop",
-    ),
+    "export-dataset": Verb("trunkline.ar.dataset.__main__", "live sessions as a dataset for LeRobot", "live,teleop"),
+    "worker": Verb("trunkline.compute.worker", "a worker for a Dask scheduler", "cluster"),
 }  # in the order in which a lab comes to them
+RENAMED = {
+    "motive": "import-motive",
+    "watch": "monitor",
+    "fleet": "batch",
+    "randomise": "randomize",
+    "demonstrations": "export-dataset",
+}  # names of before, for one release
 HELP = ("-h", "--help")
 
 
@@ -52,17 +54,19 @@ def overview() -> str:
 
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
-    told = sys.argv[1:] if arguments is None else arguments
-    if not told or told[0] in HELP:
+    words = sys.argv[1:] if arguments is None else arguments
+    if not words or words[0] in HELP:
         print(overview())
-        return 0 if told else 2
-    name, *rest = told
+        return 0 if words else 2
+    name, *rest = words
     if name == "--version":
         print(f"{COMMAND} {__version__}")
         return 0
+    if name in RENAMED:
+        name = _new_name(program_name(name), RENAMED[name])
     if name not in VERBS:
-        meant = nearest(name, list(VERBS)) or ", expected one of " + ", ".join(VERBS)
-        raise InputError(f"{COMMAND}: found {name!r}, no such verb{meant}")
+        suggestion = nearest(name, list(VERBS)) or ", expected one of " + ", ".join(VERBS)
+        raise InputError(f"{COMMAND}: found {name!r}, no such verb{suggestion}")
     verb = VERBS[name]
     try:
         module = import_module(verb.module)
@@ -70,10 +74,25 @@ def main(arguments: list[str] | None = None) -> int:
         if (error.name or "").partition(".")[0] == "trunkline":
             raise
         extras = ",".join(filter(None, ("pipeline", verb.extra)))
-        found = f"found no module {error.name!r}, expected what `pip install 'trunkline[{extras}]'` brings"
-        raise InputError(f"{COMMAND} {name}: {found}") from error
-    set_called(name)
+        missing = f"found no module {error.name!r}, expected what `pip install 'trunkline[{extras}]'` brings"
+        raise InputError(f"{program_name(name)}: {missing}") from error
     return module.main(rest)
+
+
+def inspect_by_old_name() -> int:
+    """The console script `trunkline-inspect`, for one release."""
+    return main([_new_name(f"{COMMAND}-inspect", "inspect"), *sys.argv[1:]])
+
+
+def import_motive_by_old_name() -> int:
+    """The console script `trunkline-motive`, for one release."""
+    return main([_new_name(f"{COMMAND}-motive", "import-motive"), *sys.argv[1:]])
+
+
+def _new_name(old: str, verb: str) -> str:
+    """`verb`, after a line on stderr about the old spelling of its command."""
+    print(f"{old} is now `{program_name(verb)}`; the old name goes with the next release", file=sys.stderr)
+    return verb
 
 
 if __name__ == "__main__":

@@ -47,9 +47,9 @@ def in_one_line(main: Callable[..., int]) -> Callable[..., int]:
     return command
 
 
-def nearest(found: str, valid: list[str]) -> str:
-    """ ", did you mean 'x'?" for the one of `valid` that is most like `found`; empty where none is."""
-    matches = difflib.get_close_matches(found, valid, n=1)
+def nearest(name: str, valid: list[str]) -> str:
+    """ ", did you mean 'x'?" for the one of `valid` that is most like `name`; empty where none is."""
+    matches = difflib.get_close_matches(name, valid, n=1)
     return f", did you mean {matches[0]!r}?" if matches else ""
 
 

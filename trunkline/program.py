@@ -1,16 +1,8 @@
-"""How a command was called, for the first line of its help."""
-
-import sys
+"""How the command is called, for the first line of help and messages."""
 
 COMMAND = "trunkline"
 
 
-def called(module: str) -> str:
-    """`trunkline VERB` where the command `trunkline` called, as `sys.argv[0]` says; else `python -m module`."""
-    told = sys.argv[0] if sys.argv else ""
-    return told if told.startswith(f"{COMMAND} ") else f"python -m {module}"
-
-
-def set_called(verb: str) -> None:
-    """For all of this process: the parsers of the verb ask `called`."""
-    sys.argv[0] = f"{COMMAND} {verb}"
+def program_name(verb: str) -> str:
+    """What a verb's help calls itself, however it was started."""
+    return f"{COMMAND} {verb}"

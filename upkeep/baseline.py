@@ -95,7 +95,7 @@ def linked(parent: str, commit: str, reason: str, worse: list[str], metrics: dic
 
 def root_hash(unchained: list[Renewal]) -> str:
     """What the first change of the chain follows."""
-    return digest([{"commit": one.commit, "reason": one.reason, "worse": one.worse} for one in unchained])
+    return digest([{"commit": change.commit, "reason": change.reason, "worse": change.worse} for change in unchained])
 
 
 def breaks(baseline: Baseline) -> list[str]:

@@ -30,25 +30,25 @@ from upkeep.provenance import stale
 
 def failures(limits: Limits, baseline: Baseline, folder: Path) -> list[str]:
     """One line per metric in `folder` that breaks its limit, naming stage and key; empty if all is well."""
-    found, never = [], unrun(limits, baseline, folder)
+    problems, never = [], unrun(limits, baseline, folder)
     for stage, rows in limits.items():
         if stage in never:
             continue
         try:
             metrics = read_metrics(folder, stage)
         except InputError as error:
-            found.append(f"{stage}: {error}")
+            problems.append(f"{stage}: {error}")
             continue
         for key, limit in rows.items():
             before = baseline.metrics.get(stage, {}).get(key)
             if before is None and limit.equals is None:
-                found.append(f'{stage}: {key}: no baseline, expected one (`make baseline REASON="..."`)')
-            found += [f"{stage}: {key}: {problem}" for problem in limit.problems(metrics, key, before)]
-    return found
+                problems.append(f'{stage}: {key}: no baseline, expected one (`make baseline REASON="..."`)')
+            problems += [f"{stage}: {key}: {problem}" for problem in limit.problems(metrics, key, before)]
+    return problems
 
 
 def main(root: Path = Path(".")) -> int:
-    count, stages, found = 0, 0, 0
+    count, stages, count_problems = 0, 0, 0
     for file in limit_files(root):
         try:
             limits, baseline = read_limits(file), read_baseline(baseline_file(file))
@@ -64,16 +64,16 @@ def main(root: Path = Path(".")) -> int:
         problems += company(baseline_file(file))
         for problem in problems:
             print(f"gate: FAIL {example}{problem}")
-        held = [rows for stage, rows in limits.items() if stage not in never]
-        count, stages = count + sum(map(len, held)), stages + len(held)
-        found += len(problems)
+        checked = [rows for stage, rows in limits.items() if stage not in never]
+        count, stages = count + sum(map(len, checked)), stages + len(checked)
+        count_problems += len(problems)
     for problem in stale(root):
         print(f"gate: FAIL {problem}")
-        found += 1
+        count_problems += 1
     if why := unchecked(root):
         print(f"gate: {why}: not checked whether the commits of baselines are in the history and have their values")
-    print(f"gate: {count} metrics in {stages} stages, {found} problems")
-    return 1 if found else 0
+    print(f"gate: {count} metrics in {stages} stages, {count_problems} problems")
+    return 1 if count_problems else 0
 
 
 if __name__ == "__main__":

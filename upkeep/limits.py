@@ -245,4 +245,4 @@ def _not_finite(value: Any, key: str) -> tuple[str, float] | None:
     if isinstance(value, float) and not math.isfinite(value):
         return key, value
     items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    return next((bad for part, held in items if (bad := _not_finite(held, f"{key}.{part}"))), None)
+    return next((bad for part, item in items if (bad := _not_finite(item, f"{key}.{part}"))), None)

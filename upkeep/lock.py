@@ -23,13 +23,13 @@ ABSENT = ("deleted", "not in cache")  # DVC's words for a file that a clone with
 def mismatches(root: Path) -> list[str]:
     """One line per way in which the lock files disagree with the working tree or with themselves."""
     with Repo(str(root)) as repo:
-        found = [*_unlocked(repo), *_changed(repo), *_inconsistent(repo)]
-    return [*found, *locked_otherwise(root), *installed_otherwise(root)]
+        lines = [*_unlocked(repo), *_changed(repo), *_inconsistent(repo)]
+    return [*lines, *locked_otherwise(root), *installed_otherwise(root)]
 
 
 def _unlocked(repo: Repo) -> list[str]:
     """Stages that never ran, or that gained a dependency or an output since."""
-    found = []
+    lines = []
     for stage in repo.index.stages:
         entries = [*stage.deps, *stage.outs]
         if _on_demand(stage) and not _has_results(stage):
@@ -37,8 +37,8 @@ def _unlocked(repo: Repo) -> list[str]:
         new = [str(_path(entry)) for entry in entries if not entry.hash_info]
         if new:
             what = "never ran" if len(new) == len(entries) else f"not in the lock file: {', '.join(new)}"
-            found.append(f"{stage.name}: {what}")
-    return found
+            lines.append(f"{stage.name}: {what}")
+    return lines
 
 
 def _changed(repo: Repo) -> list[str]:
@@ -49,21 +49,21 @@ def _changed(repo: Repo) -> list[str]:
     expected |= {folder for file in expected for folder in file.parents}
     expected |= {_path(out) for out in repo.index.outs if not out.use_cache}
     lagging = {stage.addressing: _has_results(stage) for stage in repo.index.stages if _on_demand(stage)}
-    found = []
+    lines = []
     for address, changes in repo.status().items():
         stage = address.rpartition(":")[2]
         for change in changes:
             if isinstance(change, str):  # "changed command"
-                found += [] if address in lagging else [f"{stage}: {change}"]
+                lines += [] if address in lagging else [f"{stage}: {change}"]
                 continue
-            found += [
+            lines += [
                 f"{stage}: {kind}: {name}: {state}"
                 for kind, states in change.items()
                 if address not in lagging or (lagging[address] and kind == "changed outs")
                 for name, state in states.items()
                 if state not in ABSENT or Path(name) in expected
             ]
-    return found
+    return lines
 
 
 def _inconsistent(repo: Repo) -> list[str]:

@@ -22,12 +22,12 @@ from trunkline.unity.package import MANIFEST as PACKED
 from trunkline.unity.package import read_tarball
 from upkeep.provenance import MANIFEST, SHOWN, package_of
 
-ROOMS = ("trunkline", "upkeep", "demo", "rehearsal", "studies", "benchmarks", "stages", "tests")
+ROOMS = ("trunkline", "upkeep", "demo", "rehearsal", "studies", "benchmarks", "qualification", "stages", "tests")
 
 # What surrounds every result (load, show, refuse, write) and never changes a number. Also of tests/pipeline.
 INERT = (
     "trunkline/compute/",  # where it runs: the same bits
-    *("trunkline/errors.py", "trunkline/startup_notice.py", "trunkline/settings.py"),
+    *("trunkline/errors.py", "trunkline/files.py", "trunkline/startup_notice.py", "trunkline/settings.py"),
     *("trunkline/report/figures/", "trunkline/pipeline/", "upkeep/"),
     *("demo/__init__.py", "rehearsal/__init__.py", "rehearsal/report.py", "studies/rows.py"),
 )
@@ -109,24 +109,24 @@ def code_of(root: Path, modules: Iterable[str], reads: Iterable[str] = ()) -> di
     folders: dict[str, list[Path]] = {}
     for file in with_neighbours(root, imported(root, starts)):
         folders.setdefault(_place(root, file).as_posix(), []).append(file)
-    found = {name: _digest(root, files) for name, files in folders.items()}
+    digests = {name: _digest(root, files) for name, files in folders.items()}
     others = {entry: _of_entry(root, entry) for entry in reads if not entry.endswith(".py")}
-    return found | {entry: digest for entry, digest in others.items() if digest}
+    return digests | {entry: digest for entry, digest in others.items() if digest}
 
 
 def imported(root: Path, starts: Iterable[str]) -> set[str]:
     """Files of `root` that `starts` import, directly or not, themselves included; without what is inert."""
-    found: set[str] = set()
+    reached: set[str] = set()
     todo = list(starts)
     while todo:
         name = todo.pop()
         inert = name.startswith(INERT) and name not in ACTIVE
-        if name in found or inert or not (root / name).is_file():
+        if name in reached or inert or not (root / name).is_file():
             continue
         modules, is_empty = _imports((root / name).read_text(encoding="utf-8"))
         if is_empty:
             continue
-        found.add(name)
+        reached.add(name)
         if name == "trunkline/model/arm/kinds.py":  # it imports every file beside it
             todo += [f"trunkline/model/arm/{file.name}" for file in (root / "trunkline/model/arm").glob("*.py")]
         for module in modules:
@@ -135,19 +135,19 @@ def imported(root: Path, starts: Iterable[str]) -> set[str]:
                 "/".join(parts) + ".py",
                 *("/".join([*parts[:n], "__init__.py"]) for n in range(1, len(parts) + 1)),
             ]
-    return found
+    return reached
 
 
 def with_neighbours(root: Path, files: Iterable[str]) -> list[Path]:
     """`files`, and what is no Python in their folders; of a file that lies in a room itself, what has its stem."""
-    found = {Path(file) for file in files}
-    places = {_place(root, file) for file in found if file.parts[0] in ROOMS}
+    paths = {Path(file) for file in files}
+    places = {_place(root, file) for file in paths if file.parts[0] in ROOMS}
     for place in {place.parent if place.suffix else place for place in places}:
         inside = len(place.parts) > 1
         inner = (root / place).rglob("*") if inside else (root / place).glob("*")
         others = [file.relative_to(root) for file in inner if file.is_file() and file.suffix not in {".py", *MADE}]
-        found |= {file for file in others if inside or file.with_suffix(".py") in found}
-    return sorted(found)
+        paths |= {file for file in others if inside or file.with_suffix(".py") in paths}
+    return sorted(paths)
 
 
 def _place(root: Path, file: Path) -> Path:
@@ -167,14 +167,14 @@ def _flat(entries: str | list) -> list[str]:
 @cache
 def _imports(text: str) -> tuple[list[str], bool]:
     """Modules of the checkout that a module's text imports anywhere in it; and whether it is a docstring alone."""
-    tree, found = ast.parse(text), []
+    tree, modules = ast.parse(text), []
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
-            found += [alias.name for alias in node.names]
+            modules += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            found += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+            modules += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
     is_empty = [type(node) for node in tree.body] == [ast.Expr]
-    return [module for module in found if module.partition(".")[0] in ROOMS], is_empty
+    return [module for module in modules if module.partition(".")[0] in ROOMS], is_empty
 
 
 def _file(root: Path, module: str) -> str:

@@ -10,6 +10,8 @@ from pathlib import Path
 
 from dvc.repo import Repo
 
+from trunkline.files import file_digest
+
 SHOWN = 12  # digits of a digest
 REHEARSAL = ("rehearsal/dvc.yaml", "rehearse")
 METRICS, MANIFEST = Path("artifacts/rehearse/metrics.json"), Path("artifacts/package_unity/manifest.json")
@@ -33,7 +35,7 @@ def changed_since(root: Path, file: str, name: str) -> list[str]:
 def package_of(root: Path) -> str:
     """Digest of the tree's package, as `unpacked.package_digest`, from the manifest that Git has; "none" without."""
     path = root / MANIFEST
-    return hashlib.sha256(path.read_bytes()).hexdigest()[:SHOWN] if path.is_file() else "none"
+    return file_digest(path)[:SHOWN] if path.is_file() else "none"
 
 
 def stale(root: Path) -> list[str]:
@@ -47,9 +49,9 @@ def stale(root: Path) -> list[str]:
         return []
     changed = changed_since(root, *REHEARSAL) if then[0] != now[0] else []
     changed += ["the package"] if then[1] != now[1] else []
-    told = f"of code {then[0] or 'that is not named'}, package {then[1] or 'that is not named'}"
+    then_words = f"of code {then[0] or 'that is not named'}, package {then[1] or 'that is not named'}"
     since = ", ".join(changed) or "what the lock file does not tell"
-    return [f"README: rehearsal: {told}; the tree has code {now[0]}, package {now[1]}; changed since: {since}"]
+    return [f"README: rehearsal: {then_words}; the tree has code {now[0]}, package {now[1]}; changed since: {since}"]
 
 
 def _parts(root: Path, file: str, name: str) -> dict[str, tuple]:
@@ -59,10 +61,10 @@ def _parts(root: Path, file: str, name: str) -> dict[str, tuple]:
         stage = repo.stage.load_one(str(root / file), name)
         apart = [Path(entry) for entry in (stage.meta or {}).get("apart", [])]
         written = {out.fs_path: out.hash_info.value for out in repo.index.outs}
-        found = {}
+        digests = {}
         for dep in stage.deps:
             path = Path(dep.fs_path).relative_to(repo.root_dir)
             if not any(path.is_relative_to(entry) for entry in apart):
                 now = dep.get_hash().value if dep.exists else written.get(dep.fs_path)
-                found[path.as_posix()] = (now, dep.hash_info.value if dep.hash_info else None)
-    return found
+                digests[path.as_posix()] = (now, dep.hash_info.value if dep.hash_info else None)
+    return digests

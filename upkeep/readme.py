@@ -1,5 +1,7 @@
 """`python -m upkeep.readme`: write the graph, all tables of results and the pictures anew.
 
+The README has the graph and the headline numbers; docs/report.md has the full tables.
+
 Generated blocks stand between `<!-- name -->` and `<!-- /name -->`.
 """
 
@@ -11,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise, zip_longest
 from pathlib import Path
+from textwrap import fill
 
 import networkx
 import pandas as pd
@@ -27,7 +30,7 @@ from trunkline.recordings.trials.splits import DECIDING, TEST
 from upkeep.baseline import baseline_file, read_baseline
 from upkeep.limits import Limit, lookup, metrics_folder, read_limits
 from upkeep.rehearsal_table import rehearsal_table, source_words
-from upkeep.results import block
+from upkeep.results import block, results_index
 from upkeep.truth_table import KINDS, STAGES, error_table, truth_table
 
 # where it is made, and where the READMEs show it: Git holds no pictures among the artifacts
@@ -40,16 +43,17 @@ PICTURES = {
     "examples/ftdcr/artifacts/score/errors.png": "examples/ftdcr/errors.png",
     "examples/pairs/artifacts/identify_stiffness/paths.png": "examples/pairs/paths.png",
 }
-EXAMPLES = ("asl_trunk",)  # folders of examples/ with releases, each a block of the README and of its own README
+EXAMPLES = ("asl_trunk",)  # folders of examples/ with releases, each a block of docs/report.md and of its own README
+RESULTS_PAGE = Path("docs/report.md")
 
 # E_internal of the paper's arm before and after identification, over 437 frames: its section "Parameter Identification"
 PAPER = {"cad": "89.8 mm (17 %)", "identified": "15.8 mm (3 %)"}
 MODELS = {
-    "null": "null model: mean rest shape",
+    "null": "baseline: mean rest shape",
     "cad": "CAD",
     "coarse": "coarse: one scalar each",
-    "smooth": "identified, its cables not rubbing",
-    "prompt": "identified, its winches without rate limit and backlash",
+    "smooth": "identified, without capstan friction",
+    "prompt": "identified, without the winches' rate limit and backlash",
     "identified": "identified",
     "noise_floor": "noise floor",
 }
@@ -78,33 +82,35 @@ RESULTS = {
             (Shown("mujoco_deviation_mm.median", "mm"),),
         ),
         (
-            "Friction's band, between where the tip stops once pulled and once let go: median / 95th percentile",
+            "Friction band, between where the tip stops after a pull and after a release: median / 95th percentile",
             (Shown("friction_band_mm.median", "mm"), Shown("friction_band_mm.p95", "mm")),
         ),
     ],
     "train_ik": [
         (
-            "The network's commands sent to the twin, without friction, tip error at rest: median / 95th percentile / "
-            "beyond 1 % of length and no doubt raised",
+            "The network's commands sent to the twin without friction, tip error at rest: median / 95th percentile / "
+            "targets missed by more than 1 % of length without a warning",
             as_sent("as_controls.frictionless", "as_controls.targets"),
         ),
         (
-            "… to the twin as it is, with friction, all at once",
+            "… to the twin with friction, sent at once",
             as_sent("as_controls.friction", "as_controls.friction.targets"),
         ),
-        ("… to the lab's own arm", as_sent("on_plant", "on_plant.targets")),
+        ("… to the simulated lab's arm", as_sent("on_plant", "on_plant.targets")),
     ],
     "reachability": [
         (
             "Rigid map: share of points on which inverse kinematics of the same Panda agrees",
             (Shown("rigid.accuracy"),),
         ),
-        ("Soft maps: smallest overlap under gravities between theirs", (Shown("soft.heldout_iou_min"),)),
+        (
+            "Soft maps: smallest overlap under gravity directions between the sampled ones",
+            (Shown("soft.heldout_iou_min"),),
+        ),
     ],
     "identify_control": [
         (
-            "Identified model with cables that do not rub, as the package's file has them, on `validate`: position / "
-            "tip error",
+            "Identified model without capstan friction, as in the package's file, on `validate`: position / tip error",
             (Shown("smooth.validate.e_position_mm", "mm"), Shown("smooth.validate.e_tip_mm", "mm")),
         ),
     ],
@@ -119,6 +125,11 @@ GOAL = {"e_internal": 0.2, "e_position": 0.6, "e_tip": 2.0}  # % of the arm's le
 
 
 BESIDE = ("cad", "null", "null_straight", "null_held", "noise_floor")  # an identified model
+
+
+def title(model: str) -> str:
+    """What a column of a model is called; metrics call the baselines null models."""
+    return LABELS[model].replace("null:", "baseline:")
 
 
 def pipeline_graph(root: Path) -> str:
@@ -145,7 +156,7 @@ def pipeline_graph(root: Path) -> str:
 def results_table(file: Path, results: Mapping[str, Sequence[tuple[str, Sequence[Shown]]]]) -> str:
     """The metrics in the working tree that `file` limits as a Markdown table, beside goals and the gate's bounds."""
     limits, baseline = read_limits(file), read_baseline(baseline_file(file))
-    lines = ["| measure | found | goal | `make gate` |", "|---|---:|---:|---:|"]
+    lines = ["| measure | value | goal | `make gate` |", "|---|---:|---:|---:|"]
     for stage, rows in results.items():
         metrics = _metrics(metrics_folder(file), stage)
         for what, figures in rows:
@@ -179,18 +190,15 @@ def identification_table(root: Path) -> str:
     metrics = _metrics(root, "identify_control")
     factors = lookup(_metrics(root, "identify_stiffness"), "per_joint_gain")
     lines = [
-        "| model | E_internal, identify | E_internal, validate | position / tip error, mm, identify "
-        "| position / tip error, mm, validate | E_internal, paper's arm |",
+        "| model | position / tip error, identify | position / tip error, validate "
+        "| E_internal, identify | E_internal, validate | E_internal, paper's arm |",
         "|---|---:|---:|---:|---:|---:|",
     ]
     for model, words in MODELS.items():
         if (model == "coarse" and not factors) or lookup(metrics, model) is None:
             continue
-        cells = []
-        for split in DECIDING:
-            millimetres, share = (lookup(metrics, f"{model}.{split}.e_internal_{unit}") for unit in ("mm", "pct"))
-            cells.append(f"{_number(millimetres)} mm ({_number(share)} %)")
-        cells += [_pair(metrics, f"{model}.{split}.", share=True) for split in DECIDING]
+        cells = [_pair(metrics, f"{model}.{split}.", share=True) for split in DECIDING]
+        cells += [_internal(metrics, f"{model}.{split}.") for split in DECIDING]
         lines.append(f"| {words} | {' | '.join(cells)} | {PAPER.get(model, '')} |")
     return "\n".join(lines)
 
@@ -229,17 +237,17 @@ def score_table(root: Path) -> str:
         *words, last = (KINDS[kind][0] for kind in KINDS if kind in scored)
         what = f"{', '.join(words)} and {last}" if words else last
         rows.append(f"| {what}, `{together}` | {' | '.join(_beside(lookup(metrics, together), f'{TEST}.'))} |")
-    goal = f"| goal | {GOAL['e_internal']:g} % | {GOAL['e_position']:g} / {GOAL['e_tip']:g} % |{' |' * len(BESIDE)}"
+    goal = f"| goal | {GOAL['e_position']:g} / {GOAL['e_tip']:g} % |{' |' * len(BESIDE)} {GOAL['e_internal']:g} % |"
     return "\n".join([*_head(f"trials of `{TEST}`"), goal, *rows])
 
 
-def rehearsal_block(root: Path, variants: bool) -> str:
-    """What the committed runs of the rehearsal came to, and of which code and package."""
+def rehearsal_block(root: Path) -> str:
+    """Results of the committed runs of the rehearsal, and their code and package."""
     metrics = _metrics(root, "rehearse")
     if metrics is None:
         return "(no runs are committed yet)"
     goals = read_limits(root / "tests" / "limits.yaml")["rehearse"]
-    table = rehearsal_table(metrics, goals, source_words(root, metrics), variants)
+    table = rehearsal_table(metrics, goals, source_words(root, metrics), variants=True)
     stated = preview_table(metrics.get("preview"), goals)
     return "\n\n".join([table, stated] if stated else [table])
 
@@ -249,8 +257,8 @@ def preview_table(preview: dict | None, goals: dict[str, Limit]) -> str:
     coverage = lookup(preview, "coverage.at_end")
     if not coverage:
         return ""
-    times = {"at_end": "at the end", "after_2s": "2 s later", "after_10s": "10 s later"}
-    lines = ["| what previews state | came true | goal |", "|---|---:|---:|"]
+    times = COVERAGE_TIMES
+    lines = ["| statement of the preview | came true | goal |", "|---|---:|---:|"]
     radius = f"{_number(lookup(preview, 'radius_mm.median'))} mm"
     counts = [[lookup(preview, f"coverage.{name}.{key}") for key in ("inside", "runs")] for name in times]
     inside = [f"{count} of {runs}" for count, runs in counts]
@@ -261,10 +269,10 @@ def preview_table(preview: dict | None, goals: dict[str, Limit]) -> str:
     lines.append(f"| {what} | {came} | {_joined(asked)} |")
     likelier, previews = lookup(preview, "agreed"), lookup(preview, "previews")
     goal = _goal(goals.get("preview.agreement"), lookup(preview, "agreement"))
-    lines.append(f"| grasp, hand-over: whether it holds | {likelier} of {previews} as the likelier | {goal} |")
+    lines.append(f"| grasp, hand-over: whether it holds | {likelier} of {previews} as predicted | {goal} |")
     path = lookup(preview, "path_pct_median")
     goal = _goal(goals.get("preview.path_pct_median"), path)
-    lines.append(f"| grasp, hand-over: where the tip goes | {_number(path)} % of length off, median | {goal} |")
+    lines.append(f"| grasp, hand-over: path of the tip | {_number(path)} % of length off, median | {goal} |")
     return "\n".join(lines)
 
 
@@ -274,7 +282,8 @@ def example_table(folder: Path, all_splits: bool = True) -> str:
     scored = lookup(_metrics(folder, "score"), "identify_damping")
     fitted = _metrics(folder, "identify_damping")
     head, line = _head("releases")
-    rows = [head + " repeatability | about each one's rest | late tip speed off by |", line + "---:|" * 3]
+    head += " repeatability, mm | about each trial's rest, mm | error of the late tip speed |"
+    rows = [head, line + "---:|" * 3]
     fits = [(split, fitted) for split in reversed(DECIDING)] if all_splits else []
     for split, metrics in ((TEST, scored), *fits):
         scatter = [_number(lookup(metrics, f"repeatability_mm.release.{key}_mm")) for key in ("mean", "tip")]
@@ -289,7 +298,7 @@ def example_table(folder: Path, all_splits: bool = True) -> str:
 
 
 PATHS = {"identified": "identified", "prompt": "identified, no backlash", "cad": "CAD",
-         "null": "null: mean shape", "null_straight": "null: straight arm"}  # fmt: skip
+         "null": "baseline: mean shape", "null_straight": "baseline: straight arm"}  # fmt: skip
 
 
 def path_table(folder: Path) -> str:
@@ -312,16 +321,16 @@ NETWORK = {
     "train_ik": [
         ("IK, tip of settled MuJoCo: median", "as_controls.frictionless.position_error_mm.median", "mm"),
         ("… 95th percentile", "as_controls.frictionless.position_error_mm.p95", "mm"),
-        ("… reachable poses that it calls doubtful", "as_controls.frictionless.doubted", ""),
+        ("… share of reachable poses with a warning", "as_controls.frictionless.doubted", ""),
         ("… sent at once, with the winches' backlash", "as_controls.friction.position_error_mm.median", "mm"),
         ("IK, samples held out: median", "position_error_mm.median", "mm"),
         ("… after 3 Gauss-Newton steps: median", "polished.position_error_mm.median", "mm"),
         ("… 95th percentile", "polished.position_error_mm.p95", "mm"),
     ],
     "reachability": [
-        ("Soft map: unseen tips that it calls reachable", "soft.heldout_reachable_min", ""),
-        ("… points 30 mm from every tip that it calls so", "soft.heldout_beyond_max", ""),
-        ("Hybrid map: points inside for which a pose was found", "hybrid.found_inside", ""),
+        ("Soft map: share of held-out tips that it calls reachable", "soft.heldout_reachable_min", ""),
+        ("… share of points 30 mm from every tip that it calls reachable", "soft.heldout_beyond_max", ""),
+        ("Hybrid map: share of points inside for which a pose was found", "hybrid.found_inside", ""),
     ],
 }
 
@@ -339,7 +348,8 @@ def log_table(folder: Path) -> str:
     """An example's trials of `test` by the log that they are pieces of: each model's mean position / tip error, mm."""
     file = folder / "artifacts" / "score" / "trials.csv"
     names = [LABELS[name] for name in ("identified", *BESIDE)]
-    lines = [f"| log: position / tip error, mm | trials | {' | '.join(names)} |", f"|---{'|---:' * (len(names) + 1)}|"]
+    shown = " | ".join(title(name) for name in ("identified", *BESIDE))
+    lines = [f"| log: position / tip error, mm | trials | {shown} |", f"|---{'|---:' * (len(names) + 1)}|"]
     if not file.is_file():
         return "\n".join(lines)
     rows = pd.read_csv(file)
@@ -352,19 +362,93 @@ def log_table(folder: Path) -> str:
 
 
 def other_arms(examples: Path) -> str:
-    """What became of the examples that are moved by motors, on trials of `test`: a line each."""
+    """Results of the examples that are moved by motors, on trials of `test`: a line each, for a page in docs/."""
     scored = [_metrics(examples / name, "score") for name in ("asl_motion", "ftdcr")]
     moved, paths = (lookup(metrics, "identify_stiffness") for metrics in scored)
-    found, share = (_number(lookup(moved, f"identified.{TEST}.e_position_{unit}")) for unit in ("mm", "pct"))
+    error, share = (_number(lookup(moved, f"identified.{TEST}.e_position_{unit}")) for unit in ("mm", "pct"))
     tip = _number(lookup(paths, f"identified.{TEST}.e_tip_centred_rms_mm"))
     nulls = lookup(moved, f"null.{TEST}.e_position_mm"), lookup(paths, f"null.{TEST}.e_tip_centred_rms_mm")
-    own, other = map(_number, nulls)
+    moved_null, paths_null = map(_number, nulls)
     return (
-        f"[Moved by its motors](examples/asl_motion), without and with a load: {found} mm ({share} %) on `{TEST}` "
-        f"(mean shape {own}).\n"
-        f"The [FTDCR](examples/ftdcr), nine tendons: tip {tip} mm RMS on `{TEST}` (its authors' simulator 9.38, "
-        f"mean shape {other})."
+        f"[Moved by its motors](../examples/asl_motion), without and with a load: {error} mm ({share} %) on `{TEST}` "
+        f"(mean shape {moved_null}).\n"
+        f"The [FTDCR](../examples/ftdcr), nine tendons: tip {tip} mm RMS on `{TEST}` (its authors' simulator 9.38, "
+        f"mean shape {paths_null})."
     )
+
+
+EXPERIMENT_NAMES = {"reach": "reach", "follow": "follow", "grasp": "grasp", "handle": "hand-over"}
+# keys of metrics of the rehearsal's coverage: when the tip was looked at
+COVERAGE_TIMES = {"at_end": "at the end", "after_2s": "2 s later", "after_10s": "10 s later"}
+
+
+def headline(root: Path) -> str:
+    """The README's few numbers, the bad ones beside the good ones; what misses a goal is bold."""
+    rehearsed = _metrics(root, "rehearse")
+    lines = ["| | calibrated twin | for comparison |", "|---|---|---|", *_held_out_rows(root), _command_row(root)]
+    lines += _rehearsal_rows(rehearsed, read_limits(root / "tests" / "limits.yaml").get("rehearse", {}))
+    if rehearsed:
+        lines += ["", fill(f"The last two rows: rehearsal {source_words(root, rehearsed)}.", 120)]
+    return "\n".join(lines)
+
+
+def _held_out_rows(root: Path) -> list[str]:
+    """Errors on trials of `test`, of the simulated lab's arm and of a real one."""
+    example = f"examples/{EXAMPLES[0]}"
+    arms = (
+        ("simulated lab", root, "identify_control", "releases, curls, pulls, motions"),
+        (f"[a real arm]({example})", root / example, "identify_damping", "releases"),
+    )
+    rows = []
+    for arm, folder, stage, kinds in arms:
+        metrics = lookup(_metrics(folder, "score"), stage)
+        trials = _number(lookup(metrics, f"identified.{TEST}.trials"))
+        errors = _pair(metrics, f"identified.{TEST}.", share=True)
+        others = "; ".join(f"{title(name)} {_pair(metrics, f'{name}.{TEST}.')} mm" for name in ("cad", "null"))
+        rows.append(f"| Shape / tip error, {arm}, {trials} held-out trials ({kinds}) | {errors} | {others} |")
+    return rows
+
+
+def _command_row(root: Path) -> str:
+    """Tip errors of the network's commands on the twin, and on the simulated lab's arm, where they are worse."""
+    metrics, cells = _metrics(root, "train_ik"), []
+    for at, targets in (("as_controls.frictionless", "as_controls.targets"), ("on_plant", "on_plant.targets")):
+        *errors, silent = as_sent(at, targets)
+        tip = " / ".join(_number(lookup(metrics, figure.key)) for figure in errors)
+        counts = f"{_number(lookup(metrics, silent.key))} of {_number(lookup(metrics, targets))}"
+        cells.append(f"{tip} mm; {counts} targets missed by more than 1 % of length without a warning")
+    what = "Tip error of the network's commands, median / 95th percentile"
+    return f"| {what} | on the twin, without friction: {cells[0]} | **on the simulated lab's arm: {cells[1]}** |"
+
+
+def _rehearsal_rows(metrics: dict | None, goals: Mapping[str, Limit]) -> list[str]:
+    """Success rates, and how often a stated radius held, beside their goals."""
+    rates, asked = [], []
+    for name, words in EXPERIMENT_NAMES.items():
+        rate, goal = lookup(metrics, f"{name}.rate"), goals.get(f"{name}.rate")
+        rates.append(_marked(f"{words} {_percent(rate)}", goal, rate))
+        asked += [f"{words} ≥ {_percent(goal.asked)}"] if goal and goal.asked is not None else []
+    rows = [f"| Rehearsed experiments that succeed | {', '.join(rates)} | goal: {', '.join(asked)} |"]
+    counts, missed = [], []
+    for name, words in COVERAGE_TIMES.items():
+        inside, runs = (_number(lookup(metrics, f"preview.coverage.{name}.{key}")) for key in ("inside", "runs"))
+        share, goal = lookup(metrics, f"preview.coverage.{name}.share"), goals.get(f"preview.coverage.{name}.share")
+        counts.append(f"{words} {_marked(f'{inside} of {runs}', goal, share)}")
+        missed.append(_goal(goal, share))
+    off = _number(lookup(metrics, "preview.tip_error_radii.at_end.median"))
+    what = "Rehearsed reaches that end within the preview's 90 % radius"
+    rows.append(f"| {what} | {', '.join(counts)} | goal: {_joined(missed)}; the tip is {off} radii off, median |")
+    return rows
+
+
+def _marked(words: str, goal: Limit | None, value: float | None) -> str:
+    """`words`, bold where `value` misses its goal."""
+    missed = goal is not None and goal.asked is not None and value is not None and goal.misses(value, goal.asked)
+    return f"**{words}**" if missed else words
+
+
+def _percent(share: float | None) -> str:
+    return "–" if share is None else f"{100 * share:.1f} %".replace(".0 %", " %")
 
 
 def _metrics(root: Path, stage: str) -> dict | None:
@@ -374,26 +458,32 @@ def _metrics(root: Path, stage: str) -> dict | None:
 
 def _head(what: str) -> list[str]:
     """The head of a table whose rows are of `_beside`."""
-    cells = [f"{what}: position / tip error, mm", "E_internal", *(LABELS[name] for name in ("identified", *BESIDE))]
+    cells = [f"{what}: position / tip error", f"{title('identified')}, % of length (mm)"]
+    cells += [*(f"{title(name)}, mm" for name in BESIDE), "E_internal"]
     return [f"| {' | '.join(cells)} |", f"|---|{'---:|' * (len(cells) - 1)}"]
 
 
 def _beside(metrics: dict | None, at: str) -> list[str]:
-    """E_internal, then position / tip error of the identified model, of CAD, null models and the noise floor."""
-    internal = [_number(lookup(metrics, f"identified.{at}e_internal_{unit}")) for unit in ("mm", "pct")]
-    found = [f"{internal[0]} ({internal[1]} %)", _pair(metrics, f"identified.{at}", share=True)]
-    return found + [_pair(metrics, f"{name}.{at}") for name in BESIDE]
+    """Position / tip error of the identified model, of CAD, baselines and the noise floor, then E_internal."""
+    pairs = [_pair(metrics, f"{name}.{at}") for name in BESIDE]
+    return [_pair(metrics, f"identified.{at}", share=True), *pairs, _internal(metrics, f"identified.{at}")]
+
+
+def _internal(metrics: dict | None, at: str) -> str:
+    """E_internal in mm and % of the arm's length."""
+    millimeters, share = (_number(lookup(metrics, f"{at}e_internal_{unit}")) for unit in ("mm", "pct"))
+    return f"{millimeters} mm ({share} %)"
 
 
 def _pair(metrics: dict | None, at: str, share: bool = False) -> str:
-    """Position / tip error in mm; with `share` in % of the arm's length too."""
+    """Position / tip error in mm; with `share` in % of the arm's length first."""
     if lookup(metrics, f"{at}e_position_mm") is None:
         return "–"
-    pairs = [
-        " / ".join(_number(lookup(metrics, f"{at}{error}_{unit}")) for error in ("e_position", "e_tip"))
+    pairs = {
+        unit: " / ".join(_number(lookup(metrics, f"{at}{error}_{unit}")) for error in ("e_position", "e_tip"))
         for unit in ("mm", "pct")
-    ]
-    return f"{pairs[0]} ({pairs[1]} %)" if share else pairs[0]
+    }
+    return f"{pairs['pct']} % ({pairs['mm']} mm)" if share else pairs["mm"]
 
 
 def _goal(limit: Limit | None, value: float | None) -> str:
@@ -435,16 +525,12 @@ def with_blocks(text: str, blocks: dict[str, str]) -> str:
 
 
 def generate(root: Path) -> dict[Path, str]:
-    """README.md, the examples' own, the reference of sessions and the pages on results, with their generated blocks as
-    they should be."""
+    """README.md, the examples' own, the reference of sessions and the docs, with their generated blocks as they should
+    be."""
     examples = {name: example_table(root / "examples" / name) for name in EXAMPLES}
     examples |= {name: log_table(root / "examples" / name) for name in ("asl_motion", "pairs")}
-    results = results_table(root / "tests" / "limits.yaml", RESULTS)
-    own = {"pipeline": pipeline_graph(root), "identification": identification_table(root), "results": results}
-    own |= {"score": score_table(root), "rehearsal": rehearsal_block(root, variants=False)}
-    own |= {name: example_table(root / "examples" / name, all_splits=False) for name in EXAMPLES}
-    own["arms"] = other_arms(root / "examples")
-    blocks = {root / "README.md": own}
+    blocks: dict[Path, dict[str, str]] = {}
+    blocks[root / "README.md"] = {"pipeline": pipeline_graph(root), "headline": headline(root)}
     blocks[root / "data" / "raw" / "README.md"] = {"experiments": experiment_table()}
     blocks |= {root / "examples" / name / "README.md": {name: table} for name, table in examples.items()}
     ftdcr = root / "examples" / "ftdcr"
@@ -453,8 +539,14 @@ def generate(root: Path) -> dict[Path, str]:
         names = re.findall(r"^<!-- (results/\w+) -->$", page.read_text(encoding="utf-8"), re.MULTILINE)
         if names:
             blocks[page] = {name: block(root / "docs" / f"{name}.json") for name in names}
+    demo = {"identification": identification_table(root), "score": score_table(root)}
+    demo["results"] = results_table(root / "tests" / "limits.yaml", RESULTS)
+    demo |= {name: example_table(root / "examples" / name, all_splits=False) for name in EXAMPLES}
+    demo["arms"] = other_arms(root / "examples")
+    blocks.setdefault(root / RESULTS_PAGE, {}).update(demo)
     blocks.setdefault(root / "docs" / "identification.md", {})["parameters"] = parameter_table(root)
-    blocks.setdefault(root / "docs" / "rehearsal.md", {})["rehearsal"] = rehearsal_block(root, variants=True)
+    blocks.setdefault(root / "docs" / "rehearsal.md", {})["rehearsal"] = rehearsal_block(root)
+    blocks[root / "docs" / "results" / "README.md"] = {"kept_results": results_index(root)}
     truth = {"truth": truth_table(root), "errors": error_table(root)}
     blocks.setdefault(root / "docs" / "results" / "intervals.md", {}).update(truth)
     return {path: with_blocks(path.read_text(encoding="utf-8"), content) for path, content in blocks.items()}

@@ -24,15 +24,15 @@ def rehearsal_table(metrics: Mapping[str, Any], goals: Mapping[str, Limit], pack
         "| tip's distance: median / 95th percentile of runs, mm | failures |",
         "|---|---:|---:|---:|---:|---:|---|",
     ]
-    experiments = [name for name, told in metrics.items() if isinstance(told, Mapping)]  # the others: of which package
+    experiments = [name for name, row in metrics.items() if isinstance(row, Mapping)]  # the others: of which package
     for name in sorted(experiments, key=[*DISTANCES, *experiments].index):
-        told = metrics[name]
+        result = metrics[name]
         goal = goals.get(f"{name}.rate")
-        if "runs" in told:
-            lines.append(_row(name, name, told, _goal(goal, told["rate"])))
+        if "runs" in result:
+            lines.append(_row(name, name, result, _goal(goal, result["rate"])))
         if variants:
-            lines += [_row(name, f"… {kind}", row, "") for kind, row in told.get("objects", {}).items()]
-            lines += [_row(name, f"… {variant}", row, "") for variant, row in told.get("variants", {}).items()]
+            lines += [_row(name, f"… {kind}", row, "") for kind, row in result.get("objects", {}).items()]
+            lines += [_row(name, f"… {variant}", row, "") for variant, row in result.get("variants", {}).items()]
     return "\n".join(lines)
 
 
@@ -50,13 +50,13 @@ def _goal(limit: Limit | None, rate: float) -> str:
     return f"≥ {_percent(limit.asked)}{' (missed)' if limit.misses(rate, limit.asked) else ''}"
 
 
-def _row(experiment: str, words: str, told: Mapping[str, Any], goal: str) -> str:
-    distances = lookup(told, DISTANCES.get(experiment, ""))
+def _row(experiment: str, words: str, result: Mapping[str, Any], goal: str) -> str:
+    distances = lookup(result, DISTANCES.get(experiment, ""))
     error = " / ".join(f"{distances[key]:.0f}" for key in ("median", "p95")) if distances else ""
-    causes = sorted(told["causes"].items(), key=lambda cause: -cause[1])
+    causes = sorted(result["causes"].items(), key=lambda cause: -cause[1])
     failed = ", ".join(f"{kind} {count}" for kind, count in causes) or "none"
-    interval = f"{100 * told['low']:.1f} to {_percent(told['high'])}"
-    return f"| {words} | {told['runs']} | {_percent(told['rate'])} | {interval} | {goal} | {error} | {failed} |"
+    interval = f"{100 * result['low']:.1f} to {_percent(result['high'])}"
+    return f"| {words} | {result['runs']} | {_percent(result['rate'])} | {interval} | {goal} | {error} | {failed} |"
 
 
 def _percent(share: float) -> str:

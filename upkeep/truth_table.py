@@ -3,14 +3,16 @@
 import json
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from trunkline.identification.evaluation.error_tables import number
+from trunkline.identification.stages import STAGES
 from trunkline.recordings.trials.experiments import EXPERIMENTS, Kind
 from trunkline.recordings.trials.splits import TEST, VALIDATE
 
-STAGES = ("identify_stiffness", "identify_damping", "identify_control")
 TRUTH = Path("data/raw/demo.truth.json")
 
 
@@ -21,6 +23,7 @@ def judge(kind: Kind) -> str:
     return "identify_stiffness" if kind.static else "identify_damping"
 
 
+_number = partial(number, digits=4)
 # kind of experiment: what its trials are called, and the stage whose model is scored on them
 KINDS = {name: (kind.plural, judge(kind)) for name, kind in EXPERIMENTS.items()}
 # whose errors: of the identified model, and of what it stands beside
@@ -104,20 +107,20 @@ def truth_table(root: Path) -> str:
         cells = [f"`{name}`{unit}", _number(truth.get("parameters", {}).get(name)), _number(expected)]
         low, high = row.get("interval_95_given_model", (None, None))
         interval = "undetermined" if row["undetermined"] else f"{_number(low)} … {_number(high)}"
-        held = {True: "yes", False: "**no**", None: ""}[holds(row, expected)]
+        verdict = {True: "yes", False: "**no**", None: ""}[holds(row, expected)]
         effects = [effect for effect in LACKING.get(truth.get("plant", ""), ()) if name in effect.on]
         lacking = [words for effect in effects if (words := effect.lacking(truth, rows))]
-        cells += [_number(row["value"]), interval, held, ", ".join(lacking)]
+        cells += [_number(row["value"]), interval, verdict, ", ".join(lacking)]
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join([*lines, "", _factors(root, truth), *_unanswered(truth)])
 
 
 def identified(root: Path) -> dict[str, dict]:
     """The rows of all stages' parameters.json, by name; of a parameter that two stages identify, the later one."""
-    found = {}
+    rows = {}
     for stage in STAGES:
-        found |= _json(root / "artifacts" / stage / "parameters.json").get("parameters", {})
-    return found
+        rows |= _json(root / "artifacts" / stage / "parameters.json").get("parameters", {})
+    return rows
 
 
 def expectation(truth: dict, name: str) -> float | None:
@@ -140,10 +143,10 @@ def _factors(root: Path, truth: dict) -> str:
     real = truth.get("stiffness_factors")
     if not table or not real or "half_width_95_given_model" not in table:
         return "Factors of single joints: –"
-    found, real = np.array(table["factor"]), np.array(real)
+    factors, real = np.array(table["factor"]), np.array(real)
     halves = np.array([np.inf if half is None else half for half in table["half_width_95_given_model"]])
-    inside = int(np.sum(np.abs(found - real) <= halves))
-    correlation = np.corrcoef(found, real)[0, 1]
+    inside = int(np.sum(np.abs(factors - real) <= halves))
+    correlation = np.corrcoef(factors, real)[0, 1]
     return (
         f"Factors of single joints' stiffness: correlation with the lab's own scatter {correlation:.2f}; "
         f"{inside} of {len(real)}\nof their intervals hold it."
@@ -154,8 +157,8 @@ def _unanswered(truth: dict) -> list[str]:
     """What the lab has that no single parameter answers to, in a sentence."""
     if "branches" not in truth:
         return []
-    branches = ", ".join(f"{_number(one['ratio'])} for {_number(one['time_s'])} s" for one in truth["branches"])
-    sliders = ", ".join(f"{_number(one['ratio'])} up to {_number(one['bend_rad'])} rad" for one in truth["sliders"])
+    branches = ", ".join(f"{_number(row['ratio'])} for {_number(row['time_s'])} s" for row in truth["branches"])
+    sliders = ", ".join(f"{_number(row['ratio'])} up to {_number(row['bend_rad'])} rad" for row in truth["sliders"])
     return [
         f"The lab's Maxwell branches, over its springs: {branches}.\nIts sliders: {sliders}.\n"
         f"Its motors wind at most {_number(truth['rate_limit_m_s'])} m/s, with "
@@ -194,8 +197,8 @@ def _start_rows(root: Path, filtered: dict) -> list[str]:
         if late:
             cells = f"{np.mean(late):+.2f} ms | {max(late, key=abs):+.2f} ms | {len(late)} trials, all splits"
             rows.append(f"| detected start of a {kind}, late | {cells} |")
-    found = _json(root / "artifacts/ingest/metrics.json").get("clock_offset_ms")
-    error = None if found is None or "clock_offset_s" not in truth else abs(found + 1e3 * truth["clock_offset_s"])
+    offset = _json(root / "artifacts/ingest/metrics.json").get("clock_offset_ms")
+    error = None if offset is None or "clock_offset_s" not in truth else abs(offset + 1e3 * truth["clock_offset_s"])
     return [*rows, f"| clock of the motors against the cameras' | | {_number(error)} ms | the session |"]
 
 
@@ -214,7 +217,3 @@ def _at(table: dict, *keys: str) -> dict:
 
 def _json(path: Path) -> dict:
     return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
-
-
-def _number(value: float | None) -> str:
-    return "–" if value is None else f"{value:.4g}"

@@ -55,15 +55,15 @@ def installed_otherwise(root: Path) -> list[str]:
 
     A local part does not count: torch 2.13.0+cpu is torch 2.13.0.
     """
-    found = []
+    lines = []
     for name, expected in OmegaConf.load(root / FILE).items():
         try:
             installed = version(str(name)).partition("+")[0]
         except PackageNotFoundError:
             installed = "none"
         if installed != expected:
-            found.append(f"{name}: installed {installed}, {FILE} names {expected}")
-    return found
+            lines.append(f"{name}: installed {installed}, {FILE} names {expected}")
+    return lines
 
 
 @in_one_line

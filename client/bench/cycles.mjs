@@ -1,4 +1,4 @@
-// Full cycles in an emulated Quest 3 against a server that runs: benchmarks/headset_cycles.py starts this and answers.
+// Full cycles in an emulated Quest 3 against a server that runs: qualification/headset_cycles.py starts this and answers.
 //
 //   node cycles.mjs URL RUNS AT
 //

@@ -131,6 +131,7 @@ class Cousin:
                 rows = controls[:, start * stride : end * stride]
                 if len(rows[0]):
                     parts.append(move(batch, rows, ("qpos",), stride, at=stride - 1, moved=bar.update)["qpos"])
+        assert not batch.warning.any(), "the cousin's simulation diverged: its steps are too long"
         return np.concatenate(parts, axis=1)[:, :instants]
 
 

@@ -1,7 +1,7 @@
 """Rehearsed runs as logs of live sessions, for demonstrations: a simulated operator at the stand-in robot.
 
     python -m examples.demonstrations.rehearsed artifacts/package_unity/*.tgz --experiment reach --runs 5
-    python -m trunkline.ar.dataset rehearsed/*.mcap --out dataset
+    trunkline export-dataset rehearsed/*.mcap --out dataset
 
 A run is the rehearsal's own of that seed, to the last bit: it is only listened to.
 """

@@ -1,6 +1,6 @@
 """A batch of arms for learning, each drawn from what identification left open: how far apart are their tips?
 
-    python -m trunkline.tools.randomize artifacts --out randomisation.json
+    trunkline randomize artifacts --out randomisation.json
     python batch.py artifacts/identify_control/arm.xml randomisation.json [ARMS] [SECONDS]
 
 The first arm of the batch is the calibrated one. All are pulled by the same commands from the straight arm on.
@@ -15,11 +15,11 @@ import numpy as np
 
 from trunkline.model.simulation.motion import batch_of, hold, move
 from trunkline.tools.randomize.fields import drawn_fields
-from trunkline.tools.randomize.file import read_randomisation
+from trunkline.tools.randomize.file import read_randomization
 
 path, told = Path(sys.argv[1]), Path(sys.argv[2])
 count, seconds = int(sys.argv[3]) if len(sys.argv) > 3 else 64, float(sys.argv[4]) if len(sys.argv) > 4 else 2.0
-drawn, which = read_randomisation(told)
+drawn, which = read_randomization(told)
 assert hashlib.sha256(path.read_bytes()).hexdigest() == which["sha256"], f"{told} is of another model than {path}"
 model = mujoco.MjModel.from_xml_path(str(path))
 x = np.insert(drawn.draw(count - 1, np.random.default_rng(0)), 0, 0, axis=0)  # the first: the centre

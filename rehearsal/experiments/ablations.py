@@ -19,7 +19,7 @@ import mujoco
 from rehearsal.experiments.bench import Bench
 from rehearsal.experiments.lookup import lookup
 from trunkline.ar.hybrid.friction import TPU_ON
-from trunkline.ar.hybrid.posterior import Contact, Doubts
+from trunkline.ar.hybrid.posterior import Contact, Posterior
 from trunkline.errors import InputError
 from trunkline.model.arm.contact_geometry import read_geometry
 from trunkline.model.statics.chain import read_chain
@@ -29,7 +29,7 @@ from trunkline.pipeline.inputs import read_model, read_spec
 DRAWING = PROJECT / "artifacts/build_mjcf/arm.xml"
 NOWHERE = 5.0  # m; within it of its axis the arm has no bending plane: further than anything is
 SLIPPERY = 0.7  # of the friction that is believed
-SURE = Doubts(contact=Contact(0.0, (0.0, 0.0, 0.0), 0.0))  # of everything
+SURE = Posterior(contact=Contact(0.0, (0.0, 0.0, 0.0), 0.0))  # of everything
 
 Change = Callable[[Bench], Bench]
 
@@ -86,7 +86,7 @@ def _single(bench: Bench) -> Bench:
     """One future, with all as it is believed, of the plan and of each place that the assistant tries."""
     assert bench.known is not None
     one = replace(bench.previewing, futures=1, assistant=min(bench.previewing.assistant, 1))
-    return replace(bench, known=replace(bench.known, doubts=SURE), previewing=one)
+    return replace(bench, known=replace(bench.known, posterior=SURE), previewing=one)
 
 
 def _cad_grasp(bench: Bench, drawing: Path = DRAWING) -> Bench:

@@ -19,11 +19,11 @@ from rehearsal.robot.stand_in import StandIn, StandInRobot, Truth
 from rehearsal.session import REFERENCE, Place, Session, View
 from rehearsal.settings import Free
 from rehearsal.settings import previewing as read_previewing
-from trunkline.ar.preview.grasp_preview import Foresight
+from trunkline.ar.preview.grasp_preview import GraspPreviewer
 from trunkline.ar.preview.package import Package, read_package
-from trunkline.ar.preview.preview_twin import Believed, believed
+from trunkline.ar.preview.preview_twin import RobotModel, robot_model_of
 from trunkline.ar.preview.settings import Previewing
-from trunkline.ar.teleop.config import Config
+from trunkline.ar.teleop.config import TeleoperationConfig
 from trunkline.ar.teleop.messages import Box, World
 from trunkline.ar.teleop.rigid_ik import RigidIK
 from trunkline.ar.teleop.vectors import DOWN
@@ -43,13 +43,13 @@ class Bench:
     good. `known`, `previewing`: what grasps are previewed with; the package's arm and `previewing` by themselves."""
 
     package: Package
-    config: Config
+    config: TeleoperationConfig
     arm: Stranger
     stand_in: StandIn
     person: Person
     settings: Free
     judged: bool = True
-    known: Believed | None = None
+    known: RobotModel | None = None
     previewing: Previewing = field(default_factory=read_previewing)
 
     def place(self, rng: np.random.Generator) -> np.ndarray:
@@ -67,16 +67,16 @@ class Bench:
         return Operator(self.person, (left, right), offset, radius, band, rng, self.judged)
 
     @property
-    def foresight(self) -> Foresight | None:
+    def foresight(self) -> GraspPreviewer | None:
         """What plans are previewed with; None where nobody looks at a preview."""
         if not self.judged:
             return None
         assert self.known is not None
-        return Foresight(self.known, self.package.grips(self.config), self.previewing)
+        return GraspPreviewer(self.known, self.package.grips(self.config), self.previewing)
 
     def session(
         self, operator: Operator, thing: np.ndarray | None, seed: int, place: Place,
-        foresight: Foresight | None = None,
+        foresight: GraspPreviewer | None = None,
     ) -> Session:  # fmt: skip
         """The stand-in at its ready pose; a sphere hangs at `thing` (3,), m, or there is none."""
         s = self.settings
@@ -101,9 +101,9 @@ def bench_of(file: Path) -> Bench:
     arm = plant_of(load_config(Lab, "record", LAB))
     if not isinstance(arm, Stranger):
         raise InputError(f"{LAB}/params.yaml: record.plant: found another plant, expected stranger: the robot's arm")
-    config = load_folder(Config, PROJECT / "conf/teleop")
+    config = load_folder(TeleoperationConfig, PROJECT / "conf/teleop")
     package, previewing = read_package(file), read_previewing()
-    known = believed(previewing, package.files)
+    known = robot_model_of(previewing, package.files)
     return Bench(
         package, config, arm, settings.stand_in(), settings.person(), settings.free(), known=known,
         previewing=previewing,

@@ -1,7 +1,6 @@
 """What a run comes to, its rows in a table that is resumed, and rates with their intervals."""
 
 import csv
-import os
 from dataclasses import MISSING, asdict, dataclass, fields
 from pathlib import Path
 
@@ -9,6 +8,7 @@ import numpy as np
 
 from trunkline.ar.hybrid.rates import wilson
 from trunkline.errors import InputError
+from trunkline.files import written_whole
 
 LATER = {"at_end": 0.0, "after_2s": 2.0, "after_10s": 10.0}  # s after an execution's end that its tip is looked at
 
@@ -104,11 +104,9 @@ def as_row(result: Result) -> dict[str, str]:
 def rewrite_results(path: Path, results: list[Result]) -> None:
     """The table anew, whole or not at all, its rows in the order of experiments as they first come, variant, seed."""
     order = list(dict.fromkeys(result.experiment for result in results))
-    partial = path.with_name(f".{path.name}.partial")
-    partial.unlink(missing_ok=True)
-    for result in sorted(results, key=lambda one: (order.index(one.experiment), one.variant, one.seed)):
-        append_result(partial, result)
-    os.replace(partial, path)
+    with written_whole(path) as part:
+        for result in sorted(results, key=lambda one: (order.index(one.experiment), one.variant, one.seed)):
+            append_result(part, result)
 
 
 def grouped(results: list[Result]) -> dict[tuple[str, str], list[Result]]:

@@ -8,6 +8,7 @@ from pydantic import Field
 from scipy.spatial.transform import Rotation
 
 from trunkline.ar.teleop.messages import Controller, Pose
+from trunkline.ar.teleop.minimum_jerk import minimum_jerk
 from trunkline.frames import STANDARD_GRAVITY, rotation_from_wxyz, wxyz_from_rotation
 
 AXES = 3  # of the tremor: two turns of the ray and one about it
@@ -37,10 +38,9 @@ class Person:
     patience: Annotated[int, Field(ge=1, le=100)]
 
 
-def minimum_jerk(share: float) -> float:
-    """From 0 to 1 as hands move (T. Flash, N. Hogan, J. Neurosci. 5 (1985) 1688-1703)."""
-    s = min(max(share, 0.0), 1.0)
-    return s**3 * (10 - 15 * s + 6 * s**2)
+def as_hands_move(share: float) -> float:
+    """From 0 to 1, before and after which it stays."""
+    return minimum_jerk(min(max(share, 0.0), 1.0))
 
 
 class RayHand:
@@ -90,11 +90,11 @@ class RayHand:
 
     def wished(self, now: float) -> np.ndarray:
         """Where the ray's end shall be now, (3,), m, without error and tremor."""
-        return self.start + minimum_jerk((now - self.begun) / self.lasting) * (self.goal - self.start)
+        return self.start + as_hands_move((now - self.begun) / self.lasting) * (self.goal - self.start)
 
     def missed(self, now: float) -> np.ndarray:
         """By how much the aim is off now, across the ray, twice, and along it, (3,), m."""
-        share = minimum_jerk((now - self.begun) / self.lasting)
+        share = as_hands_move((now - self.begun) / self.lasting)
         return self.last_error + share * (self.error - self.last_error)
 
     def press(self, name: str, now: float) -> None:

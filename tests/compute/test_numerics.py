@@ -41,8 +41,11 @@ def has_avx2() -> bool:
     return cpuinfo.is_file() and set(cpuinfo.read_text().split()) >= NEEDED
 
 
+ROOMS = ("stages", "demo", "studies", "benchmarks", "qualification", "rehearsal", "trunkline.ar.session")
+
+
 @pytest.mark.skipif(not has_avx2(), reason="this processor has no AVX2: its last digits are its own")
-@pytest.mark.parametrize("room", ["stages", "demo", "studies", "benchmarks", "rehearsal", "trunkline.ar.session"])
+@pytest.mark.parametrize("room", ROOMS)
 def test_digits_are_those_of_other_machines(room):
     clean = {name: value for name, value in os.environ.items() if name not in HELD}
     clean |= {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}

@@ -278,7 +278,7 @@ def _started(file: Path, *command: str) -> subprocess.Popen:
 
 
 def test_a_scheduler_that_goes_away_is_told_in_one_line(monkeypatch, tmp_path):
-    """A real one, with a worker as docs/cluster.md starts it; before the worker is there, that is told."""
+    """A real one, with a worker as docs/speed.md starts it; before the worker is there, that is told."""
     file = tmp_path / "scheduler.json"
     options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(file)]
     processes = [_started(file, "distributed.cli.dask_scheduler", *options)]

@@ -152,7 +152,7 @@ def test_the_first_start_goes_to_its_own_minimum_and_the_others_leave_plateaus_a
     """The first is the best that is known; where it ends is an answer, also on a plateau."""
     hasty = []
 
-    def ends(problem, start, iterations, tolerance, report, hurried):
+    def ends(problem, start, iterations, tolerance, report, hurried, _):
         hasty.append(hurried)
         return [descend(problem, start, iterations, tolerance, report)]
 

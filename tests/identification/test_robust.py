@@ -15,7 +15,7 @@ from trunkline.identification.fit.optimizers import LeastSquares
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.robust import robust_loss, trial_weights, usual_losses
 from trunkline.identification.simulate.experiment import prepare
-from trunkline.identification.uncertainty.trial_diagnostics import suspicions
+from trunkline.identification.uncertainty.trial_diagnostics import moving_start, suspicions
 
 UNITS, FRAMES, LATE = 3, 40, 10
 METHOD = Method(
@@ -126,3 +126,12 @@ def test_a_trial_that_bends_the_arm_farther_may_be_farther_off():
     assert trial_weights(0.05**2 * bends, usual, 4.0).tolist() == [1, 1, 1, 1]
     assert usual[0] == usual[1] == pytest.approx(0.05**2 * 6.5e-4)
     assert trial_weights(np.full(4, 0.05**2 * 64e-4), usual, 4.0)[0] < 0.2
+
+
+def test_a_hand_that_swings_is_told():
+    """The start moves on from a hand that swings, so what is said of it is one of two."""
+    trial = replace(release(PLANT, 0.3, frames=30), start=10 / 120)
+    swayed = trial.positions + 0.2 * np.arange(30)[:, None, None] / 120 * [1, 0, 0]  # m, at 0.2 m/s
+    swayed = replace(trial, positions=swayed)
+    suspicion = moving_start(swayed, prepare(swayed, PLANT, 20))
+    assert any(words in suspicion for words in ("in motion", "when it is let go"))

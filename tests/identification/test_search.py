@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.support.matched_plant import release, segments_of, small_model
+from trunkline.identification.fit.identify import _search
 from trunkline.identification.fit.linearisation import linearise
 from trunkline.identification.fit.optimizers import DifferentialEvolution, LeastSquares
 from trunkline.identification.fit.problem import Bounds, Problem
@@ -126,6 +127,28 @@ class Capped:
 
     def start(self):
         return np.log([1.0, 10.0])
+
+    def effort(self):
+        return {}
+
+
+@pytest.mark.parametrize(
+    "optimizer",
+    [
+        LeastSquares(7, 2, 12, 1e-4),  # three descents all the same, and more from where a cap begins to matter
+        LeastSquares(7, 3, 12, 1e-4),
+        LeastSquares(0, 1, 1, 1e-4),  # ended by its limit
+        DifferentialEvolution(6, 2, 30, 1e-3),
+        DifferentialEvolution(6, 2, 3, 1e-9),
+    ],
+    ids=repr,
+)
+def test_a_search_never_counts_beyond_its_total_and_ends_there(optimizer, capsys, monkeypatch):
+    monkeypatch.setattr("trunkline.compute.progress.PLAIN_INTERVAL", 0.0)
+    _search(Capped(), optimizer, 3, "fit")
+    counts = [tuple(map(int, line.split()[1].split("/"))) for line in capsys.readouterr().out.splitlines()]
+    assert all(done <= total for done, total in counts)
+    assert counts[-1][0] == counts[-1][1] > 0
 
 
 def test_starts_on_a_plateau_leave_it_before_they_are_compared():

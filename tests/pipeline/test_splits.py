@@ -26,7 +26,7 @@ from trunkline.recordings.trials.splits import DECIDING, IDENTIFY, SPLITS, TEST,
 from trunkline.recordings.trials.trial import Trial, read_trials, write_trials
 
 ROOT = Path(__file__).parents[2]
-FOLDERS = ("trunkline", "stages", "studies", "benchmarks", "examples", "demo")
+FOLDERS = ("trunkline", "stages", "studies", "benchmarks", "qualification", "examples", "demo")
 READERS = {"filter", "identify_stiffness", "identify_damping", "identify_control", "score", "report"}  # of trials
 # who may name the split test, or all splits, and for what
 MAY_NAME = {
@@ -48,13 +48,7 @@ MAY_NAME = {
     "upkeep/truth_table.py": {"TEST"},  # shows it
 }
 # who says the same words of something else: the network's samples are split too; `identify` is also a function
-OTHERWISE = (
-    "trunkline/kinematics/dataset/",
-    "trunkline/kinematics/ik/",
-    "trunkline/report/figures/network.py",
-    "studies/training.py",
-)
-OTHERWISE += ("benchmarks/identification/sysid.py",)
+OTHERWISE = ("trunkline/kinematics/dataset/", "trunkline/kinematics/ik/", "trunkline/report/figures/network.py")
 
 
 def files() -> dict[str, ast.Module]:
@@ -86,7 +80,7 @@ def test_whoever_reads_trials_says_which_and_of_the_stages_only_score_says_test(
         for node in ast.walk(tree)
         if isinstance(node, ast.Call) and ast.unparse(node.func) in ("read_trials", "read_takes")
     ]
-    assert {(name, told) for name, told in calls if told != "DECIDING"} == {
+    assert {(name, splits) for name, splits in calls if splits != "DECIDING"} == {
         ("stages/filter.py", "SPLITS"),
         ("stages/score.py", "(IDENTIFY, TEST)"),
         ("trunkline/tools/evaluate/session.py", "SPLITS"),
@@ -163,7 +157,7 @@ def test_poison_in_the_split_test_moves_no_bit_of_the_other_filtered_trials(tmp_
     record(tmp_path / "raw", [*all_truths(), replace(static_truth(30.0), split=TEST)], instruments())
     limits = load_config(__import__("stages.ingest").ingest.Config, "ingest", ROOT).limits
     takes = [take for _, take, _ in take_in(tmp_path / "raw", read_session(tmp_path / "raw"), limits)]
-    found = []
+    results = []
     for shift in (0.0, 1e3):
         moved = [
             replace(take, positions=take.positions * (1 + shift) + shift) if take.split == TEST else take
@@ -172,10 +166,10 @@ def test_poison_in_the_split_test_moves_no_bit_of_the_other_filtered_trials(tmp_
         filter_stage.INGEST.mkdir(parents=True, exist_ok=True)
         write_takes(filter_stage.INGEST, moved)
         filter_stage.main(config)
-        found.append(read_trials(filter_stage.PROCESSED, DECIDING))
-    assert len(found[0]) == 4
-    for one, other in zip(*found, strict=True):
-        for key, value in vars(one).items():
+        results.append(read_trials(filter_stage.PROCESSED, DECIDING))
+    assert len(results[0]) == 4
+    for trial, other in zip(*results, strict=True):
+        for key, value in vars(trial).items():
             np.testing.assert_array_equal(value, getattr(other, key), err_msg=key)
 
 
@@ -219,9 +213,9 @@ def test_score_tells_the_right_model_from_a_wrong_one_and_from_none(scored):
 
 def test_errors_come_with_and_without_repaired_trials(scored):
     _, _, metrics = scored
-    found = metrics["identify_damping"]["identified"]["test"]
-    assert found["repaired"] == 1
-    assert found["without_repaired"]["e_position_mm"] == found["by_experiment"]["static_tilt"]["e_position_mm"]
+    scores = metrics["identify_damping"]["identified"]["test"]
+    assert scores["repaired"] == 1
+    assert scores["without_repaired"]["e_position_mm"] == scores["by_experiment"]["static_tilt"]["e_position_mm"]
     only = metrics["identify_stiffness"]["identified"]["test"]
     assert only["repaired"] == 0
     assert "without_repaired" not in only
@@ -229,8 +223,8 @@ def test_errors_come_with_and_without_repaired_trials(scored):
 
 def test_a_session_without_the_split_test_is_told_so(scored, capsys):
     root, config, _ = scored
-    kept = read_trials(root / "data/processed/filter", DECIDING)
-    write_trials(root / "data/processed/filter", kept)
+    retained = read_trials(root / "data/processed/filter", DECIDING)
+    write_trials(root / "data/processed/filter", retained)
     score_stage.main(config)
     assert "identify_stiffness: found no static_tilt with split test" in capsys.readouterr().out
     assert json.loads((root / "artifacts/score/metrics.json").read_text())["identify_stiffness"] == {}

@@ -12,7 +12,7 @@ import pytest
 from trunkline.compute.progress import progress
 from trunkline.compute.threads import thread_count
 from trunkline.errors import InputError
-from trunkline.pipeline.stage import output_folder, write_json
+from trunkline.pipeline.stage import output_folder, write_json, write_metrics
 from trunkline.report.figures.style import save_figure
 
 ROOT = Path(__file__).parents[2]
@@ -53,6 +53,35 @@ def run(tmp_path):
         return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
 
     return run
+
+
+@pytest.fixture
+def other_stage(tmp_path):
+    """A stage beside `fit`, with a mistake in its settings; it says when it is imported."""
+    (tmp_path / "dvc.yaml").write_text("stages: {fit: {cmd: x}, train: {cmd: x}}\n")
+    (tmp_path / "conf" / "train").mkdir(parents=True)
+    (tmp_path / "conf" / "train" / "config.yaml").write_text("{}\n")
+    (tmp_path / "stages").mkdir()
+    settings = "from trunkline.settings import settings\n\n\n@settings\nclass Config:\n    rate: float\n"
+    (tmp_path / "stages" / "train.py").write_text(f"print('train is imported')\n{settings}")
+    return "1\ntrain: {rtae: 1.0}"
+
+
+def test_a_stage_alone_imports_no_other(run, other_stage, monkeypatch):
+    monkeypatch.delenv("DVC_STAGE", raising=False)
+    done = run(other_stage)
+    assert done.returncode == 0, done.stderr
+    assert "train is imported" not in done.stdout
+
+
+def test_in_a_run_of_the_pipeline_the_settings_of_later_stages_are_checked_before_any_work(
+    run, other_stage, monkeypatch, tmp_path
+):
+    monkeypatch.setenv("DVC_STAGE", "fit")
+    done = run(other_stage)
+    assert done.returncode == 1
+    assert "params.yaml: train.rtae: unknown key, did you mean 'rate'" in done.stderr
+    assert not (tmp_path / "artifacts").exists()
 
 
 def test_a_stage_that_succeeds_writes_everything(run, tmp_path):
@@ -97,6 +126,12 @@ def test_json_is_sorted_rounded_and_free_of_numpy(tmp_path):
     assert json.loads((tmp_path / "a.json").read_text()) == {"a": [0, 1], "b": 0.3, "c": True, "d": None}
 
 
+def test_metrics_have_four_significant_digits_and_counts_have_all(tmp_path):
+    write_metrics(tmp_path, {"e_tip_mm": 13.14159, "small": 1.23456e-7, "frames": 123456, "by": {"kind": [0.99994]}})
+    written = {"e_tip_mm": 13.14, "small": 1.235e-7, "frames": 123456, "by": {"kind": [0.9999]}}
+    assert json.loads((tmp_path / "metrics.json").read_text()) == written
+
+
 @pytest.mark.parametrize("bad", [float("nan"), np.inf, np.array([1.0, np.nan])])
 def test_json_refuses_what_is_not_finite_by_name(tmp_path, bad):
     with pytest.raises(InputError, match=r"errors\.tip.*expected a finite number"):
@@ -134,6 +169,28 @@ def test_the_first_and_the_last_line_of_progress_come_once(capsys, monkeypatch):
         bar.update(1)
         bar.update(1)
     assert [line.split()[1] for line in capsys.readouterr().out.splitlines()] == ["0/2", "1/2", "2/2"]
+
+
+def test_a_total_that_changes_is_told_from_then_on(capsys, monkeypatch):
+    monkeypatch.setattr("trunkline.compute.progress.PLAIN_INTERVAL", 0.0)
+    with progress(2, "fit", "iterations") as bar:
+        bar.expect(1)
+        bar.update(1)
+        bar.update(1)
+        bar.expect(-1)
+    shown = [line.split("  ")[0] for line in capsys.readouterr().out.splitlines()]
+    assert shown == ["fit: 0/2 iterations (0 %)", "fit: 1/3 iterations (33 %)", "fit: 2/3 iterations (67 %)",
+                     "fit: 2/2 iterations (100 %)"]
+
+
+def test_on_a_terminal_a_total_that_changes_is_told_too(monkeypatch):
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+    with progress(0, "fit", "iterations") as bar:
+        bar.expect(3)
+        bar.update(2)
+        bar.expect(-1)
+        task = bar._bar.tasks[0]
+        assert (task.completed, task.total) == (2, 2)
 
 
 def test_without_a_terminal_progress_ends_in_a_plain_line(capsys):

@@ -34,8 +34,8 @@ def test_it_has_ten_steps_and_commands_in_each():
 
 def test_its_verbs_and_options_are_the_command_s(monkeypatch, tmp_path):
     """Parsed by the verbs' own parsers, which end there."""
-    asked = [words for words in words_of("trunkline") if words[0] not in (*HELP, "VERB")]
-    assert {words[0] for words in asked} >= {"inspect", "motive", "describe", "check", "report", "evaluate"}
+    commands = [words for words in words_of("trunkline") if words[0] not in (*HELP, "VERB")]
+    assert {words[0] for words in commands} >= {"inspect", "import-motive", "describe", "check", "report", "evaluate"}
     parse = argparse.ArgumentParser.parse_args
 
     class Parsed(Exception):
@@ -46,7 +46,7 @@ def test_its_verbs_and_options_are_the_command_s(monkeypatch, tmp_path):
         raise Parsed
 
     monkeypatch.setattr(argparse.ArgumentParser, "parse_args", parse_and_end)
-    for verb, *arguments in asked:
+    for verb, *arguments in commands:
         if ">" in arguments:
             arguments = arguments[: arguments.index(">")]
         with pytest.raises(Parsed):
@@ -106,8 +106,8 @@ def test_its_edits_of_the_session_make_three_splits_of_every_kind(tmp_path):
     for command in COMMANDS:
         if command.startswith("sed -i") and "session.yaml" in command:
             subprocess.run(shlex.split(command), cwd=tmp_path, check=True)
-    found: dict[str, set[str]] = {}
+    splits_of: dict[str, set[str]] = {}
     for trial in yaml.safe_load((tmp_path / "data/raw/mine/session.yaml").read_text())["trials"]:
-        found.setdefault(kinds[trial["file"].removesuffix(".mcap")], set()).add(trial["split"])
-    assert set(found) == {"tilt", "pull", "release", "curl", "motion"}
-    assert all(splits == {*DECIDING, TEST} for splits in found.values()), found
+        splits_of.setdefault(kinds[trial["file"].removesuffix(".mcap")], set()).add(trial["split"])
+    assert set(splits_of) == {"tilt", "pull", "release", "curl", "motion"}
+    assert all(splits == {*DECIDING, TEST} for splits in splits_of.values()), splits_of

@@ -14,9 +14,9 @@ from tests.rehearsal.arm import stranger
 from tests.support.bent_chain import hardening_stump, stump_spec
 from tests.support.operator import config
 from trunkline.ar.hybrid.friction import TPU_ON
-from trunkline.ar.hybrid.posterior import Contact, Doubts, draw
+from trunkline.ar.hybrid.posterior import Contact, Posterior, sample
 from trunkline.ar.preview.package import Package
-from trunkline.ar.preview.preview_twin import Believed
+from trunkline.ar.preview.preview_twin import RobotModel
 from trunkline.ar.teleop.alignment import Aligned, align, wrist_of
 from trunkline.ar.teleop.tendons import bend
 from trunkline.ar.teleop.vectors import DOWN
@@ -34,7 +34,7 @@ MODELS = ("statics", "cad")  # that need a package, and a drawing of the arm
 @pytest.fixture(scope="module")
 def bench() -> Bench:
     robot = PandaRobot("panda", 0.05, 0.8, 0.0, list(READY))
-    known = Believed(stump_spec(), Doubts(("kp",), np.ones(1), np.eye(1), Contact(FRICTION, PLACE, 0.1)), robot)
+    known = RobotModel(stump_spec(), Posterior(("kp",), np.ones(1), np.eye(1), Contact(FRICTION, PLACE, 0.1)), robot)
     return Bench(None, config(), stranger(), stand_in(), settings.person(), settings.free(), known=known)  # type: ignore[arg-type]
 
 
@@ -67,10 +67,10 @@ def test_a_variant_of_another_experiment_is_refused_with_those_there_are(bench, 
 
 def test_a_single_preview_is_of_what_is_believed(bench):
     found = varied(bench, "grasp", "single")
-    one = draw(found.known.doubts, found.known.arm.compile(), found.previewing.futures, 0)
+    one = sample(found.known.posterior, found.known.arm.compile(), found.previewing.futures, 0)
     assert (len(one), one.values) == (1, {})
     assert (one.friction[0], *one.offsets[0], one.turns[0]) == (1.0, 0.0, 0.0, 0.0, 0.0)
-    assert np.ptp(draw(bench.known.doubts, bench.known.arm.compile(), 8, 0).friction) > 0
+    assert np.ptp(sample(bench.known.posterior, bench.known.arm.compile(), 8, 0).friction) > 0
 
 
 def test_without_a_preview_no_grasp_is_foreseen(bench):
@@ -86,7 +86,7 @@ def test_the_drawings_arm_takes_the_identified_ones_place(bench, tmp_path):
     assert found.known.arm.compile().nv == found.package.model.nv == found.package.chain.units * 2 == 10
     assert found.package.geometry.units == 5
     assert found.known.robot == bench.known.robot
-    assert found.known.doubts == SURE
+    assert found.known.posterior == SURE
 
 
 def test_a_slippery_robot_is_so_by_what_is_believed(bench):

@@ -9,10 +9,10 @@ from scipy.spatial.transform import Rotation
 
 from rehearsal import settings
 from tests.ar.hybrid.conftest import hybrid_settings, rubbing_arm
-from trunkline.ar.hybrid.posterior import Doubts, nominal_draw
+from trunkline.ar.hybrid.posterior import Posterior, nominal_sample
 from trunkline.ar.hybrid.preview import joined
-from trunkline.ar.hybrid.rollouts import Way, futures
-from trunkline.ar.preview.preview_twin import Believed, compose_twin
+from trunkline.ar.hybrid.rollouts import CommandTrajectory, rollouts
+from trunkline.ar.preview.preview_twin import RobotModel, compose_twin
 from trunkline.ar.teleop.messages import Box, Thing, World
 from trunkline.kinematics.panda.kinematics import mount_pose
 from trunkline.kinematics.panda.mounts import PandaRobot
@@ -24,20 +24,20 @@ WORLD = World("w", (Box("floor", (-3, -3, -2), (3, 3, -0.75)), Box("stand", (0.4
 
 
 @pytest.fixture(scope="module")
-def known() -> Believed:
+def known() -> RobotModel:
     arm = rubbing_arm(spiral_chain(length=0.2, base_width=0.05, tip_width=0.02, units=6), 3)
     robot = hybrid_settings(robot="panda").robot
     assert isinstance(robot, PandaRobot)
-    return Believed(arm, Doubts(), robot)
+    return RobotModel(arm, Posterior(), robot)
 
 
-def composed(known: Believed, thing: Thing, lean: Rotation, left=None):
+def composed(known: RobotModel, thing: Thing, lean: Rotation, left=None):
     arm = known.arm.copy().compile()
     straight = arm.tendon_length0[arm.actuator_trnid[:, 0]]
     return compose_twin(known, WORLD, thing, READY, straight, settings.previewing(), lean, left), straight
 
 
-def tip_of(twin, known: Believed) -> np.ndarray:
+def tip_of(twin, known: RobotModel) -> np.ndarray:
     """In the frame of the mount without its lean, m."""
     data = mujoco.MjData(twin.model)
     data.qpos[:] = twin.start
@@ -63,8 +63,8 @@ def test_what_stands_stays_where_it_is_seen(known, high):
     turn = Rotation.from_euler("zx", [0.3, 0.005]).as_quat(scalar_first=True)
     thing = replace(BASKET, position=(x, y, BASKET.position[2] + high), quaternion=tuple(map(float, turn)))
     twin, straight = composed(known, thing, Rotation.identity())
-    way = Way(0.1, np.tile(READY, (6, 1)), np.tile(straight, (6, 1)))
-    motion = joined(list(futures(twin, way, nominal_draw())))
+    way = CommandTrajectory(0.1, np.tile(READY, (6, 1)), np.tile(straight, (6, 1)))
+    motion = joined(list(rollouts(twin, way, nominal_sample())))
     assert np.abs(motion.object[0, :, :3] - thing.position).max() < 1e-3
     upright = Rotation.from_quat(motion.object[0, -1, 3:], scalar_first=True).as_matrix()[2, 2]
     assert upright > 1 - 1e-5

@@ -5,8 +5,8 @@ from importlib import import_module
 
 import pytest
 
-from benchmarks.identification.case import STAGES
 from studies.choices import CHOICES, quick
+from studies.demo_session import STAGES
 from trunkline.identification.fit.optimizers import LeastSquares
 from trunkline.identification.fit.setup import fit_of
 from trunkline.pipeline.config import load_config

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from trunkline.ar.teleop.config import Config
+from trunkline.ar.teleop.config import TeleoperationConfig
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.messages import Box, Controller, Input, Pose, World
 from trunkline.ar.teleop.reach import Reading
@@ -24,8 +24,8 @@ REFERENCE = Pose(
 
 
 @cache
-def config() -> Config:
-    return load_folder(Config, PROJECT / "conf/teleop")
+def config() -> TeleoperationConfig:
+    return load_folder(TeleoperationConfig, PROJECT / "conf/teleop")
 
 
 class Everywhere:

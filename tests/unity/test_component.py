@@ -19,7 +19,7 @@ from tests.unity.test_start import files as arm_files
 from trunkline.unity.package import MANIFEST
 from trunkline.unity.plugin import Scene
 from trunkline.unity.proof import DOWN, PREFIX, manifest_of, scene_of, turns
-from trunkline.unity.start import Twin
+from trunkline.unity.start import TwinComponent
 from trunkline.unity.time_steps import steps_per_frame
 from trunkline.unity.twin import CSHARP
 
@@ -77,7 +77,7 @@ def without_component(files, prefixes) -> mujoco.MjModel:
     return scene.model
 
 
-def run(program: Path, files, folder: Path, happens, manifest: bytes | None = None, **told_too) -> list[list]:
+def run(program: Path, files, folder: Path, happens, manifest: bytes | None = None, **more_fields) -> list[list]:
     """What the component does where it is told: angles, activations, times (s), and what the console says."""
     models = {}
     for count, prefixes in ((1, [PREFIX]), (2, [PREFIX, "other_"])):
@@ -85,11 +85,11 @@ def run(program: Path, files, folder: Path, happens, manifest: bytes | None = No
         mujoco.mj_saveModel(model, str(folder / f"{count}.mjb"), None)
         models[str(folder / f"{count}.mjb")] = contents(model)
     (folder / "manifest.json").write_bytes(files[MANIFEST] if manifest is None else manifest)
-    one, two = models
-    told = [[{"one": one, "two": two}.get(word, word) if isinstance(word, str) else word for word in line]
+    first, second = models
+    lines = [[{"one": first, "two": second}.get(word, word) if isinstance(word, str) else word for word in line]
             for line in happens]  # fmt: skip
-    scene = {"manifest": str(folder / "manifest.json"), "models": models, "display_rate": RATE, "happens": told}
-    scene |= told_too | fields(without_component(files, [PREFIX]))
+    scene = {"manifest": str(folder / "manifest.json"), "models": models, "display_rate": RATE, "happens": lines}
+    scene |= more_fields | fields(without_component(files, [PREFIX]))
     (folder / "scene.json").write_text(json.dumps(scene))
     environment = os.environ | {"LD_LIBRARY_PATH": str(program.parent)}
     command = ["mono", str(program), str(folder / "scene.json")]
@@ -107,7 +107,7 @@ def name(files) -> str:
 def test_it_settles_the_arm_and_keeps_it_as_python_does(program, files, tmp_path, name):
     begin = [["arm", PREFIX, "one"], ["compile", "one"], ["tell"]]
     then = [["control", name, 0.02], ["step", 30], ["recreate", "one"], ["tell"], ["step", 30], ["tell"]]
-    found = run(program, files, tmp_path, begin + then)
+    results = run(program, files, tmp_path, begin + then)
     scene = scene_of(files, TURN, STEP)
     expected = []
     scene.start()
@@ -118,11 +118,11 @@ def test_it_settles_the_arm_and_keeps_it_as_python_does(program, files, tmp_path
     expected.append((scene.data.qpos.copy(), scene.data.act.copy()))
     scene.fixed_update(30)
     expected.append((scene.data.qpos.copy(), scene.data.act.copy()))
-    for (angles, activations, times, told), (qpos, act) in zip(found, expected, strict=True):
+    for (angles, activations, times, lines), (qpos, act) in zip(results, expected, strict=True):
         np.testing.assert_allclose(angles, qpos, atol=1e-9)
         np.testing.assert_allclose(activations, act, atol=1e-12)
         assert times.tolist() == pytest.approx([STEP, 2 / RATE])
-        assert told == []
+        assert lines == []
     assert np.abs(expected[0][0]).max() > 1e-4  # the rest is not the straight arm
     assert np.abs(expected[2][0] - expected[0][0]).max() > 1e-2
 
@@ -130,36 +130,36 @@ def test_it_settles_the_arm_and_keeps_it_as_python_does(program, files, tmp_path
 def test_another_arm_that_comes_disturbs_none(program, files, tmp_path, name):
     begin = [["arm", PREFIX, "one"], ["compile", "one"], ["control", name, 0.02], ["step", 30]]
     then = [["arm", "other_", "two"], ["recreate", "two"], ["step", 30], ["tell"]]
-    ((angles, activations, _, told),) = run(program, files, tmp_path, begin + then)
+    ((angles, activations, _, lines),) = run(program, files, tmp_path, begin + then)
     scene = scene_of(files, TURN, STEP)
     scene.start()
     scene.controls[name] = 0.02
     scene.fixed_update(30)
     scene.arms.append(replace(scene.arms[0], prefix="other_"))
-    scene.components.append(Twin(manifest_of(files), "other_"))
+    scene.components.append(TwinComponent(manifest_of(files), "other_"))
     scene.recreate()
     scene.fixed_update(30)
     np.testing.assert_allclose(angles, scene.data.qpos, atol=1e-9)
     np.testing.assert_allclose(activations, scene.data.act, atol=1e-12)
-    assert told == []
+    assert lines == []
 
 
 def test_commands_are_sent_as_pulls_and_bad_ones_are_one_line(program, files, tmp_path, name):
-    rest = [one.rest_length for one in manifest_of(files).actuators]
+    rest = [actuator.rest_length for actuator in manifest_of(files).actuators]
     commands = (np.array(rest) - [0.02, 0.0, -0.01]).tolist()
     begin = [["arm", PREFIX, "one"], ["compile", "one"], ["send", PREFIX, commands], ["step", 100], ["tell"]]
     bad = [["send", PREFIX, [None, *commands[1:]]], ["step", 1], ["send", PREFIX, [None, *commands[1:]]], ["tell"]]
-    held = [["control", name, None], ["step", 3], ["control", name, None], ["step", 3], ["tell"]]
+    not_finite = [["control", name, None], ["step", 3], ["control", name, None], ["step", 3], ["tell"]]
     short = [["send", PREFIX, commands[:2]], ["tell"]]
-    good, refused, stays, few = run(program, files, tmp_path, begin + bad + held + short)
+    good, refused, stays, few = run(program, files, tmp_path, begin + bad + not_finite + short)
     np.testing.assert_allclose(good[1], [0.02, 0.0, -0.01], atol=1e-4)  # the motors' lag is over
     assert good[3] == []
     assert refused[3] == [
         "error: Trunkline Twin: found the command NaN, expected finite numbers; the pulls stay as they are"
     ]
     (line,) = stays[3]
-    found = f"{name.removeprefix(PREFIX)}: found the control NaN, expected a finite number; it stays at 0.02 m"
-    assert line == f"error: Trunkline Twin: {found}"
+    problem = f"{name.removeprefix(PREFIX)}: found the control NaN, expected a finite number; it stays at 0.02 m"
+    assert line == f"error: Trunkline Twin: {problem}"
     np.testing.assert_allclose(stays[1], [0.02, 0.0, -0.01], atol=1e-4)
     assert few[3] == ["error: Trunkline Twin: found 2 commands, expected 3"]
 
@@ -169,8 +169,8 @@ def test_a_manifest_of_another_arm_is_one_line_and_the_arm_stands_still(program,
     other["model"]["names"]["joints"][0] = "elbow"
     other["model"]["names"]["joints"][1] = "wrist"
     happens = [["arm", PREFIX, "one"], ["compile", "one"], ["step", 100], ["recreate", "one"], ["tell"]]
-    ((angles, _, _, told),) = run(program, files, tmp_path, happens, json.dumps(other).encode())
-    assert told == [
+    ((angles, _, _, lines),) = run(program, files, tmp_path, happens, json.dumps(other).encode())
+    assert lines == [
         f"error: Trunkline Twin: found no joint elbow below {PREFIX}, and 1 more are missing, expected the arm of "
         "; it is held where it is"
     ]
@@ -179,8 +179,8 @@ def test_a_manifest_of_another_arm_is_one_line_and_the_arm_stands_still(program,
 
 @pytest.mark.parametrize("bad", [b"{}", b'{"model": {"longest_step": 0.004}}', b"not JSON"])
 def test_a_file_that_is_no_manifest_is_one_line(program, files, tmp_path, bad):
-    ((*_, told),) = run(program, files, tmp_path, [["arm", PREFIX, "one"], ["compile", "one"], ["tell"]], bad)
-    assert told == [
+    ((*_, lines),) = run(program, files, tmp_path, [["arm", PREFIX, "one"], ["compile", "one"], ["tell"]], bad)
+    assert lines == [
         "error: Trunkline Twin: found no Manifest File that says all of an arm, expected Runtime/manifest.json of this "
         "package"
     ]
@@ -189,9 +189,9 @@ def test_a_file_that_is_no_manifest_is_one_line(program, files, tmp_path, bad):
 def test_a_scene_that_is_only_written_is_left_alone(program, files, tmp_path):
     """`CreateScene(skipCompile: true)` raises the event without a model."""
     happens = [["arm", PREFIX, "one"], ["write"], ["compile", "one"], ["tell"]]
-    ((angles, _, _, told),) = run(program, files, tmp_path, happens)
+    ((angles, _, _, lines),) = run(program, files, tmp_path, happens)
     assert np.abs(angles).max() > 1e-4
-    assert told == []
+    assert lines == []
 
 
 SLOW, FAST, STEPS = 1 / 50, 1 / RATE, steps_per_frame(RATE)  # s, of a frame that simulates one of the display
@@ -202,23 +202,23 @@ def test_a_device_that_falls_behind_is_told_before_the_camera_until_it_keeps_up(
     first = [["frames", 60, SLOW, STEPS], ["look"], ["tell"]]  # a second and more: it may be a hitch
     then = [["frames", 60, SLOW, STEPS], ["look"], ["frames", 60, SLOW, STEPS], ["look"], ["tell"]]
     again = [["frames", 140, FAST, STEPS], ["look"], ["tell"]]  # a whole second at the display's rate, too
-    found = run(program, files, tmp_path, begin + first + then + again)
-    said = "found 56 % of real time simulated in steps of 3.7 ms, expected 100 %"
-    shown = f"shown: Trunkline: / {said}: / this device does not keep up, the arm moves too slowly at 1 m"
-    warned = f"warning: Trunkline: {said}: this device does not keep up, the arm moves too slowly"
-    assert [told for *_, told in found] == [["shown: "], [warned, shown, shown], ["shown: "]]
+    results = run(program, files, tmp_path, begin + first + then + again)
+    rate = "found 56 % of real time simulated in steps of 3.7 ms, expected 100 %"
+    shown = f"shown: Trunkline: / {rate}: / this device does not keep up, the arm moves too slowly at 1 m"
+    warned = f"warning: Trunkline: {rate}: this device does not keep up, the arm moves too slowly"
+    assert [lines for *_, lines in results] == [["shown: "], [warned, shown, shown], ["shown: "]]
 
 
 def test_a_component_that_is_switched_off_takes_its_warning_along(program, files, tmp_path):
     begin = [["arm", PREFIX, "one"], ["compile", "one"], ["camera"], ["frames", 120, SLOW, STEPS], ["look"]]
-    ((*_, told),) = run(program, files, tmp_path, [*begin, ["disable", PREFIX], ["look"], ["tell"]])
-    assert [len(line) > len("shown: ") for line in told] == [True, True, False]
+    ((*_, lines),) = run(program, files, tmp_path, [*begin, ["disable", PREFIX], ["look"], ["tell"]])
+    assert [len(line) > len("shown: ") for line in lines] == [True, True, False]
 
 
 def test_another_libmujoco_than_the_plug_in_s_is_one_line(program, files, tmp_path):
-    ((angles, _, _, told),) = run(
+    ((angles, _, _, lines),) = run(
         program, files, tmp_path, [["arm", PREFIX, "one"], ["compile", "one"], ["tell"]], header=3012000
     )
-    found = f"found libmujoco {mujoco.__version__}, expected 3.12.0, which org.mujoco is made for"
-    assert told == [f"error: Trunkline Twin: {found}"]
+    problem = f"found libmujoco {mujoco.__version__}, expected 3.12.0, which org.mujoco is made for"
+    assert lines == [f"error: Trunkline Twin: {problem}"]
     assert not angles.any()  # a model of other structures is not touched

@@ -1,4 +1,4 @@
-"""The examples of docs/consumers.md: each takes a package to its target, and the page shows them as they are."""
+"""The examples of docs/consumers.md: each takes a package to its target, and the page shows or links them."""
 
 import json
 import re
@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from onnx import TensorProto, helper
 
-from studies.reaching import EXAMPLES, reach, reach_by_ros
 from tests.support.folders import package
+from tests.support.reaching import EXAMPLES, reach, reach_by_ros
 from tests.support.small_arm import small_spec
 from tests.unity.test_twin import LABEL, ROBOT, TRAJECTORY, sources_in
 from trunkline.errors import InputError
@@ -124,9 +124,12 @@ def test_an_example_that_fails_is_one_line(small, tmp_path):
         reach("plain.py", tmp_path / "none.tgz", tmp_path)
 
 
-def test_the_page_shows_every_example_as_it_is():
-    shown = re.findall(r"```(?:python|js)\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-    assert sorted(shown) == sorted((EXAMPLES / name).read_text(encoding="utf-8") for name in FILES)
+def test_the_page_shows_an_example_as_it_is_and_links_all_others():
+    page = PAGE.read_text(encoding="utf-8")
+    shown = re.findall(r"```(?:python|js)\n(.*?)```", page, re.DOTALL)
+    files = {name: (EXAMPLES / name).read_text(encoding="utf-8") for name in FILES}
+    assert shown == [files["plain.py"]]
+    assert [name for name in files if name != "plain.py" and f"](../examples/consumers/{name})" not in page] == []
 
 
 @pytest.mark.parametrize("example", FILES)

@@ -72,12 +72,12 @@ def test_the_core_answers_the_shared_vectors_and_what_they_leave_out(program, fi
     (tmp_path / "more.json").write_text(json.dumps(more(files)).replace("NaN", "null"))
     done = run(program, files, tmp_path / "package", "--more", str(tmp_path / "more.json"))
     assert done.returncode == 0, done.stdout + done.stderr
-    told = {line.split()[0]: int(line.split()[1]) for line in done.stdout.splitlines()}
-    assert set(told) == {*CASES, "steps", "frames", "fit", "bend", "things", "reach", "refusals"}
+    counts = {line.split()[0]: int(line.split()[1]) for line in done.stdout.splitlines()}
+    assert set(counts) == {*CASES, "steps", "frames", "fit", "bend", "things", "reach", "refusals"}
     for name in CASES:
-        assert told[name] == len(json.loads(files[f"Tests/Vectors/{name}.json"])["cases"])
+        assert counts[name] == len(json.loads(files[f"Tests/Vectors/{name}.json"])["cases"])
     recorded = json.loads(files["Tests/Vectors/steps.json"])["sequences"]
-    assert told["steps"] == sum(len(one["steps"]) for one in recorded)
+    assert counts["steps"] == sum(len(sequence["steps"]) for sequence in recorded)
 
 
 @pytest.mark.parametrize("name", [*CASES, "steps"])
@@ -86,14 +86,14 @@ def test_a_vector_that_says_otherwise_is_named(program, plain, tmp_path, name):
     network's own answers are given to the core, which adds whether they are doubtful."""
     files = with_shared_vectors(plain, config().core)
     path = f"Tests/Vectors/{name}.json"
-    told = json.loads(files[path])
-    steps = told["sequences"][-1]["steps"] if name == "steps" else told["cases"]
-    answers = [one["intent" if name == "steps" else "answer"] for one in reversed(steps)]
+    document = json.loads(files[path])
+    steps = document["sequences"][-1]["steps"] if name == "steps" else document["cases"]
+    answers = [item["intent" if name == "steps" else "answer"] for item in reversed(steps)]
     if name == "network":
         answers[0]["doubtful"] = not answers[0]["doubtful"]
     else:
-        assert any(moved_a_little(one) for one in answers)
-    data = json.dumps(told).replace("NaN", "null").encode()
+        assert any(moved_a_little(item) for item in answers)
+    data = json.dumps(document).replace("NaN", "null").encode()
     done = run(program, rehashed(files | {path: data}), tmp_path)
     assert done.returncode == 1
     assert done.stdout.splitlines()[-1].startswith(f"error: {name}")
@@ -194,7 +194,7 @@ def more(files: dict[str, bytes]) -> dict[str, list]:
         "frames": [a_frame(rng) for _ in range(20)],
         "fit": [a_fit(rng, count) for count in (3, 3, 4, 6, 12) for _ in range(4)],
         "bend": bends(files, rng),
-        "things": [of_things(core, files, rng, held) for held in (False, True) for _ in range(8)],
+        "things": [of_things(core, files, rng, in_arm) for in_arm in (False, True) for _ in range(8)],
         "reach": reaches(files, rng),
         "refusals": refusals(files),
     }
@@ -208,7 +208,7 @@ def a_frame(rng: np.random.Generator) -> dict:
     """The spin is that of the turning frame in Unity's axes, by its rotations a moment apart."""
     position, spin, first = rng.normal(size=3), rng.normal(size=3), Rotation.random(random_state=int(rng.integers(99)))
     then = Rotation.from_rotvec(STEP * spin) * first
-    q, later = (unity_quaternion(wxyz_from_rotation(one)) for one in (first, then))
+    q, later = (unity_quaternion(wxyz_from_rotation(rotation)) for rotation in (first, then))
     turned = Rotation.from_quat(later) * Rotation.from_quat(q).inv()
     answer = {"position": unity_position(position).tolist(), "quaternion": q.tolist(),
               "spin": (turned.as_rotvec() / STEP).tolist()}  # fmt: skip
@@ -224,8 +224,8 @@ def a_fit(rng: np.random.Generator, count: int) -> dict:
     if count > 3:
         pose = fit(reference, robot)
     else:
-        found = Rotation.align_vectors(robot - robot.mean(axis=0), reference - reference.mean(axis=0))[0]
-        pose = pose_of(robot.mean(axis=0) - found.apply(reference.mean(axis=0)), found)
+        rotation = Rotation.align_vectors(robot - robot.mean(axis=0), reference - reference.mean(axis=0))[0]
+        pose = pose_of(robot.mean(axis=0) - rotation.apply(reference.mean(axis=0)), rotation)
     answer = {
         "pose": asdict(pose), "inverse": asdict(inverse(pose)), "after": asdict(after(pose, pose)),
         "residuals": residuals(pose, reference, robot).tolist(),
@@ -236,46 +236,46 @@ def a_fit(rng: np.random.Generator, count: int) -> dict:
 
 def bends(files: dict[str, bytes], rng: np.random.Generator) -> list[dict]:
     """Calls of `bend`, with what the network was asked and answered."""
-    known, found, asked = network_of(files), [], []
+    network, cases, asked = network_of(files), [], []
     described = json.loads(files[MANIFEST])
     lengths = [described["model"]["rest_lengths"][tendon] for tendon in described["network"]["output_order"]]
 
     def recording(poses: np.ndarray) -> dict[str, np.ndarray]:
-        asked[:] = [poses, known.ask(poses)]
+        asked[:] = [poses, network.ask(poses)]
         return asked[1]
 
     for number in range(BENDS):
         angle, azimuth = float(rng.uniform(0.1, 0.8)), 2 * math.pi / 3 * (number % 3)
         gravity = (math.sin(angle) * math.cos(azimuth), math.sin(angle) * math.sin(azimuth), -math.cos(angle))
         tip = tuple(rng.uniform([-0.3, -0.3, -0.5], [0.3, 0.3, 0.0]).tolist())
-        bent = bend(Network(recording, known.inputs), tip, gravity, tolerance=100.0)
+        bent = bend(Network(recording, network.inputs), tip, gravity, tolerance=100.0)
         poses, answers = asked
-        told = {name: answers[name].astype(float).ravel().tolist() for name in ("commands", "lengths", "tip")}
-        question = {"tip": tip, "gravity": gravity, "tolerance": 100.0, "poses": poses.tolist(), "network": told}
+        outputs = {name: answers[name].astype(float).ravel().tolist() for name in ("commands", "lengths", "tip")}
+        question = {"tip": tip, "gravity": gravity, "tolerance": 100.0, "poses": poses.tolist(), "network": outputs}
         pulls = [rest - command for rest, command in zip(lengths, bent.commands, strict=True)]
         answer = {name: values.tolist() for name, values in bent._asdict().items()}
-        found.append(case(question, answer | {"pulls": pulls}))
-    return found
+        cases.append(case(question, answer | {"pulls": pulls}))
+    return cases
 
 
 def reaches(files: dict[str, bytes], rng: np.random.Generator) -> list[dict]:
     """Tips around the arm under gravity from any side; Python looks at all triangles of the surface."""
-    reach, found = MapReach.from_arrays(maps_of(files)), []
+    reach, cases = MapReach.from_arrays(maps_of(files)), []
     for down in rng.normal(size=(REACHES, 3)):
         tip = tuple(rng.uniform([-0.4, -0.4, -0.6], [0.4, 0.4, 0.2]).tolist())
         gravity = tuple((down / np.linalg.norm(down)).tolist())
-        found.append(case({"tip": tip, "gravity": gravity}, reach.soft(tip, gravity)._asdict()))
-    return found
+        cases.append(case({"tip": tip, "gravity": gravity}, reach.soft(tip, gravity)._asdict()))
+    return cases
 
 
-def of_things(core, files: dict[str, bytes], rng: np.random.Generator, held: bool) -> dict:
+def of_things(core, files: dict[str, bytes], rng: np.random.Generator, in_arm: bool) -> dict:
     """Targets where a thing is near: one that hangs is marked, one that is held is brought along."""
     joints = tuple(float(angle) for angle in robot_of(files).ready)
     rigid, pointing, last = tuple(rng.uniform([0.3, -0.3, 0.3], [0.6, 0.3, 0.6]).tolist()), (0.0, 0.0, -1.0), None
     tip = add(rigid, tuple(rng.uniform([-0.2, -0.2, -0.4], [0.2, 0.2, -0.2]).tolist()))
     away = tuple(rng.uniform(-0.06, 0.06, 3).tolist())
     shapes = [("sphere", away), ("basket", add(away, (0.0, 0.0, -0.25)))]
-    support = "held" if held else "hanging"
+    support = "held" if in_arm else "hanging"
     things = tuple(
         Thing(shape, shape, 0.03, 0.1, 0.2, add(tip, off), tuple(Rotation.random(random_state=number).as_quat()),
               support, Basket(0.1, 0.2, 0.25))
@@ -284,24 +284,24 @@ def of_things(core, files: dict[str, bytes], rng: np.random.Generator, held: boo
     boxes = (Box("the shelf", add(tip, (-0.05,) * 3), add(tip, (0.0, 0.05, 0.05))),)
     world, last = World("world", boxes, things), Aligned(0.0, 0, 0.0)
     wrist = wrist_of(joints, core.mount_offset)
-    if held:
-        found = bring(things[0], rigid, pointing, False, wrist, 1, world, core.reach)
+    if in_arm:
+        result = bring(things[0], rigid, pointing, False, wrist, 1, world, core.reach)
     else:
-        found = place(rigid, tip, pointing, False, wrist, last, world, core.reach, core.settings)
+        result = place(rigid, tip, pointing, False, wrist, last, world, core.reach, core.settings)
     question = {"rigid": rigid, "tip": tip, "pointing": pointing, "joints": joints, "last": last._asdict(),
                 "boxes": [asdict(box) for box in boxes], "things": [asdict(thing) for thing in things]}  # fmt: skip
-    return case(question, TARGETS.dump_python(found, mode="json"))
+    return case(question, TARGETS.dump_python(result, mode="json"))
 
 
 def refusals(files: dict[str, bytes]) -> list[dict]:
     """What is no question, and what Python says to it."""
-    reach, known = MapReach.from_arrays(maps_of(files)), network_of(files)
+    reach, known_network = MapReach.from_arrays(maps_of(files)), network_of(files)
     flat = [[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 0.3, 0.0], [0.3, 0.3, 0.01], [0.1, 0.2, 0.0]]
     spread = [*flat[:3], [0.0, 0.0, 0.3], [0.2, 0.1, 0.2]]
-    told = [0.0] if known.inputs == len(TILT) else [0.0, 0.0, -1.0]
-    pose, down = [*told, 0.1, 0.0, -0.3, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0]
+    gravity_inputs = [0.0] if known_network.inputs == len(TILT) else [0.0, 0.0, -1.0]
+    pose, down = [*gravity_inputs, 0.1, 0.0, -0.3, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0]
     wrong = [pose[:-1], [*pose[:-1], NAN], [NAN, *pose[1:]], [*pose[:-4], 2.0, 0.0, 0.0, 0.0], [1e39, *pose[1:]]]
-    wrong += [[0.0, 0.5, -1.0, *pose[3:]]] if len(told) == 3 else []
+    wrong += [[0.0, 0.5, -1.0, *pose[3:]]] if len(gravity_inputs) == 3 else []
     calls = {
         "rigid_reach": [(reach.rigid, {"mount": [NAN, 0.0, 0.5], "pointing": down})],
         "soft_reach": [
@@ -309,35 +309,35 @@ def refusals(files: dict[str, bytes]) -> list[dict]:
             (reach.soft, {"tip": [0.0, 0.0, 0.0], "gravity": [NAN] * 3}),
         ],
         "fit": [
-            (lambda reference, base: fit(np.array(reference), np.array(base)), {"reference": one, "base": other})
-            for one, other in ((flat, flat), (spread, without(spread, 2)), (without(spread, 3), spread))
+            (lambda reference, base: fit(np.array(reference), np.array(base)), {"reference": item, "base": other})
+            for item, other in ((flat, flat), (spread, without(spread, 2)), (without(spread, 3), spread))
         ],
-        "network": [(lambda pose: known.ask(np.array([pose])), {"pose": one}) for one in wrong],
+        "network": [(lambda pose: known_network.ask(np.array([pose])), {"pose": item}) for item in wrong],
     }  # fmt: skip
-    found = [
+    cases = [
         case({"of": name} | question, {"says": said_by(partial(ask, **question))})
         for name, asked in calls.items()
         for ask, question in asked
     ]
     for touches, says in of_three(spread[:3]):
-        found.append(case({"of": "fit", "reference": spread[:3], "base": touches}, {"says": says}))
-    for inputs in {7, len(TILT), len(DIRECTION)} - {known.inputs}:
+        cases.append(case({"of": "fit", "reference": spread[:3], "base": touches}, {"says": says}))
+    for inputs in {7, len(TILT), len(DIRECTION)} - {known_network.inputs}:
         says = said_by(partial(network_of, files | {NETWORK: network(inputs=inputs)}))
-        found.append(case({"of": "other network", "inputs": inputs}, {"says": says}))
+        cases.append(case({"of": "other network", "inputs": inputs}, {"says": says}))
     tip, gravity = (NAN, 0.0, -0.3), (0.0, 0.0, -1.0)
-    found.append(case({"of": "bend", "tip": tip, "gravity": gravity, "tolerance": 1.0, "poses": [], "network": SILENT},
-                      {"says": said_by(lambda: bend(known, tip, gravity, 1.0))}))  # fmt: skip
-    for one in bends(files, np.random.default_rng(1))[:1]:
-        question = one["question"] | {"tolerance": 1e-6}
+    cases.append(case({"of": "bend", "tip": tip, "gravity": gravity, "tolerance": 1.0, "poses": [], "network": SILENT},
+                      {"says": said_by(lambda: bend(known_network, tip, gravity, 1.0))}))  # fmt: skip
+    for item in bends(files, np.random.default_rng(1))[:1]:
+        question = item["question"] | {"tolerance": 1e-6}
         tip, gravity = question["tip"], question["gravity"]
-        says = said_by(lambda tip=tip, gravity=gravity: bend(known, tip, gravity, 1e-6))
-        found.append(case({"of": "bend"} | question, {"says": says}))
-    if known.inputs == len(TILT):
+        says = said_by(lambda tip=tip, gravity=gravity: bend(known_network, tip, gravity, 1e-6))
+        cases.append(case({"of": "bend"} | question, {"says": says}))
+    if known_network.inputs == len(TILT):
         aside = (math.sin(0.6) * math.cos(0.5), math.sin(0.6) * math.sin(0.5), -math.cos(0.6))
         question |= {"gravity": aside}
-        says = said_by(lambda: bend(known, tip, aside, 1.0))
-        found.append(case({"of": "bend"} | question, {"says": says}))
-    return found
+        says = said_by(lambda: bend(known_network, tip, aside, 1.0))
+        cases.append(case({"of": "bend"} | question, {"says": says}))
+    return cases
 
 
 def without(touches: list[list[float]], index: int) -> list[list[float]]:
@@ -365,8 +365,8 @@ def said_by(call) -> str:
 
 def test_rotations_of_the_fits_are_those_of_the_base():
     """`a_fit`'s answers mean what they say: a pose takes a touch of the headset's frame into the base."""
-    found = a_fit(np.random.default_rng(3), 6)
-    pose = found["answer"]["pose"]
+    fitted = a_fit(np.random.default_rng(3), 6)
+    pose = fitted["answer"]["pose"]
     turn = rotation_from_wxyz(np.array(pose["quaternion"]))
-    moved = turn.apply(found["question"]["reference"]) + pose["position"]
-    np.testing.assert_allclose(moved, found["question"]["base"], atol=0.01)
+    moved = turn.apply(fitted["question"]["reference"]) + pose["position"]
+    np.testing.assert_allclose(moved, fitted["question"]["base"], atol=0.01)

@@ -44,9 +44,9 @@ def test_the_law_it_replaces_is_the_simulator_s():
 
 
 def test_a_linear_model_is_left_alone():
-    found = linearize(small_spec(), np.ones((2, 16)), np.ones((2, 16)))
-    assert found == Laws([], [], [])
-    assert not found
+    laws = linearize(small_spec(), np.ones((2, 16)), np.ones((2, 16)))
+    assert laws == Laws([], [], [])
+    assert not laws
 
 
 def test_springs_and_dampers_come_back_exactly():

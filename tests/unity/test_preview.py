@@ -12,19 +12,19 @@ from tests.ar.hybrid.conftest import rubbing_arm
 from tests.support.folders import package
 from tests.unity.test_twin import LABEL, PARAMETERS, ROBOT, sources  # noqa: F401
 from trunkline.ar.hybrid.compose import Placed, compose
-from trunkline.ar.hybrid.objects import Thing
-from trunkline.ar.hybrid.posterior import Contact, nominal_draw, read_doubts
+from trunkline.ar.hybrid.objects import GraspObject
+from trunkline.ar.hybrid.posterior import Contact, nominal_sample, read_posterior
 from trunkline.ar.hybrid.preview import Holding, joined, preview
-from trunkline.ar.hybrid.rollouts import Twin, Way, futures
-from trunkline.ar.hybrid.worlds import World
-from trunkline.ar.preview.contents import doubts_of
+from trunkline.ar.hybrid.rollouts import CommandTrajectory, ComposedTwin, rollouts
+from trunkline.ar.hybrid.worlds import WorldGeometry
+from trunkline.ar.preview.contents import posterior_of
 from trunkline.errors import InputError
+from trunkline.identification.stages import STAGES
 from trunkline.kinematics.panda.mounts import FixedMount
 from trunkline.model.arm.contact_geometry import read_geometry
 from trunkline.model.arm.spiral import spiral_chain
 from trunkline.model.elements import capstan_friction
 from trunkline.unity.package import CALIBRATED, MANIFEST, MODEL, write_tarball
-from trunkline.unity.sources import IDENTIFIED
 from trunkline.unity.twin import Trajectory, assemble
 from trunkline.unity.unpacked import arm_of, package_digest, read_package, robot_of
 
@@ -47,30 +47,30 @@ def files(sources, mjcf, tmp_path) -> dict[str, bytes]:  # noqa: F811
     return read_package(tmp_path / "twin.tgz")
 
 
-def way_of(arm: mujoco.MjModel, joints=(), seconds: float = SECONDS) -> Way:
+def way_of(arm: mujoco.MjModel, joints=(), seconds: float = SECONDS) -> CommandTrajectory:
     """Tendon 1 is drawn in, the others are paid out."""
     time = 0.01 * np.arange(round(seconds / 0.01) + 1)
     straight = arm.tendon_length0[arm.actuator_trnid[:, 0]]
     drawn = np.clip(time / 0.3, 0, 1)[:, None] * np.array([-PULL, PULL, PULL])
-    return Way(0.01, np.tile(np.array(joints, dtype=float), (len(time), 1)), straight + drawn, LET_GO)
+    return CommandTrajectory(0.01, np.tile(np.array(joints, dtype=float), (len(time), 1)), straight + drawn, LET_GO)
 
 
-def free(spec: mujoco.MjSpec) -> Twin:
-    return Twin(compose(spec, FixedMount("fixed")).compile(), spec.compile())
+def free(spec: mujoco.MjSpec) -> ComposedTwin:
+    return ComposedTwin(compose(spec, FixedMount("fixed")).compile(), spec.compile())
 
 
-def grasping(spec: mujoco.MjSpec) -> Twin:
+def grasping(spec: mujoco.MjSpec) -> ComposedTwin:
     """A cylinder that hangs beside the arm, two thirds down, until it is let go."""
     geometry = read_geometry(spec)
     x, z = 0.6 * geometry.widths[0] + 0.01, -0.7 * geometry.length
     level = (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0)
-    placed = Placed(Thing("cylinder", 0.03, 0.1, 0.02, "plastic"), np.array([x, 0.0, z]), level, True)
-    world = World(None, {}, [x, 0.0, z + 0.15])
-    return Twin(compose(spec, FixedMount("fixed"), world, placed).compile(), spec.compile())
+    placed = Placed(GraspObject("cylinder", 0.03, 0.1, 0.02, "plastic"), np.array([x, 0.0, z]), level, True)
+    world = WorldGeometry(None, {}, [x, 0.0, z + 0.15])
+    return ComposedTwin(compose(spec, FixedMount("fixed"), world, placed).compile(), spec.compile())
 
 
-def moved(twin: Twin) -> np.ndarray:
-    return joined(list(futures(twin, way_of(twin.arm), nominal_draw()))).qpos
+def moved(twin: ComposedTwin) -> np.ndarray:
+    return joined(list(rollouts(twin, way_of(twin.arm), nominal_sample()))).qpos
 
 
 @pytest.mark.parametrize("scene", [free, grasping])
@@ -93,32 +93,32 @@ def test_a_preview_needs_the_package_alone(files):
     arm, robot = arm_of(files), robot_of(files)
     assert capstan_friction(arm.compile()) > 0
     assert robot == ROBOT
-    twin = Twin(compose(arm, robot).compile(), arm.compile())
-    found = preview(twin, way_of(twin.arm, robot.ready, 0.3), doubts_of(files), Holding(0.1), count=3)
-    assert found.motion.sound.all()
-    assert found.spread[-1] > 1e-4
-    assert len(set(found.draws.values["kp"])) == 3
+    twin = ComposedTwin(compose(arm, robot).compile(), arm.compile())
+    result = preview(twin, way_of(twin.arm, robot.ready, 0.3), posterior_of(files), Holding(0.1), count=3)
+    assert result.motion.sound.all()
+    assert result.spread[-1] > 1e-4
+    assert len(set(result.samples.values["kp"])) == 3
 
 
 def test_doubts_of_the_package_are_those_of_the_stages(files, tmp_path):
     contact = Contact(friction=0.1)
-    for stage, found in PARAMETERS.items():
-        (tmp_path / f"{stage}.json").write_text(json.dumps(found))
-    expected = read_doubts([tmp_path / f"{stage}.json" for stage in IDENTIFIED], contact)
-    doubts = doubts_of(files, contact)
-    assert (doubts.names, doubts.contact) == (expected.names, contact)
-    np.testing.assert_array_equal(doubts.deviation, expected.deviation)
-    np.testing.assert_array_equal(doubts.correlation, expected.correlation)
-    assert doubts.names == ("stiffness", "kp", "damping")
+    for stage, table in PARAMETERS.items():
+        (tmp_path / f"{stage}.json").write_text(json.dumps(table))
+    expected = read_posterior([tmp_path / f"{stage}.json" for stage in STAGES], contact)
+    posterior = posterior_of(files, contact)
+    assert (posterior.names, posterior.contact) == (expected.names, contact)
+    np.testing.assert_array_equal(posterior.deviation, expected.deviation)
+    np.testing.assert_array_equal(posterior.correlation, expected.correlation)
+    assert posterior.names == ("stiffness", "kp", "damping")
     width = np.log(2200 / 1800) / 3.92  # the latest stage's
-    assert doubts.deviation[1] == pytest.approx(width, rel=1e-3)
+    assert posterior.deviation[1] == pytest.approx(width, rel=1e-3)
 
 
 def test_a_package_without_them_is_one_line(files):
     manifest = json.loads(files[MANIFEST])
     del manifest["hybrid"]
     old = files | {MANIFEST: json.dumps(manifest).encode()}
-    for read in (arm_of, doubts_of, robot_of):
+    for read in (arm_of, posterior_of, robot_of):
         with pytest.raises(InputError, match=r"manifest\.json: found no block hybrid, expected"):
             read(old)
 
@@ -139,7 +139,7 @@ def test_the_arm_of_the_package_that_was_built_moves_as_the_identified_one(built
 
 def test_a_preview_needs_the_package_that_was_built_alone(built):
     arm, robot = arm_of(built), robot_of(built)
-    twin = Twin(compose(arm, robot).compile(), arm.compile()).stepped(1 / 240)
-    found = preview(twin, way_of(twin.arm, robot.ready, 0.4), doubts_of(built), count=3)
-    assert found.motion.sound.all()
-    assert found.spread[-1] > 1e-4
+    twin = ComposedTwin(compose(arm, robot).compile(), arm.compile()).stepped(1 / 240)
+    result = preview(twin, way_of(twin.arm, robot.ready, 0.4), posterior_of(built), count=3)
+    assert result.motion.sound.all()
+    assert result.spread[-1] > 1e-4

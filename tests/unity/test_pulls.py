@@ -33,16 +33,16 @@ def forces(model: mujoco.MjModel, qpos, qvel, commands) -> np.ndarray:
 def test_a_pull_is_the_command_that_it_stands_for():
     calibrated, pulled = pair(small_spec())
     assert (takes_pulls(calibrated), takes_pulls(pulled)) == (False, True)
-    seen = []
+    all_forces = []
     for _ in range(20):
         qpos, qvel = RNG.uniform(-0.3, 0.3, calibrated.nq), RNG.normal(0, 1, calibrated.nv)
         commands = calibrated.tendon_length0 - RNG.uniform(-0.05, 0.05, 3)
         expected = forces(calibrated, qpos, qvel, commands)
         np.testing.assert_allclose(forces(pulled, qpos, qvel, commands), expected, atol=1e-9)
-        seen.append(expected)
-    assert np.min(seen) == -80  # saturated
-    assert np.max(seen) == 0  # slack
-    assert np.any((np.array(seen) < -1) & (np.array(seen) > -79))
+        all_forces.append(expected)
+    assert np.min(all_forces) == -80  # saturated
+    assert np.max(all_forces) == 0  # slack
+    assert np.any((np.array(all_forces) < -1) & (np.array(all_forces) > -79))
 
 
 def test_nothing_pulls_at_0_and_little_more_would():

@@ -76,9 +76,9 @@ def assert_agreement(network: bytes):
     expected = answers.pop("onnxruntime")
     assert [values.shape for values in expected] == [(2000, 3)] * 3
     assert min(np.ptp(values, axis=0).min() for values in expected) > 1e-3  # the inputs matter
-    for found in answers.values():
-        for one, other in zip(found, expected, strict=True):
-            np.testing.assert_allclose(one, other, rtol=0, atol=1e-6)
+    for values in answers.values():
+        for array, reference in zip(values, expected, strict=True):
+            np.testing.assert_allclose(array, reference, rtol=0, atol=1e-6)
 
 
 def test_all_engines_agree_on_a_network():
@@ -98,8 +98,8 @@ def test_an_engine_that_answers_otherwise_is_named(files, monkeypatch):  # noqa:
         return [values + np.float32(2e-6) for values in ENGINES["ONNX's reference"](data, asked)]
 
     monkeypatch.setattr(readers, "ENGINES", ENGINES | {"tract": off})
-    (said,) = refusals(files).values()
-    assert said.startswith("ValueError: onnxruntime and tract are ")
+    (reason,) = refusals(files).values()
+    assert reason.startswith("ValueError: onnxruntime and tract are ")
 
 
 def without_a_face(obj: bytes) -> bytes:
@@ -156,8 +156,8 @@ def test_a_file_that_is_wrong_is_refused(files, path, change):  # noqa: F811
 
 
 def test_a_mesh_elsewhere_than_its_grid_is_seen(files):  # noqa: F811
-    found = refusals(files | {OBJ: shifted(files[OBJ])})
-    assert "off its surface" in found[GRID]
+    reasons = refusals(files | {OBJ: shifted(files[OBJ])})
+    assert "off its surface" in reasons[GRID]
 
 
 def test_a_file_of_an_unknown_kind_is_no_readers(files):  # noqa: F811

@@ -137,8 +137,8 @@ SPEC_CASES = {
 
 @pytest.mark.parametrize("change", SPEC_CASES, ids=lambda change: change.__name__)
 def test_a_broken_rule_is_named(change):
-    found = {(violation.element, violation.rule) for violation in lint_mjcf(spec_with(change))}
-    assert found == {SPEC_CASES[change]}
+    broken = {(violation.element, violation.rule) for violation in lint_mjcf(spec_with(change))}
+    assert broken == {SPEC_CASES[change]}
 
 
 TEXT_CASES = {

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from tests.ar.teleop.test_bad_input import LINES
+from tests.ar.teleop.test_core_faults import LINES
 from tests.support.operator import config
 from tests.unity.test_twin import LABEL, TRAJECTORY, sources_in
 from trunkline.ar.conformance.answers import answers_of
@@ -50,8 +50,8 @@ def cases(files, name) -> list[tuple[dict, dict]]:
 def test_the_core_answers_the_recorded_inputs_byte_for_byte(files, recorded, answers):
     nan = lambda dt: math.nan if dt is None else dt  # noqa: E731
     sequences = {
-        one["name"]: [(nan(step["dt"]), from_json(Input, json.dumps(step["input"]))) for step in one["steps"]]
-        for one in recorded["sequences"]
+        sequence["name"]: [(nan(step["dt"]), from_json(Input, json.dumps(step["input"]))) for step in sequence["steps"]]
+        for sequence in recorded["sequences"]
     }
     assert len(sequences) == len(recorded["sequences"])
     assert recorded["package"] == answers.core.package
@@ -69,8 +69,8 @@ def test_another_core_answers_otherwise(files, recorded, answers):
     for change in ({"look_back": 0.3}, {"moved": 0.0001}, {"delay": 0.6}):
         other = answers_with(files, recorded, **change)
         sequences = {
-            one["name"]: [(step["dt"], from_json(Input, json.dumps(step["input"]))) for step in one["steps"]]
-            for one in recorded["sequences"] if None not in [step["dt"] for step in one["steps"]]
+            sequence["name"]: [(step["dt"], from_json(Input, json.dumps(step["input"]))) for step in sequence["steps"]]
+            for sequence in recorded["sequences"] if None not in [step["dt"] for step in sequence["steps"]]
         }  # fmt: skip
         assert (
             steps_file(other.core, sequences).partition(b"sequences")[2]
@@ -79,21 +79,23 @@ def test_another_core_answers_otherwise(files, recorded, answers):
 
 
 def test_every_mode_transition_and_fault_is_among_the_steps(recorded):
-    sequences = {one["name"]: [step["intent"] for step in one["steps"]] for one in recorded["sequences"]}
+    sequences = {sequence["name"]: [step["intent"] for step in sequence["steps"]] for sequence in recorded["sequences"]}
     for (mode, event), after in TRANSITIONS.items():
         modes = [intent["mode"] for intent in sequences[f"{mode}, {event}"]]
         assert modes[-1] == after
         assert (mode, after) in zip(modes, modes[1:], strict=False)
-    every = [intent for one in sequences.values() for intent in one]
+    every = [intent for sequence in sequences.values() for intent in sequence]
     assert {intent["mode"] for intent in every} == set(MODES)
-    said = {intent["notice"] for intent in every}
+    notices = {intent["notice"] for intent in every}
     for fault, line in LINES.items():  # but for how long a client was silent: steps are longer here
-        assert any(found.startswith(line.partition(" 0.")[0] if fault == "silent" else line) for found in said), fault
+        assert any(notice.startswith(line.partition(" 0.")[0] if fault == "silent" else line) for notice in notices), (
+            fault
+        )
     assert {intent["motion"] for intent in every} == {"hold", "execute", "follow"}
 
 
 def test_steps_have_targets_of_every_kind_of_reach_under_several_gravities(recorded):
-    (steps,) = (one["steps"] for one in recorded["sequences"] if one["name"] == "reach")
+    (steps,) = (sequence["steps"] for sequence in recorded["sequences"] if sequence["name"] == "reach")
     targets = [step["intent"]["targets"] for step in steps if step["intent"]["targets"]]
     assert {target["tip"]["reach"] for target in targets} >= {"inside", "outside", "blocked"}
     assert {target["rigid"]["reach"] for target in targets} >= {"inside", "unknown"}
@@ -104,9 +106,9 @@ def test_steps_have_targets_of_every_kind_of_reach_under_several_gravities(recor
 
 def test_look_ups_are_inside_outside_and_unknown_under_gravity_from_many_sides(files):
     for name in ("rigid_reach", "soft_reach"):
-        found = [answer["where"] for _, answer in cases(files, name)]
-        assert min(found.count("inside"), found.count("outside")) > 5
-        assert "unknown" in found
+        places = [answer["where"] for _, answer in cases(files, name)]
+        assert min(places.count("inside"), places.count("outside")) > 5
+        assert "unknown" in places
     gravities = {tuple(np.round(question["gravity"], 6)) for question, _ in cases(files, "soft_reach")}
     assert len(gravities) > 10
     reach = [answer[end]["reach"] for _, answer in cases(files, "targets") for end in ("rigid", "tip")]
@@ -115,11 +117,11 @@ def test_look_ups_are_inside_outside_and_unknown_under_gravity_from_many_sides(f
 
 def test_half_planes_change_late(files):
     """On the way around, one is kept at which the other asks for less, by no more than the hysteresis."""
-    found = [(question["last"], answer["aligned"]) for question, answer in cases(files, "alignment")]
-    kept = [abs(new["turned"]) > math.pi / 2 + 1e-6 for last, new in found if new["half_plane"] == last["half_plane"]]
-    assert any(kept)
-    assert {new["half_plane"] for _, new in found} == {0, 1}
-    assert max(abs(new["turned"]) for _, new in found) < math.pi  # the wrist's limits aside
+    turns = [(question["last"], answer["aligned"]) for question, answer in cases(files, "alignment")]
+    late = [abs(new["turned"]) > math.pi / 2 + 1e-6 for last, new in turns if new["half_plane"] == last["half_plane"]]
+    assert any(late)
+    assert {new["half_plane"] for _, new in turns} == {0, 1}
+    assert max(abs(new["turned"]) for _, new in turns) < math.pi  # the wrist's limits aside
 
 
 def test_the_network_s_answers_are_those_of_every_engine(files):
@@ -127,9 +129,9 @@ def test_the_network_s_answers_are_those_of_every_engine(files):
     poses = np.array([question["pose"] for question, _ in calls], dtype=np.float32)
     for answer in ENGINES.values():
         for name, values in zip(("commands", "lengths", "tip"), answer(files[NETWORK], poses), strict=True):
-            expected = [found[name] for _, found in calls]
+            expected = [outputs[name] for _, outputs in calls]
             np.testing.assert_allclose(values, expected, rtol=0, atol=2 * ENGINES_APART)
-    assert any(found["doubtful"] for _, found in calls)
+    assert any(outputs["doubtful"] for _, outputs in calls)
 
 
 def test_vectors_are_small_and_part_of_the_package(files):
@@ -141,9 +143,9 @@ def test_vectors_are_small_and_part_of_the_package(files):
 
 
 def test_the_same_package_has_the_same_vectors(plain):
-    one, other = (with_shared_vectors(plain, config().core) for _ in range(2))
-    assert one == other
-    assert with_shared_vectors(one, config().core) == one
+    first, second = (with_shared_vectors(plain, config().core) for _ in range(2))
+    assert first == second
+    assert with_shared_vectors(first, config().core) == first
 
 
 def test_an_arm_on_a_mount_that_stands_still_has_none(tmp_path):

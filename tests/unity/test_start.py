@@ -19,7 +19,7 @@ from trunkline.unity.linearize import Laws, write_laws
 from trunkline.unity.package import MODEL
 from trunkline.unity.plugin import Imported, Scene
 from trunkline.unity.proof import DOWN, PREFIX, TIP, at_rest, manifest_of, pull, scene_of, turns
-from trunkline.unity.start import Twin
+from trunkline.unity.start import TwinComponent
 from trunkline.unity.time_steps import steps_taken
 from trunkline.unity.twin import CSHARP, assemble
 from trunkline.unity.unpacked import model_of
@@ -44,7 +44,7 @@ def files(tmp_path_factory):
 
 
 def rest_of(files) -> np.ndarray:
-    return np.array([one.rest_length for one in manifest_of(files).actuators])
+    return np.array([actuator.rest_length for actuator in manifest_of(files).actuators])
 
 
 def off(scene: Scene, expected: np.ndarray) -> float:
@@ -81,7 +81,7 @@ def test_it_begins_where_the_pulls_that_are_set_hold_it(files):
     pulls = np.array([0.02, -0.02, -0.02])
     expected = at_rest(model_of(files), UPRIGHT, rest_of(files) - pulls)
     scene = scene_of(files, UPRIGHT, STEP)
-    names = [PREFIX + one.name for one in manifest_of(files).actuators]
+    names = [PREFIX + actuator.name for actuator in manifest_of(files).actuators]
     scene.controls = dict(zip(names, pulls.tolist(), strict=True))
     scene.start()
     scene.fixed_update(round(0.5 / STEP))
@@ -112,10 +112,10 @@ def test_a_scene_that_is_compiled_anew_goes_on(files):
 def test_the_plug_in_alone_forgets_activations(files):
     """As its source says; else there would be nothing to restore."""
     scene, undisturbed = swinging(files, alone=True), swinging(files, alone=True)
-    kept = scene.data.qpos.copy()
+    angles = scene.data.qpos.copy()
     scene.recreate()
     assert not scene.data.act.any()
-    np.testing.assert_array_equal(scene.data.qpos, kept)
+    np.testing.assert_array_equal(scene.data.qpos, angles)
     scene.fixed_update(20)
     undisturbed.fixed_update(20)
     assert off(scene, undisturbed.site(TIP)) > 1 * MM
@@ -124,7 +124,7 @@ def test_the_plug_in_alone_forgets_activations(files):
 def test_another_arm_that_comes_rests_and_the_first_goes_on(files):
     scene, undisturbed = swinging(files), swinging(files)
     scene.arms.append(Imported("other_", as_imported(files[MODEL].decode())))
-    scene.components.append(Twin(manifest_of(files), "other_"))
+    scene.components.append(TwinComponent(manifest_of(files), "other_"))
     scene.recreate()
     expected = at_rest(model_of(files), UPRIGHT, rest_of(files)) + [2.0, 0, 0]  # where the scene puts a second arm
     for _ in range(100):
@@ -193,14 +193,14 @@ def test_a_mount_that_is_turned_turns_gravity_and_carries_the_arm(files):
     turn, place = turns(np.radians([40.0]).tolist())[0], np.array([0.3, -0.2, 1.5])
     scene, still = scene_of(files, UPRIGHT, STEP), scene_of(files, UPRIGHT, STEP)
     scene.arms[0] = replace(scene.arms[0], mount="mount")
-    for one in (scene, still):
-        one.start()
-        assert off(one, at_rest(model_of(files), UPRIGHT, rest_of(files))) < 0.1 * MM
+    for instance in (scene, still):
+        instance.start()
+        assert off(instance, at_rest(model_of(files), UPRIGHT, rest_of(files))) < 0.1 * MM
     mocap = scene.model.body("mount").mocapid[0]
     scene.data.mocap_pos[mocap], scene.data.mocap_quat[mocap] = place, turn.as_quat()[[3, 0, 1, 2]]
     still.model.opt.gravity[:] = turn.inv().apply(still.model.opt.gravity)
-    for one in (scene, still):
-        one.fixed_update(100)
+    for instance in (scene, still):
+        instance.fixed_update(100)
     np.testing.assert_allclose(scene.site(TIP), place + turn.apply(still.site(TIP)), atol=1e-7)
     assert np.abs(still.data.qpos).max() > 0.01
 
@@ -216,8 +216,8 @@ def test_an_arm_below_a_mount_that_is_turned_starts_at_rest(files):
 
 def test_both_languages_settle_by_the_same_numbers():
     script = (CSHARP / "Twin.cs").read_text()
-    known = {name: float(value) for name, value in re.findall(r"private const \w+ _(\w+) = ([\d.e-]+);", script)}
-    found = [known[name] for name in ("still", "peaks", "longestRise", "mostSteps")]
-    assert found == [start.STILL, start.PEAKS, start.LONGEST_RISE, start.MOST_STEPS]
+    constants = {name: float(value) for name, value in re.findall(r"private const \w+ _(\w+) = ([\d.e-]+);", script)}
+    values = [constants[name] for name in ("still", "peaks", "longestRise", "mostSteps")]
+    assert values == [start.STILL, start.PEAKS, start.LONGEST_RISE, start.MOST_STEPS]
 
 

@@ -141,8 +141,8 @@ def test_the_same_inputs_give_the_same_bytes(sources, tmp_path):
 
 
 def test_every_file_and_folder_has_a_meta_with_its_own_lasting_guid(files, sources):
-    seen = {path for path in files if "~/" not in path}  # Unity ignores folders that end in ~
-    contents = {path for path in seen if not path.endswith(".meta")}
+    visible = {path for path in files if "~/" not in path}  # Unity ignores folders that end in ~
+    contents = {path for path in visible if not path.endswith(".meta")}
     folders = {str(folder) for path in contents for folder in Path(path).parents} - {"."}
     assert {path.removesuffix(".meta") for path in files if path.endswith(".meta")} == contents | folders
     guids = {
@@ -314,7 +314,7 @@ def test_the_component_for_unity_reads_what_the_manifest_holds(files):
     read = {name: set(re.findall(r"public [\w[\]]+ (\w+);", body)) for name, body in classes}
     blocks = {
         "Manifest": Manifest.model_fields, "Model": Model.model_fields, "Names": Names.model_fields,
-        "Actuator": schema.Actuator.model_fields, "Branch": schema.Branch.model_fields,
+        "Actuator": schema.Actuator.model_fields, "Branch": schema.BranchBlock.model_fields,
         "JointLaw": JointLaw.__dataclass_fields__, "TendonLaw": TendonLaw.__dataclass_fields__,
     }  # fmt: skip
     assert read.keys() == blocks.keys()
@@ -407,8 +407,8 @@ def project(tmp_path, sources) -> Path:
         (root / "artifacts" / stage / "metrics.json").write_text("{}")
     for stage in ("build_mjcf", "identify_control"):
         (root / "artifacts" / stage / "arm.xml").write_text(sources.mjcf)
-    for stage, found in sources.parameters.items():
-        (root / "artifacts" / stage / "parameters.json").write_text(json.dumps(found))
+    for stage, table in sources.parameters.items():
+        (root / "artifacts" / stage / "parameters.json").write_text(json.dumps(table))
     shutil.copy(sources.network, root / "artifacts/train_ik/ik.onnx")
     (root / "artifacts/reachability/meshes").mkdir()
     for path in sources.meshes:
@@ -488,10 +488,10 @@ def headset_surface(files: dict[str, bytes], down: np.ndarray) -> np.ndarray:
     """The surface of tips in Unity's axes, (around, along, 3) m, under gravity in Unity's direction `down`, from the
     package's files and the manifest's words alone."""
     sheets = json.loads(files[MANIFEST])["reach"]["sheets"]
-    known = np.array(sheets["directions"]).reshape(-1, 3)
-    points = np.frombuffer(files[sheets["file"]], "<f2").reshape(len(known), sheets["around"], sheets["along"], 3)
-    matrix = np.frombuffer(files[sheets["weights"]], "<f8").reshape(len(known), -1)
-    weights = matrix @ [*(np.linalg.norm(down - known, axis=1) ** 3), 1, *down]
+    directions = np.array(sheets["directions"]).reshape(-1, 3)
+    points = np.frombuffer(files[sheets["file"]], "<f2").reshape(len(directions), sheets["around"], sheets["along"], 3)
+    matrix = np.frombuffer(files[sheets["weights"]], "<f8").reshape(len(directions), -1)
+    weights = matrix @ [*(np.linalg.norm(down - directions, axis=1) ** 3), 1, *down]
     return np.einsum("d,drsk->rsk", weights, points.astype(float))
 
 
@@ -526,10 +526,10 @@ def test_the_package_s_changelog_names_its_version(project):
 
 
 def test_package_json_has_the_modules_that_the_scripts_use():
-    told = json.loads(package_json("org.a.b", "1.2.3", "A", "6000.0", "B"))
+    document = json.loads(package_json("org.a.b", "1.2.3", "A", "6000.0", "B"))
     script = "".join(path.read_text() for path in CSHARP.rglob("*.cs"))
     uses = {"jsonserialize": "JsonUtility.", "physics": "Physics.gravity", "xr": "using UnityEngine.XR;"}
-    assert {f"com.unity.modules.{name}" for name in uses} == set(told["dependencies"])
+    assert {f"com.unity.modules.{name}" for name in uses} == set(document["dependencies"])
     assert all(words in script for words in uses.values())
 
 

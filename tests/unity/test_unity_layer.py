@@ -67,7 +67,7 @@ class Project:
         hidden += [] if "com.unity.ai.inference" in packages else ["Unity.InferenceEngine"]
         for name, (stub, references) in STUBBED.items():
             if name not in hidden:
-                uses = [self.assemblies[one] for one in references]
+                uses = [self.assemblies[reference] for reference in references]
                 out, options = folder / f"{name}.dll", ["-unsafe", "-r:System.Xml.dll"]
                 self.assemblies[name] = compiled(out, [STUBS / f"{stub}.cs"], uses, *options)
         for name in DEFINITIONS:
@@ -78,20 +78,22 @@ class Project:
         if name in self.assemblies or name not in DEFINITIONS:
             return
         path = DEFINITIONS[name]
-        told = json.loads(path.read_text())
-        defines = EDITOR + [one["define"] for one in told["versionDefines"] if one["name"] in self.packages]
-        if not set(told["defineConstraints"]) <= set(defines):
+        definition = json.loads(path.read_text())
+        defines = EDITOR + [
+            reference["define"] for reference in definition["versionDefines"] if reference["name"] in self.packages
+        ]
+        if not set(definition["defineConstraints"]) <= set(defines):
             return
-        references = list(told["references"])
-        if not told["noEngineReferences"]:
-            references += ["UnityEngine"] + ["UnityEditor"] * (told["includePlatforms"] == ["Editor"])
-        references += [one.removesuffix(".dll") for one in told["precompiledReferences"]]
-        for one in references:
-            self.build(one)
-        known = [self.assemblies[one] for one in references if one in self.assemblies]
-        options = ["-unsafe"] * told["allowUnsafeCode"] + ["-noconfig"] * told["noEngineReferences"]
+        references = list(definition["references"])
+        if not definition["noEngineReferences"]:
+            references += ["UnityEngine"] + ["UnityEditor"] * (definition["includePlatforms"] == ["Editor"])
+        references += [reference.removesuffix(".dll") for reference in definition["precompiledReferences"]]
+        for reference in references:
+            self.build(reference)
+        built = [self.assemblies[reference] for reference in references if reference in self.assemblies]
+        options = ["-unsafe"] * definition["allowUnsafeCode"] + ["-noconfig"] * definition["noEngineReferences"]
         options += [f"-d:{define}" for define in defines]
-        self.assemblies[name] = compiled(self.folder / f"{name}.dll", sources_of(path), known, *options)
+        self.assemblies[name] = compiled(self.folder / f"{name}.dll", sources_of(path), built, *options)
 
 
 def sources_of(definition: Path) -> list[Path]:
@@ -110,8 +112,8 @@ def project(tmp_path_factory):
 def test_every_assembly_compiles_where_all_packages_are_there(project):
     assert set(project.assemblies) == {*STUBBED, *DEFINITIONS}
     for path in DEFINITIONS.values():
-        told = json.loads(path.read_text())
-        assert set(told["references"]) <= {*STUBBED, *DEFINITIONS, *TEST_RUNNERS}, path
+        definition = json.loads(path.read_text())
+        assert set(definition["references"]) <= {*STUBBED, *DEFINITIONS, *TEST_RUNNERS}, path
 
 
 def test_every_script_is_of_one_assembly():
@@ -121,7 +123,7 @@ def test_every_script_is_of_one_assembly():
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_without_a_package_all_compiles_that_does_not_need_it(tmp_path, package):
-    left = Project(tmp_path, [one for one in PACKAGES if one != package]).assemblies
+    left = Project(tmp_path, [name for name in PACKAGES if name != package]).assemblies
     missing = {"org.mujoco": {"Trunkline"}, "com.unity.ai.inference": {"Trunkline.Inference"}}[package]
     samples = {name for name in DEFINITIONS if ".Samples." in name}
     assert set(DEFINITIONS) - set(left) == missing | samples
@@ -167,15 +169,15 @@ def test_components_menu_and_sample_do_as_python(layer, files, tmp_path):
     asked = cases_of(files)
     done = run(layer, files, asked, tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
-    told = {line.split()[0]: int(line.split()[1]) for line in done.stdout.splitlines()}
-    steps = sum(len(one["steps"]) for one in asked["sequences"])
+    counts = {line.split()[0]: int(line.split()[1]) for line in done.stdout.splitlines()}
+    steps = sum(len(sequence["steps"]) for sequence in asked["sequences"])
     wanted = {"reach": len(asked["reach"]), "steps": steps, "bend": len(asked["bend"]), "refusals": 7}
     wanted["runner"] = len(files_of_vectors(files))
-    assert wanted.items() <= told.items()
+    assert wanted.items() <= counts.items()
     assert steps > 400
-    assert told["offers"] > 5
-    assert told["mounts"] > 20
-    assert told["touches"] == len(asked["touches"])
+    assert counts["offers"] > 5
+    assert counts["mounts"] > 20
+    assert counts["touches"] == len(asked["touches"])
 
 
 @pytest.mark.parametrize("part", ["reach", "sequences", "bend", "touches", "refusals"])
@@ -185,10 +187,10 @@ def test_an_answer_that_is_another_is_named(layer, plain, tmp_path, part):
     if part == "refusals":
         asked[part]["no maps"] += "."
     else:
-        answers = [step["intent"] for one in asked[part] for step in one["steps"]] if part == "sequences" else [
-            one["answer"] for one in asked[part]
+        answers = [step["intent"] for item in asked[part] for step in item["steps"]] if part == "sequences" else [
+            item["answer"] for item in asked[part]
         ]  # fmt: skip
-        assert any(moved_a_little(one) for one in answers)
+        assert any(moved_a_little(item) for item in answers)
     done = run(layer, files, asked, tmp_path)
     assert done.returncode == 1
     assert done.stdout.splitlines()[-1].startswith("error: ")
@@ -214,37 +216,41 @@ def reaches(arrays: dict[str, np.ndarray], rng: np.random.Generator) -> list[dic
     if "sheets_points" not in arrays:
         return []
     points, downs, matrix = (arrays[f"sheets_{name}"] for name in ("points", "downs", "matrix"))
-    triangles, found = sheet_triangles(*points.shape[1:3]), []
-    while len(found) < CASES:
+    triangles, cases = sheet_triangles(*points.shape[1:3]), []
+    while len(cases) < CASES:
         base, gravity = Rotation.random(random_state=int(rng.integers(9999))), rng.normal(size=3)
         down = base.inv().apply(gravity / np.linalg.norm(gravity))
         if down[2] > downs[:, 2].max():
             continue
         sheet = np.tensordot(spline_weights(matrix, downs, down), points.astype(float), 1).reshape(-1, 3)
         tip = rng.uniform([-0.3, -0.3, -0.5], [0.3, 0.3, 0.0])
-        nearest, away = (one[0] for one in nearest_on_triangles(tip[None], sheet[triangles][None]))
+        nearest, away = (rows[0] for rows in nearest_on_triangles(tip[None], sheet[triangles][None]))
         answer = {"signal": float(away - arrays["soft_tolerance"]), "nearest": nearest.tolist(),
                   "first": sheet[0].tolist(), "down": down.tolist()}  # fmt: skip
         question = {"base": wxyz_from_rotation(base).tolist(), "gravity": gravity.tolist(), "tip": tip.tolist()}
-        found.append(case(question, answer))
-    return found
+        cases.append(case(question, answer))
+    return cases
 
 
 def touches(rng: np.random.Generator, count: int) -> dict:
     """Places of a robot's base, and where they are in a scene in which that stands somewhere."""
     base, position = Rotation.random(random_state=int(rng.integers(9999))), rng.uniform(-1, 1, 3)
-    known = rng.uniform(-0.5, 0.5, (count, 3))
+    points = rng.uniform(-0.5, 0.5, (count, 3))
     answer = {"position": position.tolist(), "ahead": base.apply([0.0, 1.0, 0.0]).tolist()}  # y is ahead in Unity's z
-    return case({"known": known.tolist(), "touched": (base.apply(known) + position).tolist()}, answer)
+    return case({"known": points.tolist(), "touched": (base.apply(points) + position).tolist()}, answer)
 
 
 def sequences(files: dict[str, bytes]) -> list[dict]:
     """The inputs of the shared vectors, as far as a scene can give them, and what the core wants then."""
     digest = package_digest(files)
-    told = json.loads(files["Tests/Vectors/steps.json"].decode().replace(PACKAGE, digest))
+    document = json.loads(files["Tests/Vectors/steps.json"].decode().replace(PACKAGE, digest))
     reach = MapReach.from_arrays(maps_of(files))
-    core = Teleoperation(config().core, reach, digest, told["mount_offset"])
-    return [played(core, one) for one in told["sequences"] if all(can_be_given(step["input"]) for step in one["steps"])]
+    core = Teleoperation(config().core, reach, digest, document["mount_offset"])
+    return [
+        played(core, sequence)
+        for sequence in document["sequences"]
+        if all(can_be_given(step["input"]) for step in sequence["steps"])
+    ]
 
 
 def can_be_given(heard: dict) -> bool:
@@ -257,36 +263,36 @@ def can_be_given(heard: dict) -> bool:
 def played(core: Teleoperation, sequence: dict) -> dict:
     state, steps = core.start(), []
     for step in sequence["steps"]:
-        given = as_in_a_scene(INPUT.validate_python(numbered(step["input"])))
-        state, intent = core.step(state, given, number(step["dt"]))
+        message = as_in_a_scene(INPUT.validate_python(numbered(step["input"])))
+        state, intent = core.step(state, message, number(step["dt"]))
         steps.append(step | {"intent": json.loads(to_json(intent))})
     return {"name": sequence["name"], "steps": steps}
 
 
-def numbered(told):
+def numbered(value):
     """With NaN for what is no number in JSON: among numbers."""
-    if isinstance(told, list):
-        numbers = any(isinstance(one, int | float) for one in told)
-        return [float("nan") if one is None and numbers else numbered(one) for one in told]
-    return {key: numbered(value) for key, value in told.items()} if isinstance(told, dict) else told
+    if isinstance(value, list):
+        numbers = any(isinstance(item, int | float) for item in value)
+        return [float("nan") if item is None and numbers else numbered(item) for item in value]
+    return {key: numbered(value) for key, value in value.items()} if isinstance(value, dict) else value
 
 
-def number(told: float | None) -> float:
-    return float("nan") if told is None else told
+def number(value: float | None) -> float:
+    return float("nan") if value is None else value
 
 
-def as_in_a_scene(given: Input) -> Input:
+def as_in_a_scene(message: Input) -> Input:
     """What transforms of 32 bits keep of an input."""
-    assert given.alignment is not None
-    there = inverse(given.alignment)
+    assert message.alignment is not None
+    there = inverse(message.alignment)
     base = Pose(single(there.position), single(there.quaternion))
-    return replace(given, left=as_a_hand(given.left), right=as_a_hand(given.right), alignment=inverse(base))
+    return replace(message, left=as_a_hand(message.left), right=as_a_hand(message.right), alignment=inverse(base))
 
 
-def as_a_hand(given: Controller) -> Controller:
-    turn = single(multiply(given.quaternion, conjugate(RAY)))
-    stick = single(given.stick)
-    return replace(given, position=single(given.position), quaternion=multiply(turn, RAY), stick=stick)
+def as_a_hand(controller: Controller) -> Controller:
+    turn = single(multiply(controller.quaternion, conjugate(RAY)))
+    stick = single(controller.stick)
+    return replace(controller, position=single(controller.position), quaternion=multiply(turn, RAY), stick=stick)
 
 
 def single(values: tuple) -> tuple:
@@ -319,7 +325,7 @@ def first_map(manifest: dict) -> str:
 
 
 def size_of(manifest: dict) -> int:
-    (grid,) = [one for one in manifest["grids"].values() if one["file"] == first_map(manifest)]
+    (grid,) = [grid for grid in manifest["grids"].values() if grid["file"] == first_map(manifest)]
     return 2 * int(np.prod(grid["shape"]))
 
 
@@ -328,8 +334,8 @@ def size_of(manifest: dict) -> int:
 
 def declared(text: str) -> set[str]:
     """Public members and types of C#, as their declarations begin; without what only a definition has."""
-    found = re.findall(r"^ *((?:public|protected) [^={;]*?)\s*(?:[={;]|$)", re.sub(r"//.*", "", text), re.M)
-    return {" ".join(one.replace("extern ", "").split()) for one in found}
+    declarations = re.findall(r"^ *((?:public|protected) [^={;]*?)\s*(?:[={;]|$)", re.sub(r"//.*", "", text), re.M)
+    return {" ".join(declaration.replace("extern ", "").split()) for declaration in declarations}
 
 
 def test_the_stubs_of_mujoco_have_the_signatures_of_its_source():
@@ -343,9 +349,11 @@ def test_the_stubs_of_mujoco_have_the_signatures_of_its_source():
 
 
 def test_the_samples_of_the_package_are_there():
-    told = json.loads(package_json("org.a.b", "1.2.3", "A", "6000.0", "B"))["samples"]
-    assert told == SAMPLES
-    assert {one["path"] for one in told} == {f"Samples~/{path.name}" for path in (CSHARP / "Samples~").iterdir()}
-    for one in told:
-        assert (CSHARP / one["path"] / "README.md").is_file()
-        assert set(one) == {"displayName", "description", "path"}
+    samples = json.loads(package_json("org.a.b", "1.2.3", "A", "6000.0", "B"))["samples"]
+    assert samples == SAMPLES
+    assert {sample["path"] for sample in samples} == {
+        f"Samples~/{path.name}" for path in (CSHARP / "Samples~").iterdir()
+    }
+    for sample in samples:
+        assert (CSHARP / sample["path"] / "README.md").is_file()
+        assert set(sample) == {"displayName", "description", "path"}

@@ -50,24 +50,24 @@ def files(arrays):
 
 
 def test_maps_come_back_as_they_were_in_their_own_frames(files, arrays):
-    found = maps_of(files)
-    assert found.keys() == arrays.keys() - {"soft_threshold"}
-    for name in found:
+    maps = maps_of(files)
+    assert maps.keys() == arrays.keys() - {"soft_threshold"}
+    for name in maps:
         expected = arrays[name].astype(np.float16) if np.ndim(arrays[name]) > 3 else arrays[name]
         expected = rounded(expected) if np.ndim(expected) == 3 else expected
-        np.testing.assert_allclose(found[name], expected, atol=1e-12)
+        np.testing.assert_allclose(maps[name], expected, atol=1e-12)
 
 
 def test_reach_by_the_package_is_that_by_the_stage(files, arrays):
-    one, other = MapReach.from_arrays(maps_of(files)), MapReach.from_arrays(arrays)
+    packaged, of_stage = MapReach.from_arrays(maps_of(files)), MapReach.from_arrays(arrays)
     down = (0.0, 0.0, -1.0)
     for point in RNG.uniform(-0.3, 0.3, (30, 3)):
         place = tuple(map(float, point))
         for gravity in (down, (0.48, 0.0, -((1 - 0.48**2) ** 0.5))):
-            found, expected = one.soft(place, gravity), other.soft(place, gravity)
-            assert found.outside_by == pytest.approx(expected.outside_by, abs=2e-3)
+            reading, expected = packaged.soft(place, gravity), of_stage.soft(place, gravity)
+            assert reading.outside_by == pytest.approx(expected.outside_by, abs=2e-3)
             assert expected.where != "unknown"
-        assert one.rigid(place, down).outside_by == pytest.approx(other.rigid(place, down).outside_by, abs=2e-3)
+        assert packaged.rigid(place, down).outside_by == pytest.approx(of_stage.rigid(place, down).outside_by, abs=2e-3)
 
 
 def test_a_package_is_read_from_its_folder_as_from_its_tarball(files, tmp_path):

@@ -1,4 +1,4 @@
-"""The README: its generated blocks are current. What it points to: test_docs.py."""
+"""The README and the docs: their generated blocks are current. What they point to: test_docs.py."""
 
 import json
 from pathlib import Path
@@ -13,11 +13,14 @@ from trunkline.recordings.trials.splits import DECIDING, TEST, VALIDATE
 from upkeep.baseline import Baseline, baseline_file, renewed
 from upkeep.limits import Limit, limit_files, lookup, read_limits
 from upkeep.readme import (
+    COVERAGE_TIMES,
     EXAMPLES,
     RESULTS,
+    RESULTS_PAGE,
     Shown,
     as_sent,
     generate,
+    headline,
     preview_table,
     rehearsal_block,
     results_table,
@@ -42,6 +45,39 @@ ROOT = Path(__file__).parents[2]
 def test_generated_blocks_are_current():
     for path, text in generate(ROOT).items():
         assert text == path.read_text(encoding="utf-8"), f"{path.relative_to(ROOT)}: run `make readme`"
+
+
+def test_the_full_tables_have_a_page_and_the_readme_leads_there():
+    page = (ROOT / RESULTS_PAGE).read_text(encoding="utf-8")
+    for name in ("score", "identification", "results", *EXAMPLES, "arms"):
+        assert page.count(f"<!-- {name} -->") == 1
+    assert f"]({RESULTS_PAGE.as_posix()}" in (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_headline_shows_what_misses_its_goal_beside_what_meets_it(tmp_path):
+    """Bold, with the goal; and by which code and package. Without any results it has dashes."""
+    coverage = {name: {"runs": 40, "inside": 3, "share": 0.075} for name in COVERAGE_TIMES}
+    rehearsed = {"reach": {"rate": 0.9}, "follow": {"rate": 1.0}, "grasp": {"rate": 0.95}, "handle": {"rate": 0.5}}
+    rehearsed["preview"] = {"coverage": coverage, "tip_error_radii": {"at_end": {"median": 4.0}}}
+    sent = {"position_error_mm": {"median": 0.5, "p95": 1.5}, "beyond_1pct_unsaid": 0, "targets": 50}
+    bad = {"position_error_mm": {"median": 13.0, "p95": 29.0}, "beyond_1pct_unsaid": 170, "targets": 200}
+    network = {"as_controls": {"frictionless": sent, "targets": 50}, "on_plant": bad}
+    goals = "rehearse:\n  reach.rate: {better: higher, goal: 0.98}\n  follow.rate: {min: 0.95}\n"
+    goals += "".join(f"  preview.coverage.{name}.share: {{better: higher, goal: 0.9}}\n" for name in COVERAGE_TIMES)
+    (tmp_path / "tests").mkdir()
+    (tmp_path / "tests/limits.yaml").write_text(goals)
+    assert "**" not in headline(tmp_path).replace("**on the", "").replace("warning** |", "")
+    for stage, metrics in {"train_ik": network, "rehearse": rehearsed}.items():
+        (tmp_path / f"artifacts/{stage}").mkdir(parents=True)
+        write_json(tmp_path / f"artifacts/{stage}/metrics.json", metrics)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("upkeep.readme.source_words", lambda root, metrics: "**STALE**: of code abc")
+        text = headline(tmp_path)
+    assert "without friction: 0.5 / 1.5 mm; 0 of 50 targets missed" in text
+    assert "**on the simulated lab's arm: 13 / 29 mm; 170 of 200 targets missed" in text
+    assert "| **reach 90 %**, follow 100 %, grasp 95 %, hand-over 50 % | goal: reach ≥ 98 %, follow ≥ 95 % |" in text
+    assert "at the end **3 of 40**, 2 s later **3 of 40**, 10 s later **3 of 40** | goal: ≥ 0.9 (missed) / " in text
+    assert text.endswith("The last two rows: rehearsal **STALE**: of code abc.")
 
 
 def test_a_block_is_replaced_and_a_missing_one_refused():
@@ -196,18 +232,19 @@ def test_commands_are_told_by_the_same_statistics_of_whatever_arm():
 def test_each_figure_of_the_readme_has_a_row_of_the_gate():
     """Those of `test` by their twin of `validate`. A figure may have its row in another unit."""
     rows = {file: read_limits(file) for file in limit_files(ROOT)}
-    own = rows[ROOT / "tests/limits.yaml"]
-    shown = [(stage, figure.key) for stage, lines in RESULTS.items() for _, figures in lines for figure in figures]
+    project_rows = rows[ROOT / "tests/limits.yaml"]
+    entries = [(stage, figure.key) for stage, lines in RESULTS.items() for _, figures in lines for figure in figures]
     errors = ("e_internal", "e_position", "e_tip")
-    shown += [("identify_control", f"identified.{split}.{error}") for split in DECIDING for error in errors]
+    entries += [("identify_control", f"identified.{split}.{error}") for split in DECIDING for error in errors]
     scored = json.loads((ROOT / "artifacts/score/metrics.json").read_text())
     for kind, (_, stage) in KINDS.items():
         if lookup(scored, f"{stage}.identified.{TEST}.by_experiment.{kind}") is not None:
-            shown += [(stage, f"identified.{VALIDATE}.by_experiment.{kind}.{error}") for error in errors]
+            entries += [(stage, f"identified.{VALIDATE}.by_experiment.{kind}.{error}") for error in errors]
+    entries += [("rehearse", f"preview.coverage.{name}.share") for name in COVERAGE_TIMES]
     for experiment, distance in DISTANCES.items():
-        shown.append(("rehearse", f"{experiment}.rate"))
-        shown += [("rehearse", f"{experiment}.{distance}.{at}") for at in ("median", "p95") if distance]
-    assert [key for stage, key in shown if not _has(own[stage], key)] == []
+        entries.append(("rehearse", f"{experiment}.rate"))
+        entries += [("rehearse", f"{experiment}.{distance}.{at}") for at in ("median", "p95") if distance]
+    assert [key for stage, key in entries if not _has(project_rows[stage], key)] == []
     errors += ("e_position_about_rest", "e_tip_about_rest", "e_late_speed")
     for name in EXAMPLES:
         damping = rows[ROOT / "examples" / name / "limits.yaml"]["identify_damping"]
@@ -227,21 +264,21 @@ def test_the_rehearsal_s_block_says_of_what_it_is_and_which_goals_are_missed_or_
     tmp_path, monkeypatch
 ):
     """Whether it is stale: test_provenance.py."""
-    assert rehearsal_block(tmp_path, variants=False) == "(no runs are committed yet)"
+    assert rehearsal_block(tmp_path) == "(no runs are committed yet)"
     monkeypatch.setattr("upkeep.readme.source_words", lambda root, metrics: f"of `{metrics['package']}`")
-    told = {"runs": 200, "rate": 0.975, "low": 0.943, "high": 0.989, "causes": {"aim": 5}}
-    told |= {"nearest_mm": {"median": 12.0, "p95": 21.0}, "variants": {"no preview": {**told, "runs": 40}}}
+    row = {"runs": 200, "rate": 0.975, "low": 0.943, "high": 0.989, "causes": {"aim": 5}}
+    row |= {"nearest_mm": {"median": 12.0, "p95": 21.0}, "variants": {"no preview": {**row, "runs": 40}}}
     goals = "rehearse:\n  reach.rate: {min: 0.97}\n  follow.rate: {better: higher, goal: 0.98}\n"
-    metrics = {"package": "abc", "reach": told, "follow": told, "grasp": told}
+    metrics = {"package": "abc", "reach": row, "follow": row, "grasp": row}
     for name, text in {"tests/limits.yaml": goals, "artifacts/rehearse/metrics.json": json.dumps(metrics)}.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
-    head, _, reach, follow, grasp = rehearsal_block(tmp_path, variants=False).splitlines()
+    head, _, reach, variant, follow, _, grasp, _ = rehearsal_block(tmp_path).splitlines()
     assert head.startswith("| experiment, of `abc` |")
     assert reach == "| reach | 200 | 97.5 % | 94.3 to 98.9 % | ≥ 97 % | 12 / 21 | aim 5 |"
     assert follow.startswith("| follow | 200 | 97.5 % | 94.3 to 98.9 % | ≥ 98 % (missed) |")
     assert grasp.startswith("| grasp | 200 | 97.5 % | 94.3 to 98.9 % |  |")
-    assert rehearsal_block(tmp_path, variants=True).splitlines()[3].startswith("| … no preview | 40 |")
+    assert variant.startswith("| … no preview | 40 |")
 
 
 def test_what_previews_state_stands_beside_what_came_true_and_its_goal():
@@ -257,7 +294,7 @@ def test_what_previews_state_stands_beside_what_came_true_and_its_goal():
     assert radius.startswith("| reach: the tip ends within a radius (2.3 mm, median) in 9 of 10 cases: at the end, 2 ")
     came = "3 of 42 / 1 of 42 / 0 of 42; it is 1 / 3 / 4 radii off, median"
     assert radius.endswith(f"10 s later | {came} | ≥ 0.9 (missed) / – / – |")
-    assert holds.endswith("| 39 of 40 as the likelier | ≥ 0.95 |")
+    assert holds.endswith("| 39 of 40 as predicted | ≥ 0.95 |")
     assert path.endswith("| 1.9 % of length off, median | ≤ 1.5 (missed) |")
     assert preview_table(None, goals) == ""
 
@@ -272,8 +309,8 @@ def test_errors_of_starts_and_of_the_clock_are_against_the_truth(judged):
 def test_which_intervals_of_the_demo_session_hold_the_truth():
     """A change is to be seen: one that moves a parameter to the other side belongs into docs/results/intervals.md."""
     truth = json.loads((ROOT / TRUTH).read_text())
-    found = {name: holds(row, expectation(truth, name)) for name, row in identified(ROOT).items()}
-    assert found == {
+    verdicts = {name: holds(row, expectation(truth, name)) for name, row in identified(ROOT).items()}
+    assert verdicts == {
         "stiffness": False,
         "hardening": True,
         "joint_place": False,
@@ -302,7 +339,7 @@ def test_no_stage_reads_the_truth():
     on holds it, nor does the session."""
     naming = [
         path.relative_to(ROOT).as_posix()
-        for folder in ("trunkline", "stages", "demo", "studies", "benchmarks", "conf")
+        for folder in ("trunkline", "stages", "demo", "studies", "benchmarks", "qualification", "conf")
         for path in (ROOT / folder).rglob("*.*")
         if path.suffix in (".py", ".yaml") and "truth.json" in path.read_text(encoding="utf-8")
     ]

@@ -1,4 +1,4 @@
-"""Results of studies and benchmarks: what they printed, of what commit, as the pages show it."""
+"""Results of studies, benchmarks and qualification: what they printed, of what commit, as the pages show it."""
 
 import ast
 import csv
@@ -13,15 +13,26 @@ from pathlib import Path
 import pytest
 import yaml
 
-from benchmarks.identification.__main__ import PARTS
 from trunkline.errors import InputError
 from trunkline.unity.package import write_tarball
 from upkeep.origin import READS, code_of, reads_of
-from upkeep.results import block, modules_of, not_in_history, recorded
+from upkeep.results import (
+    ARCHIVES,
+    COMMANDS,
+    KeptResult,
+    block,
+    kept_results,
+    modules_of,
+    names_recorded,
+    not_in_history,
+    recorded,
+    results_index,
+)
 
 ROOT = Path(__file__).parents[2]
 FILES = sorted((ROOT / "docs/results").glob("*.json"))
-PAGES = sorted([*(ROOT / "docs/results").glob("*.md"), ROOT / "docs/speed.md"])
+PAGES = sorted(page for name in ("results/*", "measurements/*", "speed") for page in (ROOT / "docs").glob(f"{name}.md"))
+CURRENT = [file for file in FILES if not KeptResult.read(file).archived]
 FIGURE = re.compile(r"\d\.\d|\d ?(?:%|mm|cm|s|ms|µs|N|°)(?!\w)|\d times|\d of \d")
 
 
@@ -47,6 +58,8 @@ FILES_OF_A_PROJECT = {
     "trunkline/ar/teleop/core.py": "from trunkline.model.arm import unit\n\n\ndef step():\n"
     "    import trunkline.frames\n",
     "trunkline/ar/teleop/unused.py": "",
+    **dict.fromkeys(("trunkline/ar/teleop/__init__.py", "trunkline/model/arm/__init__.py"), ""),
+    "trunkline/ar/hybrid/__init__.py": "",
     "trunkline/ar/teleop/core.csv": "1\n",
     "trunkline/model/arm/unit.py": "LENGTH = 1\n",
     "trunkline/frames.py": "UP = 1\n",
@@ -90,7 +103,7 @@ def stored(project, name="study"):
     return json.loads((project / "docs/results" / f"{name}.json").read_text())
 
 
-def shown(project):
+def page_block(project):
     return block(project / "docs/results/study.json")
 
 
@@ -104,15 +117,15 @@ def test_what_is_printed_is_kept_with_its_command_and_its_origin(project, capsys
         print("two threads\n\n| a | b |\n|---|---|\n| 1 | 2 |  ")
         print("progress", file=sys.stderr)
     assert capsys.readouterr().out.startswith("two threads\n")
-    found, of, day = stored(project), *git(project, "log", "-1", "--format=%h %cs", "--abbrev=7").split()
-    assert found["lines"] == ["two threads", "| a | b |", "|---|---|", "| 1 | 2 |"]
-    assert (found["command"], found["commit"], found["date"]) == ("python -m studies.some --only 'a b'", of, day)
+    result, of, day = stored(project), *git(project, "log", "-1", "--format=%h %cs", "--abbrev=7").split()
+    assert result["lines"] == ["two threads", "| a | b |", "|---|---|", "| 1 | 2 |"]
+    assert (result["command"], result["commit"], result["date"]) == ("python -m studies.some --only 'a b'", of, day)
     code = ["artifacts/arm.xml", "conf/teleop", "package", "params.yaml:filter", "stages/filter.py", "studies/some.py"]
     code.append("studies/some.yaml")
-    assert list(found["code"]) == [*code, "trunkline/model/arm", "trunkline/frames.py", "trunkline/ar/teleop"]
-    assert all(re.fullmatch("[0-9a-f]{12}", digest) for digest in found["code"].values())
+    assert list(result["code"]) == [*code, "trunkline/ar/teleop", "trunkline/frames.py", "trunkline/model/arm"]
+    assert all(re.fullmatch("[0-9a-f]{12}", digest) for digest in result["code"].values())
     table = "```\ntwo threads\n```\n\n| a | b |\n|---|---|\n| 1 | 2 |\n\n`python -m studies.some --only 'a b'`\n"
-    assert shown(project) == f"{table}(commit {of} of {day}; nothing that it goes through has changed since)"
+    assert page_block(project) == f"{table}(commit {of} of {day}; nothing that it goes through has changed since)"
 
 
 @pytest.mark.parametrize(
@@ -127,7 +140,7 @@ def test_what_is_printed_is_kept_with_its_command_and_its_origin(project, capsys
         ),
         ("trunkline/ar/teleop/core.csv", "2\n", "trunkline/ar/teleop"),
         ("trunkline/model/arm/unit.py", "LENGTH = 2\n", "trunkline/model/arm"),
-        ("trunkline/frames.py", "import trunkline.ar.hybrid.trials\n", "trunkline/frames.py, trunkline/ar/hybrid"),
+        ("trunkline/frames.py", "import trunkline.ar.hybrid.trials\n", "trunkline/ar/hybrid, trunkline/frames.py"),
         ("stages/filter.py", "RATE = 2\n", "stages/filter.py"),
         ("conf/teleop/config.yaml", "speed: 2\n", "conf/teleop"),
         ("conf/teleop/added.yaml", "speed: 2\n", "conf/teleop"),
@@ -141,9 +154,9 @@ def test_an_edit_of_what_a_result_goes_through_makes_it_stale_and_is_named(proje
     record(project)
     (project / name).parent.mkdir(exist_ok=True)
     (project / name).write_text(text)
-    assert shown(project).endswith(f"; **STALE**, changed since: {since})")
+    assert page_block(project).endswith(f"; **STALE**, changed since: {since})")
     commit(project)
-    assert shown(project).endswith(f"; **STALE**, changed since: {since})"), "committed or not"
+    assert page_block(project).endswith(f"; **STALE**, changed since: {since})"), "committed or not"
 
 
 @pytest.mark.parametrize(
@@ -161,18 +174,18 @@ def test_an_edit_of_what_a_result_goes_through_makes_it_stale_and_is_named(proje
 )
 def test_an_edit_of_anything_else_leaves_a_result_as_it_is(project, name, text):
     record(project)
-    before = shown(project)
+    before = page_block(project)
     (project / name).write_text(text)
-    assert shown(project) == before
+    assert page_block(project) == before
     commit(project)
-    assert shown(project) == before, "and however many commits later"
+    assert page_block(project) == before, "and however many commits later"
 
 
 def test_a_module_that_is_gone_makes_its_result_stale(project):
     record(project)
     (project / "studies/some.py").unlink()
     (project / "studies/some.yaml").unlink()
-    words = " ".join(shown(project).split())
+    words = " ".join(page_block(project).split())
     assert "**STALE**, changed since: 5 that it no longer goes through)" in words
 
 
@@ -222,7 +235,7 @@ def test_a_package_that_the_command_names_is_the_result_s(project, tmp_path, mon
     monkeypatch.setattr(sys, "orig_argv", [*sys.orig_argv, str(tmp_path / "another.tgz")])
     record(project)
     assert stored(project)["code"]["package"] == hashlib.sha256(b"{2}").hexdigest()[:12]
-    assert shown(project).endswith("; **STALE**, changed since: package)")
+    assert page_block(project).endswith("; **STALE**, changed since: package)")
 
 
 def test_a_commit_that_is_not_in_the_history_is_named(project):
@@ -251,7 +264,7 @@ def test_a_shallow_clone_says_that_it_cannot_check(project, tmp_path):
 def test_two_tables_one_after_the_other_stay_two(project):
     with recorded("study", root=project):
         print("| a |\n|---|\n| 1 |\n\n| b |\n|---|\n| 2 |")
-    assert shown(project).startswith("| a |\n|---|\n| 1 |\n\n| b |\n|---|\n| 2 |\n\n`python")
+    assert page_block(project).startswith("| a |\n|---|\n| 1 |\n\n| b |\n|---|\n| 2 |\n\n`python")
 
 
 def test_a_run_that_fails_or_is_not_to_be_kept_leaves_the_file_alone(project):
@@ -274,21 +287,89 @@ def fail(project):
 def test_a_file_that_is_none_is_one_line(project, text):
     (project / "docs/results/study.json").write_text(text)
     with pytest.raises(InputError, match="study.json: .*expected JSON with command, commit and lines"):
-        shown(project)
+        page_block(project)
     assert block(project / "docs/results/another.json") == "(no run is kept yet)"
 
 
-def test_every_study_and_benchmark_keeps_its_results_and_every_kept_one_is_shown():
-    code = "".join(file.read_text(encoding="utf-8") for name in ("studies", "benchmarks") for file in modules(name))
-    named = set(re.findall(r'recorded\("(\w+)"', code))
-    named |= {f"identification_{part}" for part in PARTS}
+def archived(project, **fields):
+    """The kept result of `project`, archived."""
+    path = project / "docs/results/study.json"
+    path.write_text(json.dumps(stored(project) | {"archived": "results-1"} | fields))
+    return KeptResult.read(path)
+
+
+def test_an_archived_result_names_its_tag_and_commit_and_is_never_stale(project):
+    record(project)
+    (project / "studies/some.py").unlink()
+    (project / "trunkline/frames.py").write_text("UP = 2\n")
+    assert KeptResult.read(project / "docs/results/study.json").state(project) == "STALE"
+    assert archived(project).state(project) == "archived (results-1)"
+    of = stored(project)["commit"]
+    words = " ".join(page_block(project).split())
+    assert f"(commit {of} of " in words
+    assert words.endswith("; archived (results-1): its code stands last in commit f922469a)")
+    archived(project, stale="its rows name no commit")
+    assert " ".join(page_block(project).split()).endswith("in commit f922469a; its rows name no commit)")
+
+
+def test_an_archived_result_whose_code_is_there_and_one_of_no_code_are_wrong(project):
+    record(project)
+    (project / "studies/some.py").write_text('@recorded("study")\ndef main():\n    pass\n')
+    result = KeptResult.read(project / "docs/results/study.json")
+    assert result.problem(project) == ""
+    assert archived(project).problem(project).startswith("study: archived, and the tree has its code")
+    (project / "studies/some.py").write_text('if __name__ == "__main__":\n    qualify("study", __doc__, main)\n')
+    assert archived(project).problem(project).startswith("study: archived, and the tree has its code")
+    (project / "studies/some.py").write_text("")
+    assert archived(project).problem(project) == ""
+    assert result.problem(project) == "study: the tree has no code of it, expected it archived"
+    assert archived(project, archived="results-0").problem(project).startswith("study: archived by results-0, expected")
+
+
+def test_a_command_that_has_another_name_today_is_shown_with_both(project):
+    record(project)
+    content = stored(project) | {"ran_as": "benchmarks.some"}
+    (project / "docs/results/study.json").write_text(json.dumps(content))
+    assert "`python -m studies.some --only 'a b'`\n(as `benchmarks.some`, commit " in page_block(project)
+
+
+def test_the_index_has_every_result_and_the_archive_by_itself(project):
+    record(project)
+    (project / "docs/page.md").write_text("<!-- results/study -->\n<!-- /results/study -->\n")
+    of = stored(project)["commit"]
+    rows = results_index(project).partition("\n\n")
+    assert f"| `study` | [page.md](../page.md) | `studies.some` | {of} |" in rows[0]
+    assert rows[0].endswith("| of this code |")
+    archived(project)
+    rows = results_index(project).partition("\n\n")
+    assert "study" not in rows[0]
+    assert rows[2].endswith("| archived (results-1) |")
+
+
+def test_every_kept_result_has_the_right_state():
+    assert [problem for result in kept_results(ROOT) if (problem := result.problem(ROOT))] == []
+
+
+def test_the_archive_s_commits_have_the_code_of_what_is_archived():
+    try:
+        not_in_history(ROOT)
+    except InputError as error:
+        pytest.skip(f"commits of results cannot be checked: {error}")
+    for result in kept_results(ROOT):
+        for module in modules_of(result.command) if result.archived else ():
+            at, place = ARCHIVES[result.archived], module.replace(".", "/")
+            assert git(ROOT, "ls-tree", "--name-only", at, f"{place}.py", f"{place}/__main__.py"), result.name
+
+
+def test_every_command_keeps_its_results_and_every_kept_one_is_shown():
+    named = names_recorded(ROOT) | {result.name for result in kept_results(ROOT) if result.archived}
     pages = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs").rglob("*.md"))
-    shown = re.findall(r"^<!-- results/(\w+) -->$", pages, re.MULTILINE)
-    assert sorted(shown) == sorted(named)
+    blocks = re.findall(r"^<!-- results/(\w+) -->$", pages, re.MULTILINE)
+    assert sorted(blocks) == sorted(named)
     assert {file.stem for file in FILES} <= named
-    runs = [file for name in ("studies", "benchmarks") for file in modules(name) if "__main__" in file.read_text()]
+    runs = [file for name in COMMANDS for file in modules(name) if '"__main__"' in file.read_text()]
     assert len(runs) >= 15
-    assert [file for file in runs if "recorded(" not in file.read_text()] == []
+    assert [file for file in runs if not re.search(r"\b(recorded|qualify)\(", file.read_text())] == []
 
 
 def modules(name):
@@ -297,21 +378,22 @@ def modules(name):
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_a_result_is_of_a_command_and_of_code(file):
-    found = json.loads(file.read_text(encoding="utf-8"))
-    modules = re.findall(r"python -m ((?:studies|benchmarks)\.[\w.]+)", found["command"])
+    content = json.loads(file.read_text(encoding="utf-8"))
+    modules = re.findall(r"python -m ((?:studies|benchmarks|qualification)\.[\w.]+)", content["command"])
     assert modules
-    for module in modules:
+    for module in modules if file in CURRENT else ():
         place = ROOT / module.replace(".", "/")
         assert place.with_suffix(".py").is_file() or (place / "__main__.py").is_file()
-    assert re.fullmatch(r"[0-9a-f]{7}", found["commit"])
+    assert re.fullmatch(r"[0-9a-f]{7}", content["commit"])
     if file.stem in UNPROVEN:
-        assert UNPROVEN[file.stem] in found["stale"]
-        assert "code" not in found
-        assert f"**STALE**: {found['stale']}" in " ".join(block(file).split())
+        assert UNPROVEN[file.stem] in content["stale"]
+        assert "code" not in content
+        words = "**STALE**: " if file in CURRENT else f"in commit {ARCHIVES[content['archived']]}; "
+        assert words + content["stale"] in " ".join(block(file).split())
     else:
-        assert "stale" not in found
-        assert found["code"]
-        assert re.fullmatch(r"\d{4}-\d\d-\d\d", found["date"])
+        assert "stale" not in content
+        assert content["code"]
+        assert re.fullmatch(r"\d{4}-\d\d-\d\d", content["date"])
 
 
 def test_the_list_of_results_without_code_holds_no_other_name():
@@ -334,9 +416,15 @@ def test_rows_that_were_made_with_changes_or_name_no_commit_are_in_the_list():
         assert is_proven or table.stem in UNPROVEN, table
 
 
+def test_the_code_of_a_qualification_is_that_of_server_robot_and_its_own():
+    code = code_of(ROOT, ["qualification.faults"], reads_of(ROOT, "faults"))
+    own = {"qualification/faults.py", "qualification/scene.py", "qualification/witness.py", "qualification/guests.py"}
+    assert own | {"trunkline/ar/session", "trunkline/ar/drivers", "conf/live", "package"} <= set(code)
+
+
 def test_what_results_read_is_named_and_is_there():
     named = yaml.safe_load((ROOT / READS).read_text())
-    assert {file.stem for file in FILES} <= set(named)
+    assert {file.stem for file in CURRENT} == set(named)
     entries = {entry for name in named for entry in reads_of(ROOT, name)}
     modules = {entry for entry in entries if entry.endswith(".py")}
     assert set(code_of(ROOT, [], entries - modules)) == entries - modules
@@ -346,22 +434,22 @@ def test_what_results_read_is_named_and_is_there():
 SETTINGS = re.compile(r"(?:conf|artifacts|data/processed)/[\w/.]+")
 
 
-@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+@pytest.mark.parametrize("file", CURRENT, ids=lambda file: file.stem)
 def test_settings_and_outputs_that_a_module_names_are_declared(file):
     """Paths and the package, in the module of the command or its folder."""
     (module,) = modules_of(json.loads(file.read_text())["command"])
     place = ROOT / module.replace(".", "/")
-    own = sorted(place.glob("*.py")) if place.is_dir() else [place.with_suffix(".py")]
-    trees = [ast.parse(one.read_text(encoding="utf-8")) for one in own]
+    files = sorted(place.glob("*.py")) if place.is_dir() else [place.with_suffix(".py")]
+    trees = [ast.parse(file.read_text(encoding="utf-8")) for file in files]
     texts = {node.value for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Constant)}
     paths = {text for text in texts if isinstance(text, str) and SETTINGS.fullmatch(text)}
-    paths |= {"package"} if any("only_package" in one.read_text() for one in own) else set()
+    paths |= {"package"} if any("qualify(" in file.read_text() for file in files) else set()
     paths = {"package" if path.startswith("artifacts/package_unity") else path for path in paths}
     reads = reads_of(ROOT, file.stem)
     assert [path for path in paths if not any(path in entry or entry in path for entry in reads)] == []
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: f"{page.parent.name}/{page.stem}")
 def test_a_page_of_results_has_no_figure_that_was_typed(page):
     """All stand in blocks that `make readme` writes; test_readme.py compares those with their files."""
     text = re.sub(r"<!-- ([\w/]+) -->.*?<!-- /\1 -->", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)

@@ -26,7 +26,7 @@ class _Bar:
 
     def __init__(self, bar: Progress, total: int, label: str, unit: str):
         self._bar = bar
-        self._unit = unit
+        self._total, self._unit = total, unit
         self._task = bar.add_task(label, total=total, info="")
         self._rate = _Rate()
 
@@ -34,6 +34,11 @@ class _Bar:
         """Count `n` more units and show `info` (generation, best loss, ...)."""
         rate = self._rate.add(n)
         self._bar.update(self._task, advance=n, info=_words(info | {f"{self._unit}/s": rate}))
+
+    def expect(self, more: int) -> None:
+        """There are so many more units than expected so far, or fewer where it is negative."""
+        self._total += more
+        self._bar.update(self._task, total=self._total)
 
 
 class _Lines:
@@ -51,6 +56,10 @@ class _Lines:
         self._info = info | {f"{self._unit}/s": self._rate.add(n)}
         if self._done < self._total and time.monotonic() - self._printed >= PLAIN_INTERVAL:
             self.line()
+
+    def expect(self, more: int) -> None:
+        """There are so many more units than expected so far, or fewer where it is negative."""
+        self._total += more
 
     def line(self) -> None:
         self._printed = time.monotonic()
@@ -77,7 +86,8 @@ def _words(info: dict[str, object]) -> str:
 
 @contextmanager
 def progress(total: int, label: str, unit: str = "steps") -> Iterator[_Bar | _Lines]:
-    """Show the progress of `total` units; call `.update(n, **info)` on what this yields.
+    """Show the progress of `total` units; call `.update(n, **info)` on what this yields, `.expect(more)` where there
+    turn out to be more or fewer.
 
     Args:
         total: how many units make up the whole.

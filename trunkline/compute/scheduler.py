@@ -2,7 +2,7 @@
 parameter: results are the same bits.
 
 `TRUNKLINE_SCHEDULER` names the scheduler's address; nothing, the default, is this machine. Work comes in pieces of
-which none depends on another. docs/cluster.md says how to start scheduler and workers.
+which none depends on another. docs/speed.md says how to start scheduler and workers.
 
 `TRUNKLINE_BATCHES` names what moves large batches of simulations that may be rough: `mujoco`, the default, or `warp`,
 MuJoCo Warp on a GPU, whose results are not the same bits.

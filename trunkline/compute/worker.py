@@ -1,20 +1,24 @@
-"""`python -m trunkline.compute.worker tcp://host:8786`: a worker of a Dask scheduler, as `TRUNKLINE_SCHEDULER` needs
-it.
+"""A worker of a Dask scheduler, as `TRUNKLINE_SCHEDULER` needs it: `trunkline worker tcp://host:8786`
 
 It is `dask worker` with one thread in each process, as many as there are cores (`--nworkers`), and the arithmetic that
-stages have; further options are Dask's (`python -m trunkline.compute.worker --help`).
+stages have; further options are Dask's (`python -m distributed.cli.dask_worker --help`).
 """
 
+import argparse
 import os
 import sys
 
 from trunkline.compute.numerics import hold_arithmetic
 from trunkline.compute.threads import thread_count
 from trunkline.errors import InputError, in_one_line
+from trunkline.program import program_name
 
 
 @in_one_line
-def main() -> int:
+def main(arguments: list[str] | None = None) -> int:
+    words = sys.argv[1:] if arguments is None else arguments
+    if {"-h", "--help"} & set(words):
+        _parser().parse_args(["--help"])
     try:
         import distributed  # noqa: F401
     except ImportError:
@@ -22,10 +26,20 @@ def main() -> int:
             "trunkline.compute.worker: found no library distributed, expected trunkline[cluster]"
         ) from None
     hold_arithmetic()  # before the processes begin, as NumPy reads it when it is imported
-    own = [] if "--nworkers" in sys.argv else ["--nworkers", str(thread_count())]
-    command = [sys.executable, "-m", "distributed.cli.dask_worker", "--nthreads", "1", *own, *sys.argv[1:]]
+    count = [] if "--nworkers" in words else ["--nworkers", str(thread_count())]
+    command = [sys.executable, "-m", "distributed.cli.dask_worker", "--nthreads", "1", *count, *words]
     os.environ["TRUNKLINE_THREADS"] = "1"
     os.execv(sys.executable, command)
+
+
+def _parser() -> argparse.ArgumentParser:
+    """For the help alone: Dask parses the arguments."""
+    parser = argparse.ArgumentParser(
+        prog=program_name("worker"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("scheduler", metavar="ADDRESS", help="of the scheduler")
+    parser.add_argument("--nworkers", metavar="N", help="processes; default: as many as there are cores")
+    return parser
 
 
 if __name__ == "__main__":

@@ -83,8 +83,8 @@ def validated(schema: type[Schema], values: dict, source: Path) -> Schema:
     except ValidationError as error:
         problems = in_order(error.errors(), values)
         where = ".".join(map(str, path_of(problems[0], values)))
-        said = describe(problems[0], adapter) + others_missing(problems, values)
-        raise InputError(f"{source}: {where}: {said}") from error
+        problem = describe(problems[0], adapter) + others_missing(problems, values)
+        raise InputError(f"{source}: {where}: {problem}") from error
 
 
 def check_settings(root: str | Path = ".") -> list[str]:
@@ -135,12 +135,12 @@ def compose_settings(folder: Path, section: dict[str, Any], where: str) -> dict[
 
 def group_options(folder: Path) -> dict[str, dict[str, Path]]:
     """The config groups that `folder / "config.yaml"` names, each with its options and their files."""
-    found = {}
+    options = {}
     for group in _defaults(folder):
-        own = folder / group
-        files = (own if own.is_dir() else folder.parent / SHARED / group).glob("*.yaml")
-        found[group] = {file.stem: file for file in sorted(files)}
-    return found
+        local = folder / group
+        files = (local if local.is_dir() else folder.parent / SHARED / group).glob("*.yaml")
+        options[group] = {file.stem: file for file in sorted(files)}
+    return options
 
 
 def own_or_project(root: Path, name: str) -> Path:
@@ -178,12 +178,12 @@ def _choices(folder: Path, section: dict[str, Any], where: str) -> dict[str, str
     """The option that `section` names for each group of the defaults list in `folder / config.yaml`."""
     chosen, defaults = {}, _defaults(folder)
     for group, options in group_options(folder).items():
-        found = section.get(group, defaults[group])
-        if found not in list(options):
-            state = "missing" if found in ("???", None) else f"found {found!r}"
-            expected = ", ".join(options) + nearest(str(found), list(options))
+        option = section.get(group, defaults[group])
+        if option not in list(options):
+            state = "missing" if option in ("???", None) else f"found {option!r}"
+            expected = ", ".join(options) + nearest(str(option), list(options))
             raise InputError(f"{where}.{group}: {state}, expected one of {expected}")
-        chosen[group] = found
+        chosen[group] = option
     return chosen
 
 

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from trunkline.errors import InputError, existing
-from trunkline.identification.evaluation.error_tables import segment_table, trial_table
+from trunkline.identification.evaluation.error_tables import TABLED, segment_table, trial_table
 from trunkline.identification.evaluation.evaluation import Prediction, halved_step, replay
 from trunkline.identification.evaluation.null_model import references
 from trunkline.identification.evaluation.repeatability import repeatability
@@ -31,14 +31,13 @@ from trunkline.identification.uncertainty.cross_validation import cross_validate
 from trunkline.identification.uncertainty.trial_diagnostics import suspicions
 from trunkline.model.elements import BACKLASH, CAPSTAN_FRICTION, RATE_LIMIT, numeric, switch_off
 from trunkline.pipeline.inputs import read_spec
-from trunkline.pipeline.stage import output_folder, write_json
+from trunkline.pipeline.stage import output_folder, write_json, write_metrics
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_static
 from trunkline.recordings.trials.splits import DECIDING, VALIDATE
 from trunkline.recordings.trials.trial import Trial, read_trials
 
 CAD_MODEL = Path("artifacts/build_mjcf/arm.xml")
 TRIALS = Path("data/processed/filter")
-TABLED = ("identified", "cad", "null", "noise_floor")  # in trials.csv; metrics.json has all
 CSV = {"index": False, "float_format": "%.6g"}
 
 
@@ -69,8 +68,8 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     fitted, segments = [e for e in experiments if e.kind in config.experiments], fit.segments
     check_folds(stage, config.cross_validation_folds, fitted)
     if model_path == CAD_MODEL and not any(map(is_static, config.experiments)):
-        seen = " and ".join(EXPERIMENTS[kind].plural for kind in config.experiments)
-        print(f"{stage}: without trials at rest, stiffness comes from {seen}, as a ratio to the masses")
+        kinds = " and ".join(EXPERIMENTS[kind].plural for kind in config.experiments)
+        print(f"{stage}: without trials at rest, stiffness comes from {kinds}, as a ratio to the masses")
     result = identify(stage, model, fitted, fit)
     identified = save_model(spec, result.models["identified"])
     # score what is written, not what was in memory: MJCF keeps six digits
@@ -110,9 +109,9 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
         "start_fit": start_fit(experiments),
     }
     if not all(is_static(e.kind) for e in experiments):
-        found = predictions["identified"]
-        halved = replay(models["identified"], found.experiments, segments, step_factor=0.5)
-        metrics["halved_step"] = halved_step(found, Prediction(halved, found.experiments))
+        prediction = predictions["identified"]
+        halved = replay(models["identified"], prediction.experiments, segments, step_factor=0.5)
+        metrics["halved_step"] = halved_step(prediction, Prediction(halved, prediction.experiments))
     if result.factors or whole:
         metrics["per_joint_gain"] = _gain(metrics)
     if config.cross_validation_folds:
@@ -131,7 +130,7 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
         table = parameter_table(result, fit.parameters) | {"compared": vars(Compared.of(config))}
         table["fitted_to"] = fingerprints([t for t in reported if t.experiment in config.experiments])
         write_json(folder / "parameters.json", table)
-        write_json(folder / "metrics.json", metrics)
+        write_metrics(folder, metrics)
         write_tables(folder, predictions, segments)
         write_plots(folder, result, fit.parameters, segments, predictions, shapes=model_path == CAD_MODEL and rests)
 
@@ -163,8 +162,8 @@ def doubts(result: Identification, bounds: dict[str, Bounds], looks: dict[str, l
         [f"the {search} search ended before it had converged" for search in unfinished]
         + [lone] * (result.starts > 0 and result.agreeing < 2)
         + [
-            f"{trial} {'; '.join([*told, *(looks or {}).get(trial, [])])}"
-            for trial, told in result.influence.deciding().items()
+            f"{trial} {'; '.join([*reasons, *(looks or {}).get(trial, [])])}"
+            for trial, reasons in result.influence.deciding().items()
         ]
         + [f"{name} ended on a bound of its range" for name in result.at_bound]
         + [f"{name} is not determined: its 95 % interval spans its range" for name in undetermined(result, bounds)]
@@ -202,26 +201,26 @@ def write_plots(
     save_figure(plots.parameter_figure(result, bounds, units, undetermined(result, bounds)), folder / "parameters.png")
     validate = {name: prediction.of(lambda e: e.split == VALIDATE) for name, prediction in predictions.items()}
     save_figure(segment_figure({"validate split": segment_table(validate, segments)}), folder / "segments.png")
-    shown = {name: validate[name] for name in ("cad", "identified")}
+    compared = {name: validate[name] for name in ("cad", "identified")}
     if shapes:
-        table = curves.shape_table(shown, segments)
+        table = curves.shape_table(compared, segments)
         table.to_csv(folder / "shapes.csv", **CSV)
         save_figure(plots.shape_figure(table), folder / "shapes.png")
         return
     moving = {name: prediction.of(lambda e: not is_static(e.kind)) for name, prediction in validate.items()}
     experiments = moving["identified"].experiments
     if experiments:
-        errors = curves.error_curves({name: moving[name] for name in ("null", "null_held", *shown)})
+        errors = curves.error_curves({name: moving[name] for name in ("null", "null_held", *compared)})
         errors.to_csv(folder / "errors.csv", **CSV)
         floor = moving["noise_floor"].scores()[VALIDATE]
         save_figure(plots.error_figure(errors, floor), folder / "errors.png")
         kinds = [e for e in experiments if e.kind == experiments[-1].kind]
         widest = max(kinds, key=lambda e: float(np.ptp(e.positions, axis=0).max()))
-        one = {name: moving[name].of(lambda e: e.name == widest.name) for name in shown}
-        table = curves.distance_table(one, segments)
+        widest_trial = {name: moving[name].of(lambda e: e.name == widest.name) for name in compared}
+        table = curves.distance_table(widest_trial, segments)
         table.to_csv(folder / "distances.csv", **CSV)
         save_figure(plots.distance_figure(table, widest.name), folder / "distances.png")
-        save_figure(plots.path_figure(one), folder / "paths.png")
+        save_figure(plots.path_figure(widest_trial), folder / "paths.png")
 
 
 def read_reported(config: IdentificationSettings) -> list[Trial]:
@@ -230,9 +229,9 @@ def read_reported(config: IdentificationSettings) -> list[Trial]:
     for kind in config.experiments:
         for split in DECIDING:
             if not any(t.experiment == kind and t.split == split for t in trials):
-                found, way_out = f"found no {kind} trial with split {split}", EXPERIMENTS[kind].without
+                missing, way_out = f"found no {kind} trial with split {split}", EXPERIMENTS[kind].without
                 otherwise = f", or in params.yaml {way_out}: data/raw/README.md" if way_out else ""
-                raise InputError(f"session.yaml: {found}, expected at least one{otherwise}")
+                raise InputError(f"session.yaml: {missing}, expected at least one{otherwise}")
     segments = trials[0].segments
     for trial in trials:
         if trial.segments != segments:

@@ -16,8 +16,9 @@ LAB = "demo"  # the session that the stand-in lab records, see demo/dvc.yaml
 def check_once(root: Path = Path(".")) -> None:
     """Check the settings of all stages, unless these very files passed before.
 
-    Every stage calls this first, so that a typo in the last section shows before the first stage works. To check
-    is to import every stage, which takes seconds; hence the note of what has passed, in DVC's temporary folder.
+    Every stage that DVC runs calls this first, so that a typo in the last section shows before the first stage works.
+    To check is to import every stage, which takes seconds: hence the note of what has passed, in DVC's temporary
+    folder, and a stage that is run by itself checks its own settings alone.
     Outside of a pipeline (no dvc.yaml) there is nothing to check.
 
     Raises:

@@ -31,7 +31,8 @@ def run_stage(name: str, schema: type[Config], main: Callable[[Config], None], r
 
     @in_one_line
     def run() -> int:
-        check_once()
+        if "DVC_STAGE" in os.environ:  # the pipeline runs: others may come after this one
+            check_once()
         config = load_config(schema, name, root)
         with threadpool_limits(1, user_api="blas"):
             main(config)
@@ -62,28 +63,39 @@ def output_folder(path: str | Path) -> Iterator[Path]:
     shutil.rmtree(old, ignore_errors=True)
 
 
-def write_json(path: str | Path, data: object) -> None:
-    """Write JSON that is the same for the same results: sorted keys, floats to 9 significant digits.
+def write_metrics(folder: Path, metrics: object) -> None:
+    """Write `metrics.json`, its floats to 4 significant digits, so that noise of another machine changes no file.
+
+    Raises:
+        InputError: as `write_json`.
+    """
+    write_json(folder / "metrics.json", metrics, digits=4)
+
+
+def write_json(path: str | Path, data: object, digits: int = 9) -> None:
+    """Write JSON that is the same for the same results: sorted keys, floats to so many significant digits.
 
     NumPy scalars and arrays become numbers and lists.
 
     Raises:
         InputError: naming file and key, if a number is not finite.
     """
-    text = json.dumps(_plain(data, f"{path}: "), indent=2, sort_keys=True, allow_nan=False)
+    text = json.dumps(_plain(data, f"{path}: ", digits), indent=2, sort_keys=True, allow_nan=False)
     Path(path).write_text(text + "\n", encoding="utf-8")
 
 
-def _plain(value: object, key: str) -> object:
+def _plain(value: object, key: str, digits: int) -> object:
     tolist = getattr(value, "tolist", None)  # of NumPy scalars and arrays
     if tolist is not None:
         value = tolist()
     if isinstance(value, dict):
-        return {str(k): _plain(v, f"{key}{k}" if key.endswith(": ") else f"{key}.{k}") for k, v in value.items()}
+        return {
+            str(k): _plain(v, f"{key}{k}" if key.endswith(": ") else f"{key}.{k}", digits) for k, v in value.items()
+        }
     if isinstance(value, list | tuple):
-        return [_plain(v, f"{key}[{i}]") for i, v in enumerate(value)]
+        return [_plain(v, f"{key}[{i}]", digits) for i, v in enumerate(value)]
     if isinstance(value, float):
         if not math.isfinite(value):
             raise InputError(f"{key}: found {value}, expected a finite number")
-        return float(f"{value:.9g}")
+        return float(f"{value:.{digits}g}")
     return value

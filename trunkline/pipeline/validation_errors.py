@@ -1,4 +1,4 @@
-"""What pydantic found wrong, as one line that names the key."""
+"""Errors of pydantic as one line that names the key."""
 
 import re
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ from pydantic import TypeAdapter
 from trunkline.errors import nearest
 
 UNKNOWN_KEY = "unexpected_keyword_argument"  # what pydantic calls it in a dataclass
-MANY = 12  # names, of which the one that was meant is told alone
+MANY = 12  # valid names, from which on the nearest alone is printed
 # pydantic's names for a number out of its range, and JSON schema's for the end that it passed
 BEYOND = {
     "greater_than": "exclusiveMinimum",
@@ -68,28 +68,28 @@ def describe(problem: Any, adapter: TypeAdapter) -> str:
         schema = adapter.json_schema()
         classes = [schema, *schema.get("$defs", {}).values()]
         valid = [name for cls in classes for name in cls.get("properties", {})]
-        found = str(problem["loc"][-1])
-        return "unknown key" + nearest(found, [name for name in valid if name != found])  # some may be of another class
+        unknown = str(problem["loc"][-1])
+        return "unknown key" + nearest(unknown, [name for name in valid if name != unknown])  # of another class
     if problem["type"] == "missing":
         return "missing, expected a value"
     expected = problem["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
     if problem["type"] == "value_error":  # a rule between fields, in the schema's own words
         return expected
-    found = problem["input"]
+    value = problem["input"]
     if problem["type"] == "union_tag_not_found":  # which of several classes: a key of theirs says it
         return f"{problem['ctx']['discriminator']}: missing, expected a value".replace("'", "", 2)
     if problem["type"] == "union_tag_invalid":
-        key, found = problem["ctx"]["discriminator"].strip("'"), problem["ctx"]["tag"]
+        key, value = problem["ctx"]["discriminator"].strip("'"), problem["ctx"]["tag"]
         expected = f"one of {problem['ctx']['expected_tags']}"
         valid = re.findall(r"'([^']*)'", expected)
-        return f"{key}: found {found!r}, expected {expected}" + nearest(found, valid)
+        return f"{key}: found {value!r}, expected {expected}" + nearest(value, valid)
     if problem["type"] in BEYOND:
         expected = _range(problem, adapter) or expected
     valid = re.findall(r"'([^']*)'", expected) if problem["type"] == "literal_error" else []
-    meant = nearest(str(found), valid)
-    if meant and len(valid) > MANY:
+    suggestion = nearest(str(value), valid)
+    if suggestion and len(valid) > MANY:
         expected = f"one of {len(valid)} names"
-    return f"found {found!r}, expected {expected}{meant}"
+    return f"found {value!r}, expected {expected}{suggestion}"
 
 
 def _range(problem: Any, adapter: TypeAdapter) -> str:
@@ -98,8 +98,8 @@ def _range(problem: Any, adapter: TypeAdapter) -> str:
     schema = adapter.json_schema()
     named = [cls.get("properties", {}).get(*key) for cls in (schema, *schema.get("$defs", {}).values()) if key]
     passed, (limit, *_) = BEYOND[problem["type"]], problem["ctx"].values()
-    found = {_ends(node) for node in _nodes(named) if node.get(passed) == limit}
-    return found.pop() if len(found) == 1 else ""
+    ranges = {_ends(node) for node in _nodes(named) if node.get(passed) == limit}
+    return ranges.pop() if len(ranges) == 1 else ""
 
 
 def _nodes(schema: Any) -> Iterator[dict]:

@@ -90,7 +90,7 @@ CHOICES: dict[tuple[str, str], frozenset[str]] = {
 _NUMBERS = re.compile(r"[-+.\deE\s]+")
 
 
-def kept_attributes(element: ET.Element) -> frozenset[str] | None:
+def imported_attributes(element: ET.Element) -> frozenset[str] | None:
     """Attributes of this element that survive; None if all do, as far as is known.
 
     <site site=…> in a tendon, <joint joint=… coef=…> and <geom geom=…> refer to the elements of that name.
@@ -108,9 +108,9 @@ def as_imported(saved: str) -> str:
     """
     root = ET.fromstring(saved)
     for element in root.iter():
-        kept = kept_attributes(element)
+        imported = imported_attributes(element)
         for name, value in list(element.attrib.items()):
-            if kept is not None and name not in kept:
+            if imported is not None and name not in imported:
                 del element.attrib[name]
             elif value.strip() and _NUMBERS.fullmatch(value) and name not in ("name", "timestep", "gravity"):
                 element.set(name, " ".join(f"{np.float32(number):.9g}" for number in value.split()))

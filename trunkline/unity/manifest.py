@@ -62,7 +62,7 @@ class Actuator(_Block):
     rest_length: float = Field(gt=0, description="m; the command that the control 0 stands for")
 
 
-class Branch(_Block):
+class BranchBlock(_Block):
     joint: str
     branch: str = Field(description="the hinge that lags behind the joint, on the world")
     tie: str = Field(description="the tendon that ties one to the other, whose spring bears nothing at rest")
@@ -95,7 +95,7 @@ class Model(_Block):
         " with kp (path length - rest length + pull) N and never pushes, so under tension the path stays longer than"
         " the command by tension / kp"
     )
-    branches: list[Branch] = Field(
+    branches: list[BranchBlock] = Field(
         description="of joints that creep: springs and dampers in series, at rest where their joints are"
     )
     springs: list[JointLaw] = Field(
@@ -135,7 +135,7 @@ class Hybrid(_Block):
     robot: Robot = Field(description="what holds the arm, as `trunkline/kinematics/panda/mounts.py` says")
 
 
-class Network(_Block):
+class NetworkBlock(_Block):
     file: str
     opset: int
     input: str
@@ -150,7 +150,7 @@ class Network(_Block):
     operators: list[str]
 
 
-class Grid(_Block):
+class GridBlock(_Block):
     file: str
     frame: str
     shape: list[int] = Field(min_length=3, max_length=3, description="points along Unity's x, y, z")
@@ -162,7 +162,7 @@ class Grid(_Block):
     overlap: float = Field(description="with the set before it was rounded: what both share over what either has")
 
 
-class Sheets(_Block):
+class SheetsBlock(_Block):
     file: str
     weights: str = Field(description="another file: the matrix M of `blend`")
     directions: list[float] = Field(min_length=3, description="of gravity, x, y, z of each, Unity's axes, unit length")
@@ -179,13 +179,13 @@ class Sheets(_Block):
     )
 
 
-class Reach(_Block):
+class ReachBlock(_Block):
     frame: str = "base of the soft arm"
     angles: list[float] = Field(min_length=1, description="gravity angles of the soft grids, rad, ascending")
     grids: list[str] = Field(min_length=1, description="their names in `grids`, in the same order")
     threshold: float = Field(description="m; a signal above it means out of reach")
     tolerance: float = Field(gt=0, description="m; how near a reachable tip counts as within reach")
-    sheets: Sheets | None = Field(description="the surface of tips, where gravity comes from any side")
+    sheets: SheetsBlock | None = Field(description="the surface of tips, where gravity comes from any side")
     signal: str = Field(description="m, about how far outside; how it is found")
 
 
@@ -205,10 +205,10 @@ class Manifest(_Block):
     frames: Frames = Frames()
     model: Model
     hybrid: Hybrid
-    network: Network
+    network: NetworkBlock
     meshes: dict[str, Mesh]
-    grids: dict[str, Grid]
-    reach: Reach
+    grids: dict[str, GridBlock]
+    reach: ReachBlock
     metrics: dict[str, dict] = Field(description="metrics.json of every stage before this one")
     sha256: dict[str, str] = Field(description="of every other file in the package, by its path in it")
 
@@ -231,12 +231,12 @@ def actuators_of(model: mujoco.MjModel) -> list[Actuator]:
     return [Actuator(name=model.actuator(i).name, tendon=tendons[i], rest_length=rest[i]) for i in range(model.nu)]
 
 
-def branches_of(model: mujoco.MjModel) -> list[Branch]:
+def branches_of(model: mujoco.MjModel) -> list[BranchBlock]:
     """Of all joints, the first of each, then the second."""
     return [
-        Branch(joint=model.joint(hinge).name, branch=model.joint(own).name, tie=model.tendon(tendon).name)
-        for one in all_elements(model, BRANCH)
-        for hinge, own, tendon in zip(one.hinge, one.own, one.tendon, strict=True)
+        BranchBlock(joint=model.joint(hinge).name, branch=model.joint(own_hinge).name, tie=model.tendon(tendon).name)
+        for element in all_elements(model, BRANCH)
+        for hinge, own_hinge, tendon in zip(element.hinge, element.own, element.tendon, strict=True)
     ]
 
 
@@ -250,7 +250,7 @@ def describe_model(model: mujoco.MjModel, file: str, **measured) -> Model:
         gravity_unity=unity_position(model.opt.gravity).tolist(),
         integrator=mujoco.mjtIntegrator(model.opt.integrator).name.removeprefix("mjINT_").lower(),
         names=names_of(model),
-        rest_lengths={one.tendon: one.rest_length for one in drawn},
+        rest_lengths={actuator.tendon: actuator.rest_length for actuator in drawn},
         actuators=drawn,
         branches=branches_of(model),
         **measured,

@@ -7,11 +7,11 @@ from google.protobuf.message import DecodeError
 from onnx.external_data_helper import uses_external_data
 
 from trunkline.errors import InputError
-from trunkline.unity.manifest import Network, require_widths
+from trunkline.unity.manifest import NetworkBlock, require_widths
 from trunkline.unity.rules import Violation, lint_network
 
 
-def describe_network(data: bytes, file: str, tendons: list[str], source: str) -> tuple[Network, list[Violation]]:
+def describe_network(data: bytes, file: str, tendons: list[str], source: str) -> tuple[NetworkBlock, list[Violation]]:
     """The manifest's block on the network, and what Unity could not read of it.
 
     Args:
@@ -30,7 +30,7 @@ def describe_network(data: bytes, file: str, tendons: list[str], source: str) ->
         raise InputError(f"{source}: found outputs {outputs}, expected those of the model's actuators, {tendons}")
     require_widths(_widths(model.graph.input), _widths(model.graph.output), inputs, outputs, source)
     opset = max(entry.version for entry in model.opset_import)
-    block = Network(
+    block = NetworkBlock(
         file=file,
         opset=opset,
         input_order=inputs,

@@ -54,9 +54,9 @@ def with_metas(name: str, files: dict[str, bytes]) -> dict[str, bytes]:
     Args:
         name: the package's name, part of the identifiers. files: contents by path in the package.
     """
-    seen = [path for path in files if not any(part.endswith("~") for part in Path(path).parts)]
-    folders = {str(folder) for path in seen for folder in Path(path).parents if str(folder) != "."}
-    metas = {f"{path}.meta": _meta(name, path, is_folder=False) for path in seen}
+    visible = [path for path in files if not any(part.endswith("~") for part in Path(path).parts)]
+    folders = {str(folder) for path in visible for folder in Path(path).parents if str(folder) != "."}
+    metas = {f"{path}.meta": _meta(name, path, is_folder=False) for path in visible}
     metas |= {f"{folder}.meta": _meta(name, folder, is_folder=True) for folder in folders}
     return dict(sorted((files | metas).items()))
 

@@ -84,14 +84,14 @@ class Scene:
 
     def recreate(self) -> None:
         """`RecreateScene`: an arm has come or gone, or another of MuJoCo's components."""
-        kept = {name: (self.data.qpos[j], self.data.qvel[j]) for name, j in self._hinges().items()}
+        states = {name: (self.data.qpos[j], self.data.qvel[j]) for name, j in self._hinges().items()}
         mujoco.mj_resetData(self.model, self.data)
         mujoco.mj_kinematics(self.model, self.data)
         self._synchronize()
         self._create()
         for name, j in self._hinges().items():
-            if name in kept:
-                self.data.qpos[j], self.data.qvel[j] = kept[name]
+            if name in states:
+                self.data.qpos[j], self.data.qvel[j] = states[name]
         mujoco.mj_kinematics(self.model, self.data)
         self._synchronize()
 
@@ -104,14 +104,14 @@ class Scene:
         """`CreateScene`: controls and activations begin at 0."""
         spec = mujoco.MjSpec()
         for number, arm in enumerate(self.arms):
-            own = mujoco.MjSpec.from_string(arm.mjcf)
+            arm_spec = mujoco.MjSpec.from_string(arm.mjcf)
             if number == 0:  # MjGlobalSettings, of which a scene has one
-                spec.option = own.option
+                spec.option = arm_spec.option
             parent, place, turn = spec.worldbody, [number * APART, 0.0, 0.0], arm.turn
             if arm.mount:
                 parent = parent.add_body(name=arm.mount, mocap=True, pos=place, quat=turn)
                 place, turn = [0.0, 0.0, 0.0], UPRIGHT
-            spec.attach(own, prefix=arm.prefix, frame=parent.add_frame(pos=place, quat=turn))
+            spec.attach(arm_spec, prefix=arm.prefix, frame=parent.add_frame(pos=place, quat=turn))
         self.model = spec.compile()
         self.model.opt.gravity[:] = np.float32(self.gravity)
         self.model.opt.timestep = np.float32(self.step)

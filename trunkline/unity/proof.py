@@ -15,7 +15,7 @@ from trunkline.unity.importer import as_imported
 from trunkline.unity.manifest import Manifest, Model
 from trunkline.unity.package import MANIFEST, MODEL
 from trunkline.unity.plugin import Imported, Scene
-from trunkline.unity.start import Twin
+from trunkline.unity.start import TwinComponent
 from trunkline.unity.time_steps import steps_taken
 
 DOWN = np.array([0.0, 0.0, -STANDARD_GRAVITY])
@@ -44,7 +44,7 @@ def scene_of(files: dict[str, bytes], turn: Rotation, step: float, alone: bool =
     """
     x, y, z, w = turn.as_quat()
     arm = Imported(PREFIX, as_imported(files[MODEL].decode()), (w, x, y, z))
-    return Scene([arm], [] if alone else [Twin(manifest_of(files), PREFIX)], DOWN, step)
+    return Scene([arm], [] if alone else [TwinComponent(manifest_of(files), PREFIX)], DOWN, step)
 
 
 def at_rest(calibrated: mujoco.MjModel, turn: Rotation, commands: np.ndarray) -> np.ndarray | None:
@@ -58,8 +58,8 @@ def at_rest(calibrated: mujoco.MjModel, turn: Rotation, commands: np.ndarray) ->
     base = data.body("base")
     to_root = base.xmat.reshape(3, 3)
     gravity = to_root.T @ turn.inv().apply(DOWN)
-    found = actuated(read_chain(calibrated).smooth, commands[None], gravity[None])
-    return turn.apply(base.xpos + to_root @ found.position[0]) if found.converged[0] else None
+    rest = actuated(read_chain(calibrated).smooth, commands[None], gravity[None])
+    return turn.apply(base.xpos + to_root @ rest.position[0]) if rest.converged[0] else None
 
 
 def started(calibrated: mujoco.MjModel, files: dict[str, bytes], tilts: Sequence[float]) -> dict[str, dict[str, float]]:
@@ -70,22 +70,22 @@ def started(calibrated: mujoco.MjModel, files: dict[str, bytes], tilts: Sequence
     Args:
         calibrated: takes commands. files: of the finished package. tilts: gravity angles, rad.
     """
-    rest = np.array([one.rest_length for one in manifest_of(files).actuators])
+    rest = np.array([actuator.rest_length for actuator in manifest_of(files).actuators])
     rests = [(turn, at_rest(calibrated, turn, rest)) for turn in turns(tilts)]
-    known = [(turn, tip) for turn, tip in rests if tip is not None]
-    if not known:
+    equilibria = [(turn, tip) for turn, tip in rests if tip is not None]
+    if not equilibria:
         raise InputError("the twin's start: found no equilibrium of the calibrated arm, expected one to start from")
     names = ("start_error_mm", "recreated_error_mm")
-    found: dict[str, dict[str, float]] = {name: {"turns": len(known)} for name in names}
+    metrics: dict[str, dict[str, float]] = {name: {"turns": len(equilibria)} for name in names}
     for key, alone in (("max", False), ("without", True)):
         start, recreated = 0.0, 0.0
-        for (turn, tip), step in product(known, steps_taken()):
+        for (turn, tip), step in product(equilibria, steps_taken()):
             scenes = [scene_of(files, turn, step, alone) for _ in range(3)]
             start = max(start, start_error(scenes[0], tip))
             recreated = max(recreated, recreated_error(scenes[1], scenes[2]))
-        found["start_error_mm"][key] = round(1e3 * start, 6)
-        found["recreated_error_mm"][key] = round(1e3 * recreated, 6)
-    return found
+        metrics["start_error_mm"][key] = round(1e3 * start, 6)
+        metrics["recreated_error_mm"][key] = round(1e3 * recreated, 6)
+    return metrics
 
 
 def start_error(scene: Scene, rest: np.ndarray) -> float:
@@ -102,10 +102,10 @@ def start_error(scene: Scene, rest: np.ndarray) -> float:
 def recreated_error(scene: Scene, other: Scene) -> float:
     """How far the tip gets in `WATCHED` after a scene was compiled anew from where it is in another that was not, m:
     of an arm that is pulled and still swings."""
-    for one in (scene, other):
-        one.start()
-        pull(one)
-        one.fixed_update(round(WATCHED / one.step))
+    for instance in (scene, other):
+        instance.start()
+        pull(instance)
+        instance.fixed_update(round(WATCHED / instance.step))
     scene.recreate()
     furthest = 0.0
     for _ in range(round(WATCHED / scene.step)):

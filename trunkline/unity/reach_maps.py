@@ -11,7 +11,7 @@ from trunkline.kinematics.sdf.grid import Lattice
 from trunkline.kinematics.sdf.mesh import unsimplified
 from trunkline.kinematics.sdf.mesh_distance import mesh_distance
 from trunkline.unity.frame import unity_obj, unity_position, unity_volume
-from trunkline.unity.manifest import Grid, Mesh, Reach, Sheets
+from trunkline.unity.manifest import GridBlock, Mesh, ReachBlock, SheetsBlock
 from trunkline.unity.rounding import rounded
 
 FOLDER = "Runtime/Reachability"
@@ -68,7 +68,7 @@ def _deviation(mesh: trimesh.Trimesh, arrays: dict[str, np.ndarray], name: str, 
     return mesh_distance((mesh.vertices, mesh.faces), whole, LOOKS * lattice.spacing)
 
 
-def convert_grids(arrays: dict[str, np.ndarray], source: str) -> tuple[dict[str, bytes], dict[str, Grid]]:
+def convert_grids(arrays: dict[str, np.ndarray], source: str) -> tuple[dict[str, bytes], dict[str, GridBlock]]:
     """Signed distance grids as raw volumes for Unity.
 
     Args:
@@ -84,7 +84,7 @@ def convert_grids(arrays: dict[str, np.ndarray], source: str) -> tuple[dict[str,
         file = f"{FOLDER}/{name}.bytes"
         packed = rounded(values)
         files[file] = unity_volume(packed)
-        blocks[name] = Grid(
+        blocks[name] = GridBlock(
             file=file,
             frame=frame_of(name),
             shape=unity_position(values.shape).tolist(),
@@ -100,11 +100,11 @@ def convert_grids(arrays: dict[str, np.ndarray], source: str) -> tuple[dict[str,
 def _overlap(values: np.ndarray, packed: np.ndarray) -> float:
     """Of the insides of two grids, by points anywhere between theirs: those in both over those in either."""
     points = np.random.default_rng(0).uniform(0, np.array(values.shape) - 1, (PROBES, 3)).T
-    one, other = (map_coordinates(np.asarray(grid, float), points, order=1) <= 0 for grid in (values, packed))
-    return round(float((one & other).sum() / max((one | other).sum(), 1)), 5)
+    first, second = (map_coordinates(np.asarray(grid, float), points, order=1) <= 0 for grid in (values, packed))
+    return round(float((first & second).sum() / max((first | second).sum(), 1)), 5)
 
 
-def convert_sheets(arrays: dict[str, np.ndarray], source: str) -> tuple[dict[str, bytes], Sheets | None]:
+def convert_sheets(arrays: dict[str, np.ndarray], source: str) -> tuple[dict[str, bytes], SheetsBlock | None]:
     """The surface of tips under any gravity, for Unity; nothing where the maps are of one tilt.
 
     Args:
@@ -125,7 +125,7 @@ def convert_sheets(arrays: dict[str, np.ndarray], source: str) -> tuple[dict[str
         )
     file, weights = f"{FOLDER}/sheets.bytes", f"{FOLDER}/sheet_weights.bytes"
     directions = unity_position(downs)
-    block = Sheets(
+    block = SheetsBlock(
         file=file,
         weights=weights,
         directions=directions.reshape(-1).tolist(),
@@ -136,7 +136,7 @@ def convert_sheets(arrays: dict[str, np.ndarray], source: str) -> tuple[dict[str
     return {file: unity_position(points).astype("<f2").tobytes(), weights: matrix.astype("<f8").tobytes()}, block
 
 
-def describe_reach(arrays: dict[str, np.ndarray], sheets: Sheets | None, source: str) -> Reach:
+def describe_reach(arrays: dict[str, np.ndarray], sheets: SheetsBlock | None, source: str) -> ReachBlock:
     """How a headset tells from the soft grids or sheets what is out of reach.
 
     Args:
@@ -151,7 +151,7 @@ def describe_reach(arrays: dict[str, np.ndarray], sheets: Sheets | None, source:
     angles = np.asarray(arrays["soft_angles"], float).tolist()
     if len(names) != len(angles):
         raise InputError(f"{source}: found {len(names)} soft maps and {len(angles)} soft_angles, expected as many")
-    return Reach(
+    return ReachBlock(
         angles=angles,
         grids=names,
         threshold=float(arrays["soft_threshold"]),

@@ -35,17 +35,17 @@ ASSET = (
 
 def refusals(files: dict[str, bytes]) -> dict[str, str]:
     """What a reader says against each of a package's `files` (contents by path) that one refuses."""
-    found = {}
+    reasons = {}
     for path, data in sorted(files.items()):
         read = READERS.get(path[path.rfind("."):])
         if read is None:
-            found[path] = "no reader for files of its kind"
+            reasons[path] = "no reader for files of its kind"
             continue
         try:
             read(path, data, files)
         except Exception as error:  # whatever a reader raises, it has refused the file
-            found[path] = f"{type(error).__name__}: {error}"
-    return found
+            reasons[path] = f"{type(error).__name__}: {error}"
+    return reasons
 
 
 def _mesh(path: str, data: bytes, files: dict[str, bytes]) -> None:
@@ -73,11 +73,11 @@ def _network(path: str, data: bytes, files: dict[str, bytes]) -> None:
     (entry,) = model.graph.input
     poses = np.random.default_rng(0).uniform(-0.5, 0.5, (POSES, entry.type.tensor_type.shape.dim[-1].dim_value))
     poses[:, -4:] /= np.linalg.norm(poses[:, -4:], axis=1, keepdims=True)  # a quaternion
-    known, *others = ((name, answer(data, poses.astype(np.float32))) for name, answer in ENGINES.items())
-    for name, found in others:
-        apart = max(np.abs(first - second).max() for first, second in zip(known[1], found, strict=True))
+    reference, *others = ((name, answer(data, poses.astype(np.float32))) for name, answer in ENGINES.items())
+    for name, outputs in others:
+        apart = max(np.abs(first - second).max() for first, second in zip(reference[1], outputs, strict=True))
         if not apart <= ENGINES_APART:
-            raise ValueError(f"{known[0]} and {name} are {apart:g} apart")
+            raise ValueError(f"{reference[0]} and {name} are {apart:g} apart")
 
 
 def _by_onnxruntime(data: bytes, poses: np.ndarray) -> list[np.ndarray]:

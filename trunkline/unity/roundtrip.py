@@ -56,8 +56,8 @@ def simulate(model: mujoco.MjModel, commands: np.ndarray, tilt: float) -> Motion
     batch.expand("opt.gravity")[:] = gravity_in_base(tilt)
     sent = controls(model, commands)
     hold(batch, model, sent[0])
-    found = move(batch, sent[None], ("xpos", "site_xpos", "qpos", "qvel"))
-    positions, sites, angles, speeds = (found[name][0] for name in ("xpos", "site_xpos", "qpos", "qvel"))
+    recorded = move(batch, sent[None], ("xpos", "site_xpos", "qpos", "qvel"))
+    positions, sites, angles, speeds = (recorded[name][0] for name in ("xpos", "site_xpos", "qpos", "qvel"))
     return Motion(positions, sites[:, model.site("tip").id], angles, speeds, int(batch.warning.sum()))
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import mujoco
 
 from trunkline.errors import InputError
-from trunkline.unity.importer import CHOICES, ELEMENTS, kept_attributes
+from trunkline.unity.importer import CHOICES, ELEMENTS, imported_attributes
 
 NAMED = {"body", "joint", "freejoint", "geom", "site", "spatial", "fixed", "general", "mesh", "material"}
 OPSETS = range(7, 16)  # Unity Inference Engine manual, "Supported models"
@@ -25,15 +25,15 @@ class Violation:
     Attributes:
         element: where, e.g. `joint unit_01_x`.
         rule: name of the rule, e.g. `polynomial`.
-        found: what is there, and what the importer would make of it.
+        detail: what is there, and what the importer would make of it.
     """
 
     element: str
     rule: str
-    found: str
+    detail: str
 
     def __str__(self) -> str:
-        return f"{self.element}: {self.rule}: {self.found}"
+        return f"{self.element}: {self.rule}: {self.detail}"
 
 
 def save_as_mujoco(xml: str, assets: dict[str, bytes] | None = None) -> tuple[str, list[str]]:
@@ -61,30 +61,30 @@ def lint_mjcf(xml: str, assets: dict[str, bytes] | None = None) -> list[Violatio
     """
     saved, complaints = save_as_mujoco(xml, assets)
     root = ET.fromstring(saved)
-    found = [
+    violations = [
         Violation("compiler", "warning", text) for text in complaints
     ]  # LoadModelFromFile throws on them
-    found += _unknown_elements(root)
-    found += _names(root)
+    violations += _unknown_elements(root)
+    violations += _names(root)
     for world in root.iterfind("worldbody"):
-        found += _inertials(world, moving=False)
+        violations += _inertials(world, moving=False)
     for element in root.iter():
-        found += _attributes(element)
-        found += _values(element)
-    found += _axes(root)
+        violations += _attributes(element)
+        violations += _values(element)
+    violations += _axes(root)
     for mesh in root.iter("mesh"):
-        found += _mesh_file(mesh, assets or {})
-    return found
+        violations += _mesh_file(mesh, assets or {})
+    return violations
 
 
 def lint_network(opset: int, external_data: bool) -> list[Violation]:
     """Check a network against what Unity's inference engine reads."""
-    found = []
+    violations = []
     if opset not in OPSETS:
-        found.append(Violation("ik.onnx", "opset", f"{opset}, expected {OPSETS[0]} to {OPSETS[-1]}"))
+        violations.append(Violation("ik.onnx", "opset", f"{opset}, expected {OPSETS[0]} to {OPSETS[-1]}"))
     if external_data:
-        found.append(Violation("ik.onnx", "external data", "weights in another file"))
-    return found
+        violations.append(Violation("ik.onnx", "external data", "weights in another file"))
+    return violations
 
 
 def _label(element: ET.Element) -> str:
@@ -100,16 +100,16 @@ def _unknown_elements(root: ET.Element) -> Iterator[Violation]:
             yield Violation(section.tag, "element", "a section that the importer skips")
     while pending:
         parent = pending.pop()
-        known = ELEMENTS.get(parent.tag)
-        for child in parent if known is not None else ():
-            if child.tag not in known:
+        imported = ELEMENTS.get(parent.tag)
+        for child in parent if imported is not None else ():
+            if child.tag not in imported:
                 yield Violation(_label(child), "element", f"<{child.tag}> in {_label(parent)} is skipped")
             elif child.tag in ("body", "spatial", "fixed"):
                 pending.append(child)
 
 
 def _names(root: ET.Element) -> Iterator[Violation]:
-    seen: dict[str, str] = {}
+    first_uses: dict[str, str] = {}
     for section in root:
         if section.tag == "default":
             continue
@@ -122,9 +122,9 @@ def _names(root: ET.Element) -> Iterator[Violation]:
                 yield Violation(_label(element), "name", "no name")
                 continue
             sanitized = name.replace("/", "_")  # MjEngineTool.Sanitize, in the names of assets
-            if sanitized in seen:
-                yield Violation(_label(element), "unique name", f"{seen[sanitized]} has that name too")
-            seen[sanitized] = _label(element)
+            if sanitized in first_uses:
+                yield Violation(_label(element), "unique name", f"{first_uses[sanitized]} has that name too")
+            first_uses[sanitized] = _label(element)
 
 
 def _inertials(body: ET.Element, moving: bool) -> Iterator[Violation]:
@@ -136,11 +136,11 @@ def _inertials(body: ET.Element, moving: bool) -> Iterator[Violation]:
 
 
 def _attributes(element: ET.Element) -> Iterator[Violation]:
-    known = kept_attributes(element)
-    if known is None:
+    imported = imported_attributes(element)
+    if imported is None:
         return
     for name, value in element.attrib.items():
-        if name not in known:
+        if name not in imported:
             yield Violation(_label(element), "attribute", f'{name}="{value}" is not imported')
 
 
@@ -152,10 +152,10 @@ def _values(element: ET.Element) -> Iterator[Violation]:
             yield Violation(_label(element), rule, f'{name}="{value}", the importer reads one number')
     if float(element.get("ref", 0)) != 0:
         yield Violation(_label(element), "ref", f'ref="{element.get("ref")}", expected 0')
-    for (tag, name), known in CHOICES.items():
-        if element.tag == tag and element.get(name) not in known | {None}:
+    for (tag, name), choices in CHOICES.items():
+        if element.tag == tag and element.get(name) not in choices | {None}:
             yield Violation(
-                _label(element), name, f"{element.get(name)}, known are {', '.join(sorted(known))}"
+                _label(element), name, f"{element.get(name)}, known are {', '.join(sorted(choices))}"
             )
     if (
         element.tag == "general"

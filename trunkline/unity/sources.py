@@ -4,12 +4,11 @@ import json
 from pathlib import Path
 
 from trunkline.errors import InputError, existing
+from trunkline.identification.stages import STAGES as IDENTIFYING
 from trunkline.unity.twin import Sources
 from trunkline.version import __version__
 
-STAGES = ["ingest", "filter", "build_mjcf", "identify_stiffness", "identify_damping", "identify_control"]
-STAGES += ["fk_dataset", "train_ik", "reachability"]
-IDENTIFIED = ["identify_stiffness", "identify_damping", "identify_control"]  # in this order: the latest counts
+STAGES = ("ingest", "filter", "build_mjcf", *IDENTIFYING, "fk_dataset", "train_ik", "reachability")
 
 
 def read_sources(root: Path) -> Sources:
@@ -21,11 +20,11 @@ def read_sources(root: Path) -> Sources:
     artifacts = root / "artifacts"
     meshes = sorted((artifacts / "reachability/meshes").glob("*.obj"))
     if not meshes:
-        found = f"{artifacts}/reachability/meshes: found no mesh"
-        raise InputError(f"{found}, expected .obj files (run the reachability stage)")
+        place = f"{artifacts}/reachability/meshes: found no mesh"
+        raise InputError(f"{place}, expected .obj files (run the reachability stage)")
     return Sources(
         mjcf=existing(artifacts / "identify_control/arm.xml").read_text(),
-        parameters={s: json.loads(existing(artifacts / s / "parameters.json").read_text()) for s in IDENTIFIED},
+        parameters={s: json.loads(existing(artifacts / s / "parameters.json").read_text()) for s in IDENTIFYING},
         network=existing(artifacts / "train_ik/ik.onnx"),
         meshes=meshes,
         grids=existing(artifacts / "reachability/grids.npz"),

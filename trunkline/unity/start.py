@@ -22,7 +22,7 @@ MOST_STEPS = 5000
 
 
 @dataclass
-class Twin:
+class TwinComponent:
     """The component of one arm.
 
     Attributes:
@@ -46,8 +46,8 @@ class Twin:
         places = scene.model.actuator_actadr[actuators]
         activations = self.activations
         if activations is None:
-            own, at_rest = self._settled(scene)
-            scene.data.qpos[own] = at_rest
+            angles, at_rest = self._settled(scene)
+            scene.data.qpos[angles] = at_rest
             activations = self.activations = scene.data.ctrl[actuators].copy()
         scene.data.act[places[places >= 0]] = activations[places >= 0]
         mujoco.mj_forward(scene.model, scene.data)
@@ -81,32 +81,38 @@ class Twin:
         """Places of the arm's angles in `qpos`, and the angles at rest, rad. Shapes (n,); what is not the arm stands
         still. Where it finds no rest it stays straight."""
         model, data = scene.model, mujoco.MjData(scene.model)
-        own = np.array([model.joint(self.prefix + name).id for name in self.arm.names.joints])
+        joint_ids = np.array([model.joint(self.prefix + name).id for name in self.arm.names.joints])
         actuators = self._actuators(model)
-        others = np.setdiff1d(np.arange(model.nq), own)
-        branches = {self.prefix + one.branch: self.prefix + one.joint for one in self.arm.branches}
+        others = np.setdiff1d(np.arange(model.nq), joint_ids)
+        branches = {self.prefix + entry.branch: self.prefix + entry.joint for entry in self.arm.branches}
         joint = np.array([model.joint(name).id for name in branches.values()], dtype=int)
         branch = np.array([model.joint(name).id for name in branches], dtype=int)
-        ties = [model.tendon(self.prefix + one.tie).id for one in self.arm.branches]
+        ties = [model.tendon(self.prefix + entry.tie).id for entry in self.arm.branches]
         cables = [model.tendon(self.prefix + name).id for name in self.arm.names.tendons]
-        let_go = ((model.tendon_stiffness, ties), (model.tendon_frictionloss, cables), (model.dof_frictionloss, own))
-        kept = [values[places].copy() for values, places in let_go]
+        let_go = (
+            (model.tendon_stiffness, ties),
+            (model.tendon_frictionloss, cables),
+            (model.dof_frictionloss, joint_ids),
+        )
+        saved = [values[places].copy() for values, places in let_go]
         for values, places in let_go:
             values[places] = 0
         data.ctrl[:], data.act[:] = scene.data.ctrl, scene.data.act
         places = model.actuator_actadr[actuators]
         data.act[places[places >= 0]] = data.ctrl[actuators][places >= 0]
-        rests, self.steps = _led_to_rest(model, data, own, others)
-        for (values, places), before in zip(let_go, kept, strict=True):
+        rests, self.steps = _led_to_rest(model, data, joint_ids, others)
+        for (values, places), before in zip(let_go, saved, strict=True):
             values[places] = before
         data.qpos[branch] = data.qpos[joint]
-        return own, data.qpos[own] if rests else model.qpos0[own]
+        return joint_ids, data.qpos[joint_ids] if rests else model.qpos0[joint_ids]
 
 
-def _led_to_rest(model: mujoco.MjModel, data: mujoco.MjData, own: np.ndarray, others: np.ndarray) -> tuple[bool, int]:
-    """Step until the arm of the joints `own` rests, the `others` standing still; whether it does, and after how many
+def _led_to_rest(
+    model: mujoco.MjModel, data: mujoco.MjData, joint_ids: np.ndarray, others: np.ndarray
+) -> tuple[bool, int]:
+    """Step until the arm of the joints `joint_ids` rests, with the `others` fixed; whether it does, and after how many
     steps."""
-    energy, since, peaks, last = 0.0, 0, 0, data.qpos[own].copy()
+    energy, since, peaks, last = 0.0, 0, 0, data.qpos[joint_ids].copy()
     for step in range(MOST_STEPS):
         mujoco.mj_step(model, data)
         data.qpos[others], data.qvel[others] = model.qpos0[others], 0
@@ -116,8 +122,8 @@ def _led_to_rest(model: mujoco.MjModel, data: mujoco.MjData, own: np.ndarray, ot
             energy = data.energy[1]
             continue
         energy, since, data.qvel[:] = 0.0, 0, 0
-        peaks = peaks + 1 if np.abs(data.qpos[own] - last).max() < STILL else 0
-        last = data.qpos[own].copy()
+        peaks = peaks + 1 if np.abs(data.qpos[joint_ids] - last).max() < STILL else 0
+        last = data.qpos[joint_ids].copy()
         if peaks == PEAKS:
             return True, step + 1
     return False, MOST_STEPS

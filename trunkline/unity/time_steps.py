@@ -39,45 +39,37 @@ def step_errors(
     Args:
         duration: s, pull: m, of the curl. tilts: gravity angles, rad.
     """
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda message: None)  # else it tells of those that diverge, which are meant to
-    try:
-        return _step_errors(calibrated, packed, duration, pull, tilts)
-    finally:
-        mujoco.set_mju_user_warning(before)
-
-
-def _step_errors(calibrated, packed, duration, pull, tilts) -> list[StepError]:
     start = curl(calibrated, duration, pull)
     expected = [simulate(calibrated, start, tilt).tip for tilt in tilts]
-    known = calibrated.opt.timestep * np.arange(len(start))
-    found = []
+    reference_time = calibrated.opt.timestep * np.arange(len(start))
+    errors = []
     for rate in DISPLAY_RATES:
         for count in range(1, steps_per_frame(rate) + 1):
             model = copy.copy(packed)
             model.opt.timestep = 1 / (rate * count)
             commands = curl(model, duration, pull)
             frames = np.arange(0, len(commands), count)
-            at = np.minimum(frames * model.opt.timestep, known[-1])
+            at = np.minimum(frames * model.opt.timestep, reference_time[-1])
             motions = [simulate(model, commands, tilt) for tilt in tilts]
             error = None
             if not any(motion.warnings for motion in motions):
-                wanted = [np.column_stack([np.interp(at, known, axis) for axis in tip.T]) for tip in expected]
+                wanted = [np.column_stack([np.interp(at, reference_time, axis) for axis in tip.T]) for tip in expected]
                 gaps = [motion.tip[frames] - tip for motion, tip in zip(motions, wanted, strict=True)]
                 error = round(1e3 * float(np.linalg.norm(gaps, axis=2).max()), 3)
             step = model.opt.timestep
-            found.append(StepError(display_rate=rate, steps_per_frame=count, step=step, tip_error_mm=error))
-    return found
+            errors.append(StepError(display_rate=rate, steps_per_frame=count, step=step, tip_error_mm=error))
+    return errors
 
 
 def step_table(steps: Sequence[StepError]) -> str:
     """The same in Markdown, what is taken in bold."""
     rows = ["| display | steps a frame | step | tip error on a curl |", "|---:|---:|---:|---:|"]
-    for one in steps:
-        taken = "**" if one.steps_per_frame == steps_per_frame(one.display_rate) else ""
-        error = "diverges" if one.tip_error_mm is None else f"{one.tip_error_mm:.1f} mm"
+    for entry in steps:
+        taken = "**" if entry.steps_per_frame == steps_per_frame(entry.display_rate) else ""
+        error = "diverges" if entry.tip_error_mm is None else f"{entry.tip_error_mm:.1f} mm"
         rows.append(
-            f"| {one.display_rate:g} Hz | {taken}{one.steps_per_frame}{taken} | {1e3 * one.step:.1f} ms | {error} |"
+            f"| {entry.display_rate:g} Hz | {taken}{entry.steps_per_frame}{taken} "
+            f"| {1e3 * entry.step:.1f} ms | {error} |"
         )
     return "\n".join(rows)
 

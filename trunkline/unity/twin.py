@@ -33,7 +33,7 @@ from trunkline.unity.time_steps import LONGEST_STEP, step_errors, with_steps
 from trunkline.unity.unsupported import without_unsupported
 
 CSHARP = Path(__file__).parent / "csharp"
-OWN_FOLDERS = ("Editor", "Samples~", "Tests")  # of CSHARP, which lie beside Runtime in the package, as Unity expects
+PLAIN_FOLDERS = ("Editor", "Samples~", "Tests")  # of CSHARP, which lie beside Runtime in the package, as Unity expects
 
 
 @dataclass
@@ -106,7 +106,7 @@ def assemble(
     steps = step_errors(calibrated, restored, trajectory.duration, trajectory.pull, trajectory.tilts)
     tendons = [bundled.tendon(i).name for i in bundled.actuator_trnid[:, 0]]
     network = sources.network.read_bytes()
-    network_block, found = describe_network(network, NETWORK, tendons, str(sources.network))
+    network_block, network_violations = describe_network(network, NETWORK, tendons, str(sources.network))
     with np.load(sources.grids) as archive:
         arrays, source = dict(archive), str(sources.grids)
     meshes, mesh_blocks = convert_meshes(sources.meshes, arrays, source)
@@ -152,17 +152,17 @@ def assemble(
         metrics=sources.metrics,
         sha256={},
     )
-    return sealed(manifest, files | meshes | grids | sheets), violations + found
+    return sealed(manifest, files | meshes | grids | sheets), violations + network_violations
 
 
 def scripts() -> dict[str, bytes]:
     """The C# and what describes it, by path in the package."""
-    found = {}
+    files = {}
     for path in sorted(CSHARP.rglob("*")):
         if path.suffix in (".cs", ".asmdef", ".md"):
             place = path.relative_to(CSHARP)
-            found[("" if place.parts[0] in OWN_FOLDERS else "Runtime/") + place.as_posix()] = path.read_bytes()
-    return found
+            files[("" if place.parts[0] in PLAIN_FOLDERS else "Runtime/") + place.as_posix()] = path.read_bytes()
+    return files
 
 
 def sealed(manifest: Manifest, files: dict[str, bytes]) -> dict[str, bytes]:
@@ -175,14 +175,14 @@ def sealed(manifest: Manifest, files: dict[str, bytes]) -> dict[str, bytes]:
 
 def identified(parameters: dict[str, dict]) -> bytes:
     """What `parameters.json` of the stages say that a preview needs, one after the other; the rest is about trials."""
-    kept = ("value", "unit", "interval_95_given_model")
+    columns = ("value", "unit", "interval_95_given_model")
     stages = [
         {
             "stage": stage,
-            "parameters": {name: {key: row[key] for key in kept} for name, row in found["parameters"].items()},
-            "correlation": found["correlation"],
+            "parameters": {name: {key: row[key] for key in columns} for name, row in table["parameters"].items()},
+            "correlation": table["correlation"],
         }
-        for stage, found in parameters.items()
+        for stage, table in parameters.items()
     ]
     return (json.dumps({"stages": stages}, indent=2) + "\n").encode()
 
@@ -204,9 +204,9 @@ def compare(first: mujoco.MjModel, second: mujoco.MjModel, trajectory: Trajector
     commands = curl(first, trajectory.duration, trajectory.pull)
     largest, warnings = 0.0, 0
     for tilt in trajectory.tilts:
-        expected, found = (simulate(model, commands, tilt) for model in (first, second))
-        furthest = float(deviation(expected, found).max())
+        expected, motion = (simulate(model, commands, tilt) for model in (first, second))
+        furthest = float(deviation(expected, motion).max())
         if not np.isfinite(furthest):
             raise InputError(f"a curl at a gravity angle of {tilt:g} rad: found positions that are not finite")
-        largest, warnings = max(largest, furthest), warnings + found.warnings
+        largest, warnings = max(largest, furthest), warnings + motion.warnings
     return round(1e3 * largest, 6), warnings

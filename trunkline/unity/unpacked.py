@@ -25,7 +25,7 @@ def read_package(path: Path) -> dict[str, bytes]:
     """
     if not path.is_dir():
         return read_tarball(path)
-    files = {str(one.relative_to(path).as_posix()): one.read_bytes() for one in path.rglob("*") if one.is_file()}
+    files = {str(file.relative_to(path).as_posix()): file.read_bytes() for file in path.rglob("*") if file.is_file()}
     if MANIFEST not in files:
         raise InputError(f"{path}: found no {MANIFEST}, expected a package's folder")
     return files
@@ -42,9 +42,9 @@ def package_digest(files: dict[str, bytes]) -> str:
     """
     manifest = manifest_of(files)
     for path, expected in manifest["sha256"].items():
-        found = hashlib.sha256(files[path]).hexdigest() if path in files else "none"
-        if found != expected:
-            raise InputError(f"{path}: found sha256 {found[:12]}, expected {expected[:12]} as the manifest says")
+        digest = hashlib.sha256(files[path]).hexdigest() if path in files else "none"
+        if digest != expected:
+            raise InputError(f"{path}: found sha256 {digest[:12]}, expected {expected[:12]} as the manifest says")
     return hashlib.sha256(files[MANIFEST]).hexdigest()
 
 
@@ -61,8 +61,8 @@ def maps_of(files: dict[str, bytes]) -> dict[str, np.ndarray]:
     for name in soft:
         for key in ("shape", "origin", "spacing"):
             if manifest["grids"][name][key] != manifest["grids"][soft[0]][key]:
-                found = f"found another {key} than that of {soft[0]}"
-                raise InputError(f"{name}: {found}, expected one lattice for all soft maps")
+                complaint = f"found another {key} than that of {soft[0]}"
+                raise InputError(f"{name}: {complaint}, expected one lattice for all soft maps")
     for name in (*soft, "rigid"):
         block = manifest["grids"][name]
         nx, ny, nz = block["shape"]  # along Unity's axes, x fastest
@@ -99,12 +99,12 @@ def robot_of(files: dict[str, bytes]) -> Robot:
     return TypeAdapter(Robot).validate_python(_hybrid(files)["robot"])
 
 
-class _Block(dict):
+class _CheckedBlock(dict):
     """A block of a JSON file, and where it is, so that what is missing is named."""
 
     def __init__(self, values: dict, source: str) -> None:
         super().__init__(
-            (name, _Block(value, f"{source}: {name}") if isinstance(value, dict) else value)
+            (name, _CheckedBlock(value, f"{source}: {name}") if isinstance(value, dict) else value)
             for name, value in values.items()
         )
         self._source = source
@@ -129,19 +129,19 @@ def _numbers(files: dict[str, bytes], path: str, kind: str, shape: tuple[int, ..
     """A file's numbers of a `kind`, raw, in this shape."""
     expected = np.dtype(kind).itemsize * math.prod(shape)
     if path not in files or len(files[path]) != expected:
-        found = f"found {len(files[path])} bytes" if path in files else "no such file"
-        raise InputError(f"{path}: {found}, expected {expected} as the manifest's lattice says")
+        complaint = f"found {len(files[path])} bytes" if path in files else "no such file"
+        raise InputError(f"{path}: {complaint}, expected {expected} as the manifest's lattice says")
     return np.frombuffer(files[path], dtype=kind).reshape(shape)
 
 
-def manifest_of(files: dict[str, bytes]) -> _Block:
+def manifest_of(files: dict[str, bytes]) -> _CheckedBlock:
     """The package's manifest; what is missing in it is an error that names it."""
     if MANIFEST not in files:
         raise InputError(f"package: found no {MANIFEST}, expected one of the stage package_unity")
     try:
-        found = json.loads(files[MANIFEST].decode(errors="replace"))
+        manifest = json.loads(files[MANIFEST].decode(errors="replace"))
     except json.JSONDecodeError as error:
         raise InputError(f"{MANIFEST}: found no JSON at character {error.pos}, expected some") from None
-    if not isinstance(found, dict):
+    if not isinstance(manifest, dict):
         raise InputError(f"{MANIFEST}: found no block, expected one")
-    return _Block(found, MANIFEST)
+    return _CheckedBlock(manifest, MANIFEST)

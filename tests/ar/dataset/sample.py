@@ -47,8 +47,8 @@ class Session(LogWriter):
         self.time, self.measured, self.world = 100.0, measured, World("w", (), (CUP,))
         self.file = open(path, "wb")  # noqa: SIM115
         self.book = LogFormat(self.file, subject, ZERO)
-        given = Operator().given
-        self.given = replace(given, world=self.world)
+        message = Operator().message
+        self.message = replace(message, world=self.world)
         tip = {"body": "unit_01", "place": PLACE}
         self.event("begin", package=PACKAGE, hardware=hardware, mount_offset=0.1, tip=tip)
         self.event("world", world=self.world)
@@ -73,7 +73,7 @@ class Session(LogWriter):
             fields = {"targets": None, "rays": ((0.1, 0.2, self.time), None)} | wanted
             if motion == "follow":
                 fields["follow"] = targets(0.1 * self.time)
-            self.step(1 / RATE, self.given, Intent(mode, motion, "", **fields))
+            self.step(1 / RATE, self.message, Intent(mode, motion, "", **fields))
             self.time += 1 / RATE
 
     def plan(self, serial: int, wanted: Targets, probability: float | None = None) -> str:

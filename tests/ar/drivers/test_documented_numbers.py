@@ -1,5 +1,5 @@
-"""The figures of docs/execution.md and docs/safety.md are those of the code: each is read from its sentence and
-compared with what the code has, and none is left out."""
+"""The figures of docs/hardware.md are those of the code: each is read from its sentence and compared with what the
+code has, and none is left out."""
 
 import re
 from functools import cache
@@ -24,13 +24,13 @@ from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.ar.drivers.winch import WinchSettings
 from trunkline.ar.session import auth, client, clock, follow, lease, log_writer, real, robot, server
 from trunkline.ar.session.settings import SessionConfig as Live
-from trunkline.ar.teleop.config import Config as Teleop
+from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.executor import BRAKE
 from trunkline.kinematics.panda.limits import ACCELERATION, VELOCITY
 from trunkline.pipeline.config import PROJECT, load_folder
 
 ROOT = Path(__file__).parents[3]
-EXECUTION, SAFETY = "docs/execution.md", "docs/safety.md"
+PAGE = "docs/hardware.md"
 SET, TELEOP = load_folder(ExecutionConfig, PROJECT / "conf/execution"), load_folder(Teleop, PROJECT / "conf/teleop")
 LIVE, CORE = load_folder(Live, PROJECT / "conf/live"), TELEOP.core
 ms, mm, Hz = 1e-3, 1e-3, 1.0
@@ -42,8 +42,8 @@ DELAYED = machine.LEAD + (machine.SMOOTH - 1) * driver.TICK  # s that limbs are 
 # In the order of the page: a sentence with each figure in brackets, and what the code has, in the sentence's own units.
 # A row of a sentence that stands there twice holds both.
 FIGURES = {
-    EXECUTION: [
-        (r"every ms it sends both limbs where they shall be (30) ms later", [machine.LEAD / ms]),
+    PAGE: [
+        (r"every ms it sends both limbs their setpoints for (30) ms later", [machine.LEAD / ms]),
         (r"without a permit for (80) ms it slows", [robot.DEAD_MAN / ms]),
         (r"run out \((30) ms\), do not come \((50) ms\) or are played late \((0\.3) s\)",
          [machine.LEAD / ms, driver.SILENT / ms, setpoint_filter.BEHIND]),
@@ -51,34 +51,32 @@ FIGURES = {
         (r"or it is late itself \((50) ms\): the cables", [driver.SILENT / ms]),
         (r"A motor silent for (20) ms: no current", [motors.SILENT / ms]),
         (r"or it is late itself \((50) ms\), a point", [driver.SILENT / ms]),
-        (r"late by less than the (30) ms moves nothing", [machine.LEAD / ms]),
+        (r"late by less than the (30) ms has no other effect", [machine.LEAD / ms]),
         (r"again (30) ms ahead", [machine.LEAD / ms]),
-        (r"silent for (0\.1) s, or ends, is a fault of the machine", [driver_client.SILENT]),
+        (r"silent for (0\.1) s, or ends, is a fault of the robot", [driver_client.SILENT]),
         (r"no permit for (80) ms", [robot.DEAD_MAN / ms]),
         (r"where the process is gone, for (0\.2) s, then no current", [driver_host.SETTLES]),
         (r"a joint (0\.05) rad off", [SET.arm.astray]),
         (r"a motor silent for (20) ms, too hot, or a cable (20) mm off", [motors.SILENT / ms, SET.motors.astray / mm]),
-        (r"It takes (0\.1) s where the Panda's", [BRAKE]),
+        (r"Braking takes (0\.1) s where the Panda's", [BRAKE]),
         (r"joint 2 at its planned speed of (1\.09) rad/s needs (0\.15) s",
          [round(PLANNED, 2), round(PLANNED / (time_scaling.SHARE * ACCELERATION[1]), 2)]),
         (r"min\(1 / (0\.1) s, \((0\.95) a", [BRAKE, time_scaling.SHARE]),
         (r"is (39) ms behind that: (30) ms ahead of time, and two means over (10) ms",
          [DELAYED / ms, machine.LEAD / ms, machine.SMOOTH * driver.TICK / ms]),
-        (r"Every (5) ms the machine's process seeks its way", [time_scaling.STRIDE / ms]),
+        (r"Every (5) ms the robot's process moves towards", [time_scaling.STRIDE / ms]),
         (r"±(16384) = ±(3) A; feedback 0x204", [gm6020.FULL, gm6020.MOST_AMPERES]),
-        (r"falls to 1 at\s+(8) Hz: below", [SET.motors.reel.crossover / Hz]),
-        (r"up to\s+(6\.4) mrad/A, nine times a turn", [simulated_motors.RIPPLE / 1e-3]),
+        (r"falls to 1 at (8) Hz: below", [SET.motors.reel.crossover / Hz]),
+        (r"up to (6\.4) mrad/A, nine times a turn", [simulated_motors.RIPPLE / 1e-3]),
         (r"(10) Hz is the most that settings may ask for", [FASTEST_CROSSOVER]),
         (r"from feedback at (1) kHz", [gm6020.RATE / 1e3]),
         (r"commands joint positions (1000) times", [1 / setpoint_filter.CYCLE]),
         (r"comes back to the plan within (0\.1) s with the least", [setpoint_filter.BRIDGED]),
         (r"one point every (10) ms", [ros_arm.PERIOD / ms]),
-        (r"(0\.2) s of silence, or\s+a joint (0\.1) rad off", [ros_arm.SILENT, SET.ros.astray]),
+        (r"(0\.2) s of silence, or a joint (0\.1) rad off", [ros_arm.SILENT, SET.ros.astray]),
         (r"at most (30) ms of the way ahead", [machine.LEAD / ms]),
         (r"to within the (0\.1) rad", [SET.ros.astray]),
         (r"is sent (0\.15) s behind", [real.DELAY]),
-    ],
-    SAFETY: [
         (r"the motion begins (0\.5) s later", [CORE.delay]),
         (r"the next input, then (0\.1) s of braking", [BRAKE]),
         (r"(0\.12) s of silence \(`silence`\), (0\.1) s of a lost controller",
@@ -92,24 +90,23 @@ FIGURES = {
         (r"permits nothing \| (0\.15) s \|", [robot.STALE]),
         (r"as soon as a write fails; (1) s in which nothing", [LIVE.journal.period + log_writer.LATE]),
         (r"A token of (128) bits", [8 * auth.TOKEN_BYTES]),
-        (r"for (2) minutes and (5) tries", [auth.CODE_SECONDS / 60, auth.CODE_TRIES]),
+        (r"valid for (2) minutes and (5) tries", [auth.CODE_SECONDS / 60, auth.CODE_TRIES]),
         (r"longer than (64) KiB, more than (400) a second", [server.LARGEST / 1024, client.PER_SECOND]),
     ],
 }  # fmt: skip
 # Not of the code: what others measured or published, and what was done to a session as it was timed.
 OTHERS = {
-    EXECUTION: ["14 to 17 Hz"],
-    SAFETY: ["holds the grips for 1 s"],
+    PAGE: ["14 to 17 Hz", "holds the grips for 1 s"],
 }
 UNITS = r"(?:ms|s|rad|N|mm|Hz|kHz|A|°C|m/s|KiB|bits|rad/s|mrad/A|times|minutes|tries)\b"
 
 
 @cache
 def written(page: str) -> str:
-    """What people wrote: without generated blocks and code."""
+    """What people wrote: without generated blocks and code, and without line breaks."""
     text = (ROOT / page).read_text(encoding="utf-8")
     text = re.sub(r"<!-- results/(\w+) -->.*?<!-- /results/\1 -->", "", text, flags=re.DOTALL)
-    return re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+    return " ".join(re.sub(r"```.*?```", "", text, flags=re.DOTALL).split())
 
 
 ROWS = [(page, sentence, figures) for page, rows in FIGURES.items() for sentence, figures in rows]

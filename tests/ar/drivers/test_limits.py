@@ -12,7 +12,7 @@ from trunkline.ar.drivers.setpoint_filter import LIMITS, NEAR, ROUNDING, Setpoin
 from trunkline.ar.drivers.time_scaling import TimeScaledRobot
 from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.plan import Plan
-from trunkline.ar.teleop.trajectory import Limits
+from trunkline.ar.teleop.trajectory import MotionLimits
 from trunkline.kinematics.panda.kinematics import Q_MAX, Q_MIN
 from trunkline.kinematics.panda.limits import ACCELERATION, JERK, VELOCITY
 
@@ -154,7 +154,7 @@ def test_a_plan_that_leaves_the_robots_own_range_is_refused_and_its_targets_are_
     limits = LIMITS["fr3"]
     border, sign = getattr(limits, side)[joint], -1 if side == "low" else 1
     start = np.where(np.arange(7) == joint, border - sign * 1e-4, READY)
-    generous = Limits(*(np.full(10, 1e3) for _ in range(3)))
+    generous = MotionLimits(*(np.full(10, 1e3) for _ in range(3)))
     for beyond in (-1e-6, 1e-6):
         there = start.copy()
         there[joint] = border + sign * beyond

@@ -7,7 +7,7 @@ import mujoco
 import pytest
 from pydantic import TypeAdapter
 
-from trunkline.ar.hybrid.settings import HybridSettings
+from trunkline.ar.hybrid.settings import HybridModelSettings
 from trunkline.model.arm.guide_holes import Holes, add_holes
 from trunkline.model.arm.joints import Branch, Joints, add_elements
 from trunkline.model.arm.material import unit_properties
@@ -21,10 +21,10 @@ SIZE = {"length": 0.507, "base_width": 0.080, "tip_width": 0.012, "units": 24}
 STIFFER = (0.01, 1.0), (0.9, 0.95, 0.001, 0.5, 2.0)
 
 
-def hybrid_settings(**groups: str) -> HybridSettings:
+def hybrid_settings(**groups: str) -> HybridModelSettings:
     """conf/hybrid with these choices."""
     composed = json.dumps(compose_settings(CONF, groups, "conf/hybrid"))
-    return TypeAdapter(HybridSettings).validate_json(composed, strict=True)
+    return TypeAdapter(HybridModelSettings).validate_json(composed, strict=True)
 
 
 @pytest.fixture(scope="session")

@@ -24,10 +24,10 @@ def moved(model, gravity=None):
     if gravity is not None:
         batch.expand("opt.gravity")[:] = gravity
     cables = [model.actuator(f"tendon_{number}_position").id for number in (1, 2, 3)]
-    held = np.zeros((1, model.nu))
-    held[0, cables] = model.tendon_length0[model.actuator_trnid[cables, 0]]
-    hold(batch, model, held)
-    controls = np.tile(held, (1, STEPS, 1))
+    straight = np.zeros((1, model.nu))
+    straight[0, cables] = model.tendon_length0[model.actuator_trnid[cables, 0]]
+    hold(batch, model, straight)
+    controls = np.tile(straight, (1, STEPS, 1))
     controls[:, :, cables[0]] -= PULL
     hinges = [model.joint(f"unit_{unit:02d}_{axis}").qposadr[0] for unit in range(1, 25) for axis in "xy"]
     return move(batch, controls, ("qpos",))["qpos"][0][:, hinges]
@@ -48,9 +48,9 @@ def test_a_tilted_mount_is_tilted_gravity(arm):
     turn = Rotation.from_euler("y", 1.0)
     tilted = FixedMount("fixed", [0.3, 0.1, 0.9], list(wxyz_from_rotation(turn)))
     np.testing.assert_allclose(turn.inv().apply([0, 0, -9.80665]), gravity_in_base(1.0), atol=1e-12)
-    found, expected = moved(compose(arm, tilted).compile()), moved(arm.compile(), gravity_in_base(1.0))
+    angles, expected = moved(compose(arm, tilted).compile()), moved(arm.compile(), gravity_in_base(1.0))
     assert np.ptp(expected, axis=0).max() > 0.2
-    np.testing.assert_allclose(found, expected, atol=1e-4)  # where cables turn round, friction magnifies rounding
+    np.testing.assert_allclose(angles, expected, atol=1e-4)  # where cables turn round, friction magnifies rounding
 
 
 def test_the_arm_hangs_from_the_flange(arm):
@@ -60,7 +60,7 @@ def test_the_arm_hangs_from_the_flange(arm):
     q = np.array([0.3, -0.2, 0.1, -1.9, 0.2, 1.7, 0.5])
     data.qpos[panda_joints(model)] = q
     mujoco.mj_kinematics(model, data)
-    position, rotation = (one[0] for one in mount_pose(q[None], robot.mount_offset))
+    position, rotation = (values[0] for values in mount_pose(q[None], robot.mount_offset))
     np.testing.assert_allclose(data.body("base").xpos, position, atol=1e-9)
     np.testing.assert_allclose(data.site("tip").xpos, position + 0.507 * rotation[:, 2], atol=1e-6)
     hole = data.site("base_tendon_1").xpos - position

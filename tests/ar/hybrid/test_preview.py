@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 from trunkline.ar.hybrid.assistant import best
-from trunkline.ar.hybrid.posterior import nominal_draw
-from trunkline.ar.hybrid.preview import Holding, Preview, asked, joined
+from trunkline.ar.hybrid.posterior import nominal_sample
+from trunkline.ar.hybrid.preview import Holding, PlanPreview, interruptible, joined
 from trunkline.ar.hybrid.rates import wilson
 from trunkline.ar.hybrid.rollouts import Piece
-from trunkline.ar.hybrid.trials import Tried
 
 FRAMES, SINCE = 11, 0.5
 TIME = np.linspace(0.0, 1.0, FRAMES)
@@ -45,7 +44,7 @@ def carried(by) -> Piece:
     return made
 
 
-HELD = {
+HOLD_CASES = {
     "as it is": (piece(), True),
     "moved against the mount by less than it may": (changed("grip", -1, [HOLDING.sag - NEAR, 0, 0]), True),
     "by more": (changed("grip", -1, [HOLDING.sag + NEAR, 0, 0]), False),
@@ -69,9 +68,9 @@ HELD = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", HELD)
+@pytest.mark.parametrize("name", HOLD_CASES)
 def test_what_counts_as_held(name):
-    motion, holds = HELD[name]
+    motion, holds = HOLD_CASES[name]
     assert HOLDING.holds(motion).tolist() == [holds]
 
 
@@ -100,39 +99,15 @@ def test_what_hung_need_not_have_been_lifted():
     assert Holding(SINCE, lifted=0.0).holds(motion).tolist() == [False]
 
 
-def tried(dropped=0.0, further=0.0) -> Tried:
-    """A grasp of which the thing came `dropped` m down and `further` m from the arm since it was let go in row 2."""
-    path, distance = np.zeros((1, 5, 3)), np.full((1, 5), 0.03)
-    path[0, -1, 2], distance[0, -1] = -dropped, 0.03 + further
-    path[0, :2], distance[0, :2] = 1.0, 1.0  # before it was let go: nobody asks
-    return Tried(path, distance, 2, np.zeros((1, 3)), np.zeros((1, 1)))
-
-
-@pytest.mark.parametrize(
-    ("dropped", "further", "held"),
-    [(0.0, 0.0, True), (0.08 - NEAR, 0.0, True), (0.08 + NEAR, 0.0, False), (0.0, 0.02 - NEAR, True),
-     (0.0, 0.02 + NEAR, False), (-0.08 - NEAR, 0.0, False), (0.0, -0.02, True), (np.nan, 0.0, False),
-     (0.0, np.nan, False)],
-)  # fmt: skip
-def test_what_counts_as_held_in_a_trial(dropped, further, held):
-    assert tried(dropped, further).held(sag=0.08, slip=0.02).tolist() == [held]
-
-
-def test_at_a_border_itself_nothing_is_held_in_a_trial_either():
-    path, distance = np.zeros((2, 5, 3)), np.zeros((2, 5))
-    path[0, -1, 2], distance[1, -1] = -0.5, 0.25
-    assert Tried(path, distance, 2, np.zeros((2, 3)), np.zeros((2, 1))).held(0.5, 0.25).tolist() == [False, False]
-
-
-def of_futures(tips, sound, held=None) -> Preview:
+def of_futures(tips, sound, success=None) -> PlanPreview:
     made = piece(tips, sound)
-    return Preview(piece(), made, nominal_draw(), None if held is None else np.array(held))
+    return PlanPreview(piece(), made, nominal_sample(), None if success is None else np.array(success))
 
 
 def test_the_probability_is_the_share_of_all_futures_and_its_interval_is_wilsons():
-    found = of_futures(None, (True, True, False, True), (True, False, False, True))
-    assert found.probability == 0.5
-    assert found.interval == wilson(2, 4)
+    result = of_futures(None, (True, True, False, True), (True, False, False, True))
+    assert result.probability == 0.5
+    assert result.interval == wilson(2, 4)
     assert of_futures(None, (True,)).probability is None
     assert of_futures(None, (True,)).interval is None
 
@@ -141,10 +116,10 @@ def test_futures_that_are_not_sound_say_nothing_of_where_the_tip_comes():
     """Four around 0, one of them shown; a fifth, which diverged, is far away, and would be so of the nearest."""
     tips = np.zeros((5, FRAMES, 3))
     tips[:, :, 0] = np.array([-0.03, -0.01, 0.01, 0.02, 90.0])[:, None]
-    found = of_futures(tips, (True, True, True, True, False))
-    np.testing.assert_allclose(found.median[:, 0], 0.0)
-    assert found.middle in (1, 2)
-    np.testing.assert_allclose(found.spread, np.quantile([0.01, 0.01, 0.02, 0.03], 0.9))
+    result = of_futures(tips, (True, True, True, True, False))
+    np.testing.assert_allclose(result.median[:, 0], 0.0)
+    assert result.middle in (1, 2)
+    np.testing.assert_allclose(result.spread, np.quantile([0.01, 0.01, 0.02, 0.03], 0.9))
     tips[4, :, 0] = 0.0
     assert of_futures(tips, (True, True, True, True, False)).middle in (1, 2)
 
@@ -168,7 +143,7 @@ def test_it_is_asked_before_each_piece_and_after_the_last_whether_to_go_on(after
             raise Unwanted
 
     with pytest.raises(Unwanted):
-        taken.extend(asked(iter("abc"), go_on))
+        taken.extend(interruptible(iter("abc"), go_on))
     assert "".join(taken) == "abc"[:after]
 
 
@@ -199,9 +174,9 @@ def test_unless_it_is_said_otherwise_8_cm_against_the_mount_and_2_from_the_arm_a
 def test_a_spread_is_about_the_median_wherever_that_is_and_so_is_what_is_shown():
     tips = np.zeros((3, FRAMES, 3)) + [5.0, -2.0, 1.0]
     tips[:, :, 0] += np.array([-0.2, 0.0, 0.1])[:, None]
-    found = of_futures(tips, (True, True, True))
-    assert found.middle == 1
-    np.testing.assert_allclose(found.spread, np.quantile([0.2, 0.0, 0.1], 0.9))
+    result = of_futures(tips, (True, True, True))
+    assert result.middle == 1
+    np.testing.assert_allclose(result.spread, np.quantile([0.2, 0.0, 0.1], 0.9))
 
 
 def test_a_spread_is_stated_every_tenth_of_a_second_of_sixtieth_frames():

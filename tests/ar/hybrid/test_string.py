@@ -5,18 +5,18 @@ import numpy as np
 import pytest
 
 from tests.ar.hybrid.conftest import rubbing_arm
-from tests.ar.hybrid.test_futures import SIZE, way_of
+from tests.ar.hybrid.test_rollouts import SIZE, way_of
 from trunkline.ar.hybrid.assistant import best, try_places
 from trunkline.ar.hybrid.compose import Placed, compose
-from trunkline.ar.hybrid.objects import Thing
-from trunkline.ar.hybrid.posterior import Contact, Doubts
+from trunkline.ar.hybrid.objects import GraspObject
+from trunkline.ar.hybrid.posterior import Contact, Posterior
 from trunkline.ar.hybrid.preview import Holding
-from trunkline.ar.hybrid.rollouts import Twin
+from trunkline.ar.hybrid.rollouts import ComposedTwin
 from trunkline.ar.hybrid.string import hang
 from trunkline.kinematics.panda.mounts import FixedMount
 from trunkline.model.arm.spiral import spiral_chain
 
-BALL, PLACE, LENGTH = Thing("sphere", 0.05, 0.05, 0.1, "plastic"), np.array([0.0, 0.0, 1.0]), 0.15
+BALL, PLACE, LENGTH = GraspObject("sphere", 0.05, 0.05, 0.1, "plastic"), np.array([0.0, 0.0, 1.0]), 0.15
 
 
 def hung() -> mujoco.MjModel:
@@ -62,17 +62,17 @@ def test_it_swings_as_a_pendulum():
 
 
 @pytest.fixture(scope="module")
-def beside() -> Twin:
+def beside() -> ComposedTwin:
     """A short arm that curls towards a ball on a string."""
     arm = rubbing_arm(spiral_chain(**SIZE), 3)
     place = np.array([0.045, 0.0, -0.17])
     spec = compose(arm, FixedMount("fixed"), None, Placed(BALL, place))
     hang(spec, place, BALL.diameter / 2, LENGTH)
-    return Twin(spec.compile(), arm.compile())
+    return ComposedTwin(spec.compile(), arm.compile())
 
 
 def test_a_place_from_which_nothing_is_touched_differs_from_one_that_pushes(beside):
-    doubts = Doubts(contact=Contact(0.0, (0.0, 0.0, 0.0)))
+    doubts = Posterior(contact=Contact(0.0, (0.0, 0.0, 0.0)))
     still = Holding(0.1, sag=0.002, slip=0.5)  # here: it stays where it hangs
     offsets = np.array([[0.0, 0.0, 0.0], [-0.3, 0.0, 0.0]])  # m, of the mount
     shares = try_places(beside, way_of(beside.arm), doubts, still, offsets, 2)

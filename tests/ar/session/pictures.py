@@ -1,4 +1,4 @@
-"""A picture of each state of a live session's page, for docs/live.md: docs/live-hold.png, docs/live-aim.png, ...
+"""A picture of each state of a live session's page, for docs/live-sessions.md: docs/live-hold.png, ...
 
     python -m tests.ar.session.pictures [PACKAGE] [--folder docs]
 
@@ -21,13 +21,13 @@ from typing import get_args
 
 from PIL import Image
 
-from benchmarks.browser import Page, browsing
+from qualification.browser import Page, browsing
 from trunkline.ar.preview.package import only_package
 from trunkline.ar.session import lease, preview_process, robot
 from trunkline.ar.session.controller import Planning
 from trunkline.ar.session.session import Address, opened
 from trunkline.ar.session.settings import SessionConfig
-from trunkline.ar.teleop.config import Config as Teleop
+from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.messages import Mode
 from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.config import PROJECT, load_folder

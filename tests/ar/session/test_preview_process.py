@@ -15,10 +15,10 @@ from tests.ar.teleop.test_plan import LIMITS, MOUNT, NETWORK, OFFSET, TIP, reque
 from tests.support.operator import config
 from tests.support.small_arm import small_spec
 from trunkline.ar.hybrid.grasp_poses import SideGrip
-from trunkline.ar.hybrid.posterior import Contact, Doubts
-from trunkline.ar.hybrid.settings import HybridSettings
-from trunkline.ar.preview.grasp_preview import Foresight
-from trunkline.ar.preview.preview_twin import Believed
+from trunkline.ar.hybrid.posterior import Contact, Posterior
+from trunkline.ar.hybrid.settings import HybridModelSettings
+from trunkline.ar.preview.grasp_preview import GraspPreviewer
+from trunkline.ar.preview.preview_twin import RobotModel
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import preview_process
 from trunkline.ar.session.preview_process import Order, Overtaken, PreviewPlanner
@@ -39,15 +39,15 @@ def made() -> PreviewPlanner:
     s, spec = simulation(), small_spec()
     live, robot = (
         load_folder(SessionConfig, PROJECT / "conf/live"),
-        load_folder(HybridSettings, PROJECT / "conf/hybrid").robot,
+        load_folder(HybridModelSettings, PROJECT / "conf/hybrid").robot,
     )
     grips = {"hanging": SideGrip(config().hanging, read_geometry(spec))}
     rigid = RigidIK(OFFSET)
     grasping = Grasping(rigid, OFFSET, s.commands, grips, config().handling)
     bends = lambda poses: {k: v - 0.5 + s.commands if k != "tip" else v for k, v in NETWORK.ask(poses).items()}  # noqa: E731
     planner = Planner(rigid, replace(NETWORK, ask=bends), s.commands, LIMITS, OFFSET, step=0.01, grasping=grasping)
-    believed = Believed(spec, Doubts(contact=Contact()), robot)
-    return PreviewPlanner(planner, Foresight(believed, grips, replace(live.preview, futures=FUTURES)), s.bodies)
+    robot_model = RobotModel(spec, Posterior(contact=Contact()), robot)
+    return PreviewPlanner(planner, GraspPreviewer(robot_model, grips, replace(live.preview, futures=FUTURES)), s.bodies)
 
 
 def order(serial=1, thing="", tip=TIP) -> Order:

@@ -28,7 +28,7 @@ from trunkline.ar.session.robot import DEAD_MAN, HOLD_TIME, MODE, MODES, PERMIT,
 from trunkline.ar.session.session import alignment_for
 from trunkline.ar.session.settings import SessionConfig as Live
 from trunkline.ar.session.simulated import Loop, TwinPlant
-from trunkline.ar.teleop.config import Config as Teleop
+from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.executor import BRAKE, FOLLOWS
 from trunkline.ar.teleop.following import KNOT, Following
 from trunkline.ar.teleop.plan import Plan

@@ -12,11 +12,11 @@ import pytest
 
 from tests.support.operator import PACKAGE, config
 from tests.support.small_arm import small_spec
-from trunkline.ar.hybrid.posterior import Doubts
+from trunkline.ar.hybrid.posterior import Posterior
 from trunkline.ar.hybrid.preview import joined, nominal
-from trunkline.ar.hybrid.rollouts import Way
-from trunkline.ar.hybrid.settings import HybridSettings
-from trunkline.ar.preview.preview_twin import Believed, compose_twin
+from trunkline.ar.hybrid.rollouts import CommandTrajectory
+from trunkline.ar.hybrid.settings import HybridModelSettings
+from trunkline.ar.preview.preview_twin import RobotModel, compose_twin
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import simulated
 from trunkline.ar.session.bodies import BodyPoses, drawn_bodies
@@ -51,12 +51,12 @@ LATE = 0.1  # s that a busy machine may take to schedule a process
 def simulation():
     live, robot = (
         load_folder(SessionConfig, PROJECT / "conf/live"),
-        load_folder(HybridSettings, PROJECT / "conf/hybrid").robot,
+        load_folder(HybridModelSettings, PROJECT / "conf/hybrid").robot,
     )
     spec = small_spec()
     arm = spec.compile()
-    straight, believed = arm.tendon_length0[arm.actuator_trnid[:, 0]], Believed(spec, Doubts(), robot)
-    twin = compose_twin(believed, make_world(()), None, SEARCH, straight, live.preview)
+    straight, robot_model = arm.tendon_length0[arm.actuator_trnid[:, 0]], RobotModel(spec, Posterior(), robot)
+    twin = compose_twin(robot_model, make_world(()), None, SEARCH, straight, live.preview)
     limits, offset = limits_of(config().motors), config().mount_offset
     return Simulation(twin, SEARCH, straight, drawn_bodies(twin.model), limits, PACKAGE, offset)
 
@@ -74,7 +74,7 @@ def plan():
 
 def test_the_robot_does_what_the_preview_shows():
     s, plant = simulation(), TwinPlant(simulation())
-    shown = joined(list(nominal(s.twin, Way(plan().step, plan().joints, plan().commands))))
+    shown = joined(list(nominal(s.twin, CommandTrajectory(plan().step, plan().joints, plan().commands))))
     poses, tip = BodyPoses(s.twin.model, s.bodies), s.bodies.index("unit_08")
     time, away = 0.0, []
     for row, until in enumerate(shown.time + s.twin.model.opt.timestep):  # of the step that ends with a frame

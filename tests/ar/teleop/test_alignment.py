@@ -35,19 +35,19 @@ def test_forward_kinematics_are_those_of_the_room_panda():
         wrist = wrist_of(tuple(q), 0.05)
         np.testing.assert_allclose(wrist.position, position[0], atol=1e-14)
         np.testing.assert_allclose(wrist.pointing, rotation[0, :, 2], atol=1e-14)
-        own = base_of(wrist.pointing, wrist.heading).as_matrix()
+        turn = base_of(wrist.pointing, wrist.heading).as_matrix()
         flange = rotation_from_wxyz(np.array(flange_turn())).as_matrix()
-        np.testing.assert_allclose(own, rotation[0] @ flange, atol=1e-9)
+        np.testing.assert_allclose(turn, rotation[0] @ flange, atol=1e-9)
 
 
 def test_tip_target_comes_into_its_half_plane():
     wrist = wrist_of(READY_JOINTS, 0.05)
     for mount, tip, pointing in targets():
-        found = align(tuple(tip), tuple(mount), tuple(pointing), wrist, FIRST, SETTINGS)
-        local = base_of(pointing, found.heading).inv().apply(tip - mount)
+        aligned = align(tuple(tip), tuple(mount), tuple(pointing), wrist, FIRST, SETTINGS)
+        local = base_of(pointing, aligned.heading).inv().apply(tip - mount)
         if np.hypot(*local[:2]) < SETTINGS.axis:
             continue
-        side = 1 if found.half_plane == 0 else -1  # dorsal over tendon 1, ventral over the other two
+        side = 1 if aligned.half_plane == 0 else -1  # dorsal over tendon 1, ventral over the other two
         assert abs(local[1]) < 1e-12
         assert side * local[0] > 0
 
@@ -66,11 +66,11 @@ def test_turning_joint_7_by_the_turn_gives_the_heading():
         mount = np.array(wrist.position)
         tip = mount + [*rng.uniform(-0.3, 0.3, 2), -0.3]
         settings = type(SETTINGS)(SETTINGS.half_planes_deg, 10.0, 0.0)
-        found = align(tuple(tip), wrist.position, DOWN, wrist, FIRST, settings)
-        assert found.turned is not None
-        q[6] -= found.turned
+        aligned = align(tuple(tip), wrist.position, DOWN, wrist, FIRST, settings)
+        assert aligned.turned is not None
+        q[6] -= aligned.turned
         assert Q_MIN[6] <= q[6] <= Q_MAX[6]
-        off = Rotation.from_rotvec([0, 0, wrist_of(tuple(q), 0.05).heading - found.heading])
+        off = Rotation.from_rotvec([0, 0, wrist_of(tuple(q), 0.05).heading - aligned.heading])
         assert off.magnitude() < 1e-6
 
 
@@ -83,12 +83,12 @@ def test_the_turn_is_the_least_of_all_that_align_and_are_within_limits():
         tip = np.array(wrist.position) + [*rng.uniform(-0.3, 0.3, 2), -0.3]
         no_habit = Aligned(0.0, 0, 0.0)
         settings = type(SETTINGS)(SETTINGS.half_planes_deg, 0.0, 0.0)
-        found = align(tuple(tip), wrist.position, DOWN, wrist, no_habit, settings)
+        aligned = align(tuple(tip), wrist.position, DOWN, wrist, no_habit, settings)
         local = base_of(DOWN, wrist.heading).inv().apply(tip - wrist.position)
         azimuth = np.arctan2(local[1], local[0])
         every = np.array([azimuth - plane + 2 * np.pi * n for plane in (0, np.pi) for n in range(-3, 4)])
         able = every[(q[6] - every >= Q_MIN[6]) & (q[6] - every <= Q_MAX[6])]
-        assert abs(found.turned) == pytest.approx(np.abs(able).min(), abs=1e-12)
+        assert abs(aligned.turned) == pytest.approx(np.abs(able).min(), abs=1e-12)
 
 
 def test_no_half_plane_within_the_wrists_limits_is_said():
@@ -112,9 +112,9 @@ def test_half_plane_does_not_flip_at_the_border():
         for _ in range(500):
             away = wrist.heading + np.pi / 2 + rng.normal(scale=np.radians(1.0))
             tip = np.array(wrist.position) + [0.2 * np.cos(away), 0.2 * np.sin(away), -0.3]
-            found = align(tuple(tip), wrist.position, DOWN, wrist, last, settings)
-            flips[hysteresis] += found.half_plane != last.half_plane
-            last = found
+            aligned = align(tuple(tip), wrist.position, DOWN, wrist, last, settings)
+            flips[hysteresis] += aligned.half_plane != last.half_plane
+            last = aligned
     assert flips[0.0] > 50
     assert flips[10.0] == 0
 
@@ -125,10 +125,10 @@ def test_another_half_plane_is_taken_once_it_is_nearer_by_the_hysteresis():
     for degrees in [*np.arange(80.5, 100), *np.arange(99.5, 80, -1)]:
         away = wrist.heading + np.radians(degrees)
         tip = np.array(wrist.position) + [0.2 * np.cos(away), 0.2 * np.sin(away), -0.3]
-        found = align(tuple(tip), wrist.position, DOWN, wrist, last, SETTINGS)
-        if found.half_plane != last.half_plane:
-            taken[found.half_plane] = degrees
-        last = found
+        aligned = align(tuple(tip), wrist.position, DOWN, wrist, last, SETTINGS)
+        if aligned.half_plane != last.half_plane:
+            taken[aligned.half_plane] = degrees
+        last = aligned
     assert taken == {1: 95.5, 0: 84.5}  # the other asks for 2 · (degrees - 90) less
 
 

@@ -47,28 +47,28 @@ def trembling() -> Operator:
 
 def test_the_same_inputs_give_the_same_intents_byte_for_byte_also_elsewhere():
     operator = trembling()
-    recorded = b"".join(to_json(given) + b"\n" for given in operator.inputs)
-    told = subprocess.run([sys.executable, "-c", REPLAY], input=recorded, capture_output=True, check=True).stdout
-    assert told == b"".join(to_json(intent) + b"\n" for intent in operator.intents)
+    recorded = b"".join(to_json(message) + b"\n" for message in operator.inputs)
+    replayed = subprocess.run([sys.executable, "-c", REPLAY], input=recorded, capture_output=True, check=True).stdout
+    assert replayed == b"".join(to_json(intent) + b"\n" for intent in operator.intents)
     assert len({intent.mode for intent in operator.intents}) >= 6
 
 
 def test_step_changes_neither_its_state_nor_anything_else():
     operator = Operator()
     operator.to("aim")
-    state, given = operator.state, operator.given
-    given = replace(given, stamp=given.stamp + DT)
-    first, again = operator.core.step(state, given, DT), operator.core.step(state, given, DT)
+    state, message = operator.state, operator.message
+    message = replace(message, stamp=message.stamp + DT)
+    first, again = operator.core.step(state, message, DT), operator.core.step(state, message, DT)
     assert first == again
     assert state is operator.state
 
 
 def test_messages_come_back_from_json_exactly():
     operator = trembling()
-    for given, intent in zip(operator.inputs, operator.intents, strict=True):
-        assert to_json(from_json(Input, to_json(given))) == to_json(given)
+    for message, intent in zip(operator.inputs, operator.intents, strict=True):
+        assert to_json(from_json(Input, to_json(message))) == to_json(message)
         assert from_json(Intent, to_json(intent)) == intent
-    missing = next(given for given in operator.inputs if math.isnan(given.left.position[0]))
+    missing = next(message for message in operator.inputs if math.isnan(message.left.position[0]))
     assert math.isnan(from_json(Input, to_json(missing)).left.position[0])
 
 
@@ -84,8 +84,8 @@ def test_targets_are_at_the_ends_of_the_rays_in_the_base_frame():
     turn = Rotation.from_euler("y", 30, degrees=True)
     pose = {"quaternion": tuple(map(float, wxyz_from_rotation(turn)))}
     intent = operator.wait(3.0, left={"grip": True, **pose}, right={"grip": True})
-    alignment = operator.given.alignment
-    end = np.array(operator.given.left.position) + turn.apply([0, 0, -0.6])
+    alignment = operator.message.alignment
+    end = np.array(operator.message.left.position) + turn.apply([0, 0, -0.6])
     expected = alignment.position + Rotation.from_quat(alignment.quaternion, scalar_first=True).apply(end)
     np.testing.assert_allclose(intent.targets.rigid.position, expected, atol=1e-6)
     np.testing.assert_allclose(intent.rays[0], expected, atol=1e-6)
@@ -105,10 +105,10 @@ def test_stick_makes_the_ray_longer_at_its_rate_and_to_its_limits():
 def test_clutch_a_target_stays_while_its_grip_is_let_go():
     operator = Operator()
     operator.wait(0.5)
-    kept = operator.wait(0.3, left={"grip": True}, right={"grip": True}).targets
+    before = operator.wait(0.3, left={"grip": True}, right={"grip": True}).targets
     operator.wait(0.1, left={"grip": False})
     intent = operator.wait(0.5, left={"position": (0.5, 0.5, 0.5)})
-    assert intent.targets.rigid.position == kept.rigid.position
+    assert intent.targets.rigid.position == before.rigid.position
     assert intent.rays[0] != intent.targets.rigid.position
     intent = operator.wait(0.5, left={"grip": True})
     np.testing.assert_allclose(intent.rays[0], intent.targets.rigid.position)
@@ -141,14 +141,14 @@ def test_tilting_the_controller_aligns_the_end_effector_with_it():
     operator = Operator()
     operator.wait(0.5)
     operator.wait(0.3, left={"grip": True}, right={"grip": True})
-    kept = operator.intents[-1].targets
+    before = operator.intents[-1].targets
     tilt = Rotation.from_euler("z", 30, degrees=True)  # about the ray: its end stays where it is
     pose = {"quaternion": tuple(map(float, wxyz_from_rotation(tilt)))}
     operator.step(left={"primary": True})
     intent = operator.wait(3.0, left=pose)
-    turn = Rotation.from_quat(operator.given.alignment.quaternion, scalar_first=True) * tilt
+    turn = Rotation.from_quat(operator.message.alignment.quaternion, scalar_first=True) * tilt
     np.testing.assert_allclose(intent.targets.pointing, turn.apply([0, -1, 0]), atol=1e-6)
-    np.testing.assert_allclose(intent.targets.rigid.position, kept.rigid.position, atol=1e-6)
+    np.testing.assert_allclose(intent.targets.rigid.position, before.rigid.position, atol=1e-6)
     assert not intent.targets.tilt_limited
     assert np.arccos(-intent.targets.pointing[2]) == pytest.approx(np.radians(30), abs=1e-6)
 
@@ -184,9 +184,9 @@ def test_outside_the_nearest_point_is_offered_and_taken_only_when_asked():
 
 
 def test_hands_are_chosen_by_the_settings():
-    one, other = Operator(), Operator(rigid_hand="right")
-    for operator in (one, other):
+    left_handed, other = Operator(), Operator(rigid_hand="right")
+    for operator in (left_handed, other):
         operator.wait(0.5)
         operator.wait(0.3, left={"grip": True}, right={"grip": True})
-    assert one.intents[-1].targets.rigid.position == other.intents[-1].targets.tip.position
-    assert one.given.left.quaternion == FORWARD
+    assert left_handed.intents[-1].targets.rigid.position == other.intents[-1].targets.tip.position
+    assert left_handed.message.left.quaternion == FORWARD

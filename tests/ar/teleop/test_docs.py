@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from omegaconf import OmegaConf
 
-from trunkline.ar.teleop.config import Config
+from trunkline.ar.teleop.config import TeleoperationConfig
 from trunkline.ar.teleop.transitions import TRANSITIONS, diagram
 from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT, SHARED, load_folder
@@ -21,17 +21,17 @@ def test_diagram_is_that_of_the_table():
 
 
 def test_settings_compose_and_a_typo_is_one_line(tmp_path):
-    assert load_folder(Config, PROJECT / "conf/teleop").core.rigid_hand in ("left", "right")
+    assert load_folder(TeleoperationConfig, PROJECT / "conf/teleop").core.rigid_hand in ("left", "right")
     for room in ("teleop", SHARED):
         shutil.copytree(PROJECT / "conf" / room, tmp_path / room)
     core = tmp_path / SHARED / "core/two_rays.yaml"
     text = core.read_text()
     core.write_text(text.replace("look_back: 0.1", "look_back: 9.0"))
     with pytest.raises(InputError, match=r"core\.look_back: found 9"):
-        load_folder(Config, tmp_path / "teleop")
+        load_folder(TeleoperationConfig, tmp_path / "teleop")
     core.write_text(text.replace("start: 0.6 ", "start: 9.0 "))
     with pytest.raises(InputError, match=r"rays\.start: found 9"):
-        load_folder(Config, tmp_path / "teleop")
+        load_folder(TeleoperationConfig, tmp_path / "teleop")
 
 
 def test_the_mount_is_as_far_from_the_flange_everywhere():

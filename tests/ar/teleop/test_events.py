@@ -20,7 +20,7 @@ from trunkline.ar.teleop.messages import (
     World,
 )
 from trunkline.ar.teleop.recorder import PLAN
-from trunkline.ar.teleop.state import Pinned, State
+from trunkline.ar.teleop.state import Pinned, TeleoperationState
 from trunkline.ar.teleop.tracked_controller import Hand
 from trunkline.ar.teleop.transitions import MODES
 from trunkline.ar.teleop.vectors import DOWN
@@ -30,21 +30,23 @@ NEAR, FORWARD = 1e-6, (1.0, 0.0, 0.0, 0.0)
 TARGETS = Targets(Target((0.5, 0.0, 0.5)), Target((0.6, 0.0, 0.2)), DOWN, 0.0, 0, 0.0, thing="the cup")
 REQUEST = Request(3, TARGETS, "world", PACKAGE)
 ENDS = ((0.5, 0.0, 0.5), (0.6, 0.0, 0.2))
-HELD = Hand(0.6, held=("grip",), gripped_at=ENDS[0])
+GRIPPING = Hand(0.6, buttons=("grip",), gripped_at=ENDS[0])
 OPEN = Hand(0.6)
 OFFER = Offer("the cup", (0.5, 0.0, 0.6), DOWN, 0.9)
 PLANNED = ("plan", "preview", "ready", "delay", "execute", "follow")
 
 
-def state(mode, **changes) -> State:
-    return replace(State(HELD, OPEN, mode, digest=PLAN, pinned=Pinned(REQUEST, REFERENCE, WORLD)), **changes)
+def state(mode, **changes) -> TeleoperationState:
+    return replace(
+        TeleoperationState(GRIPPING, OPEN, mode, digest=PLAN, pinned=Pinned(REQUEST, REFERENCE, WORLD)), **changes
+    )
 
 
 def heard(**changes) -> Input:
     hand = Controller((0.0, 0.0, 0.0), FORWARD)
-    given = Input(100.0, hand, hand, REFERENCE, (0.0,) * 7, WORLD, PACKAGE, PlanReport(3, PLAN, "", PACKAGE, "world"),
+    message = Input(100.0, hand, hand, REFERENCE, (0.0,) * 7, WORLD, PACKAGE, PlanReport(3, PLAN, "", PACKAGE, "world"),
                   PLAN)  # fmt: skip
-    return replace(given, **changes)
+    return replace(message, **changes)
 
 
 def aside(by: float):
@@ -53,7 +55,7 @@ def aside(by: float):
     return (x, y + by, z), right
 
 
-PRESSED = replace(OPEN, pressed=("primary",), held=("primary",))
+PRESSED = replace(OPEN, pressed=("primary",), buttons=("primary",))
 CHANGES = {  # what changes: of the state, of what is heard, the ends, what is said, and in which modes
     "nothing": ({}, {}, ENDS, "", ()),
     "world": ({}, {"world": World("other")}, ENDS, "world changed", PLANNED),
@@ -67,11 +69,11 @@ CHANGES = {  # what changes: of the state, of what is heard, the ends, what is s
     "offer taken": ({"left": PRESSED}, {"offer": OFFER}, ENDS, "the offer was taken", ("preview", "ready")),
     "ray moved": ({}, {}, aside(SETTINGS.moved + NEAR), "target moved", ("plan", "preview", "ready")),
     "ray moved by less": ({}, {}, aside(SETTINGS.moved - NEAR), "", ()),
-    "ray moved, not held": ({"left": replace(HELD, held=())}, {}, aside(1.0), "", ()),
-    "ray moved, grip of before": ({"left": replace(HELD, gripped_at=None)}, {}, aside(1.0), "", ()),
+    "ray moved, not held": ({"left": replace(GRIPPING, buttons=())}, {}, aside(1.0), "", ()),
+    "ray moved, grip of before": ({"left": replace(GRIPPING, gripped_at=None)}, {}, aside(1.0), "", ()),
     "ray gone": ({}, {}, (None, ENDS[1]), "", ()),
     "other ray moved": (
-        {"left": OPEN, "right": replace(HELD, gripped_at=ENDS[1])}, {}, (ENDS[0], (0.6, 0.1, 0.2)), "target moved",
+        {"left": OPEN, "right": replace(GRIPPING, gripped_at=ENDS[1])}, {}, (ENDS[0], (0.6, 0.1, 0.2)), "target moved",
         ("plan", "preview", "ready"),
     ),
 }  # fmt: skip
@@ -80,15 +82,15 @@ CHANGES = {  # what changes: of the state, of what is heard, the ends, what is s
 @pytest.mark.parametrize("mode", PLANNED)
 @pytest.mark.parametrize("name", CHANGES)
 def test_what_voids_a_plan(name, mode):
-    changes, given, ends, said, modes = CHANGES[name]
-    found = changed_since(state(mode, **changes), heard(**given), ends, SETTINGS)
-    assert found == (said if mode in modes else "")
+    changes, fields, ends, expected, modes = CHANGES[name]
+    reason = changed_since(state(mode, **changes), heard(**fields), ends, SETTINGS)
+    assert reason == (expected if mode in modes else "")
 
 
 @pytest.mark.parametrize("mode", MODES)
 def test_where_no_plan_was_asked_for_nothing_is_void(mode):
-    given = heard(world=World("other"), alignment=None, shown="e" * 64, offer=OFFER)
-    assert changed_since(state(mode, pinned=None, left=PRESSED), given, aside(1.0), SETTINGS) == ""
+    message = heard(world=World("other"), alignment=None, shown="e" * 64, offer=OFFER)
+    assert changed_since(state(mode, pinned=None, left=PRESSED), message, aside(1.0), SETTINGS) == ""
 
 
 def test_of_several_changes_the_first_is_told():
@@ -97,11 +99,11 @@ def test_of_several_changes_the_first_is_told():
         ({"offer": OFFER}, "the offer was taken"), ({"shown": "e" * 64}, "another plan was shown"),
         ({}, "target moved"),
     ]  # fmt: skip
-    right = replace(HELD, gripped_at=ENDS[1])
+    right = replace(GRIPPING, gripped_at=ENDS[1])
     ends = (ENDS[0], (0.6, 0.1, 0.2))
-    for first, (_, said) in enumerate(order):
-        given = {name: value for change, _ in order[first:] for name, value in change.items()}
-        assert changed_since(state("ready", left=PRESSED, right=right), heard(**given), ends, SETTINGS) == said
+    for first, (_, reason) in enumerate(order):
+        fields = {name: value for change, _ in order[first:] for name, value in change.items()}
+        assert changed_since(state("ready", left=PRESSED, right=right), heard(**fields), ends, SETTINGS) == reason
 
 
 @pytest.mark.parametrize("mode", ["ready", "delay"])
@@ -122,7 +124,7 @@ def test_a_plan_is_executed_by_the_preview_of_it_alone(mode, shown):
     [
         (PRESSED, OFFER, True, True),
         (OPEN, OFFER, True, False),
-        (replace(PRESSED, held=("primary", "grip")), OFFER, True, False),
+        (replace(PRESSED, buttons=("primary", "grip")), OFFER, True, False),
         (replace(PRESSED, pressed=()), OFFER, True, False),
         (PRESSED, None, True, False),
         (PRESSED, replace(OFFER, thing="the box"), True, False),
@@ -152,14 +154,14 @@ REPORTS = [
 ]
 
 
-@pytest.mark.parametrize(("report", "answer", "said"), REPORTS)
-def test_what_is_a_plan(report, answer, said):
-    given, waits = heard(plan=report), state("plan", waited=0.0)
-    assert answered(waits, given) == answer
-    assert refusal(waits, given, SETTINGS) == said
-    told, _ = happened(waits, given, TARGETS, ENDS, SETTINGS)
-    assert told["planned"] == (answer and not said)
-    assert told["refused"] == bool(said)
+@pytest.mark.parametrize(("report", "answer", "reason"), REPORTS)
+def test_what_is_a_plan(report, answer, reason):
+    message, waits = heard(plan=report), state("plan", waited=0.0)
+    assert answered(waits, message) == answer
+    assert refusal(waits, message, SETTINGS) == reason
+    events, _ = happened(waits, message, TARGETS, ENDS, SETTINGS)
+    assert events["planned"] == (answer and not reason)
+    assert events["refused"] == bool(reason)
 
 
 @pytest.mark.parametrize(("late", "mode", "refused"), [(-NEAR, "plan", ""), (NEAR, "plan", "no plan within 5 s"),
@@ -170,16 +172,16 @@ def test_a_plan_that_does_not_come_is_refused_after_a_while(late, mode, refused)
     assert refusal(waits, heard(), SETTINGS) == ""
 
 
-def event(name: str, before: State, given: Input, targets=TARGETS) -> bool:
-    return happened(before, given, targets, ENDS, SETTINGS)[0][name]
+def event(name: str, before: TeleoperationState, message: Input, targets=TARGETS) -> bool:
+    return happened(before, message, targets, ENDS, SETTINGS)[0][name]
 
 
 RUNS = {"mode": "execute", "running": True}
-GRIPPED, LET_GO = {"left": HELD}, {"left": OPEN}
+GRIPPED, LET_GO = {"left": GRIPPING}, {"left": OPEN}
 
 
 def trigger(**changes) -> Hand:
-    return replace(OPEN, pressed=("trigger",), held=("trigger",), **changes)
+    return replace(OPEN, pressed=("trigger",), buttons=("trigger",), **changes)
 
 
 def sides(by: float) -> float:
@@ -200,7 +202,7 @@ EVENTS = [
     ("confirm", {"mode": "ready", "right": replace(trigger(), pressed=())} | GRIPPED, {}, False),
     ("released", RUNS | GRIPPED, {}, False),
     ("released", RUNS | LET_GO, {}, True),
-    ("released", RUNS | LET_GO | {"right": HELD}, {}, False),
+    ("released", RUNS | LET_GO | {"right": GRIPPING}, {}, False),
     ("elapsed", {"mode": "delay", "waited": SETTINGS.delay}, {}, True),
     ("elapsed", {"mode": "delay", "waited": SETTINGS.delay - NEAR}, {}, False),
     ("settled", {"mode": "hold", "sound_for": sides(0.0)} | LET_GO, {}, True),
@@ -223,10 +225,10 @@ EVENTS = [
 ]
 
 
-@pytest.mark.parametrize(("name", "before", "given", "expected"), EVENTS)
-def test_when_an_event_has_happened(name, before, given, expected):
+@pytest.mark.parametrize(("name", "before", "fields", "expected"), EVENTS)
+def test_when_an_event_has_happened(name, before, fields, expected):
     before = dict(before)
-    assert event(name, state(before.pop("mode"), **before), heard(**given)) == expected
+    assert event(name, state(before.pop("mode"), **before), heard(**fields)) == expected
 
 
 @pytest.mark.parametrize(("reach", "turned"), [("outside", 0.0), ("blocked", 0.0), ("inside", None)])
@@ -242,24 +244,24 @@ NEEDED = "both targets are needed: hold a grip to set each"
 
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize(
-    ("button", "hand", "targets", "said"),
+    ("button", "hand", "targets", "notice"),
     [
-        ("trigger", HELD, None, NEEDED),
-        ("stick_pressed", HELD, None, NEEDED),
+        ("trigger", GRIPPING, None, NEEDED),
+        ("stick_pressed", GRIPPING, None, NEEDED),
         ("stick_pressed", OPEN, TARGETS, "hold a grip to follow"),
-        ("stick_pressed", HELD, TARGETS, ""),
-        ("primary", HELD, None, ""),
+        ("stick_pressed", GRIPPING, TARGETS, ""),
+        ("primary", GRIPPING, None, ""),
     ],
 )
-def test_what_was_asked_for_in_vain_is_said_as_one_aims_and_only_then(mode, button, hand, targets, said):
+def test_what_was_asked_for_in_vain_is_said_as_one_aims_and_only_then(mode, button, hand, targets, notice):
     before = state(mode, left=hand, right=replace(OPEN, pressed=(button,)), pinned=None, stamp=100.0, waited=0.0)
     _, line = happened(before, heard(), targets, ENDS, SETTINGS)
     usual = {"grips let go; holding", "robot: no reason given; stopped"}
-    assert line == (said if mode == "aim" else "") or (mode != "aim" and line in usual)
+    assert line == (notice if mode == "aim" else "") or (mode != "aim" and line in usual)
 
 
 @pytest.mark.parametrize(
-    ("mode", "given", "changes", "said"),
+    ("mode", "fields", "changes", "notice"),
     [
         ("execute", {"executor": ExecutorReport("fault", PLAN, "reflex")}, RUNS, "robot: reflex; stopped"),
         ("execute", {"executor": ExecutorReport("fault", PLAN)}, RUNS, "robot: no reason given; stopped"),
@@ -273,6 +275,6 @@ def test_what_was_asked_for_in_vain_is_said_as_one_aims_and_only_then(mode, butt
                      "executor": ExecutorReport("fault", PLAN, "reflex")}, RUNS, "stopped; primary button goes on"),
     ],
 )  # fmt: skip
-def test_what_is_said_of_what_happened(mode, given, changes, said):
+def test_what_is_said_of_what_happened(mode, fields, changes, notice):
     changes = {name: value for name, value in changes.items() if name != "mode"}
-    assert happened(state(mode, **changes), heard(**given), TARGETS, ENDS, SETTINGS)[1] == said
+    assert happened(state(mode, **changes), heard(**fields), TARGETS, ENDS, SETTINGS)[1] == notice

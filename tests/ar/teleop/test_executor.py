@@ -45,8 +45,8 @@ def test_no_axis_moves_faster_than_its_limit(axis, sign, row):
     """Joints and tendons, either way, at the plan's beginning and at its end."""
     most = ROUNDING * LIMITS.velocity[axis]
     assert robot().check(plan_of(moving(axis, sign * most * (1 - NEAR), row))) == ""
-    found = robot().check(plan_of(moving(axis, sign * most * (1 + NEAR), row)))
-    assert found == f"plan: {NAMES[axis]} moves at {most:.3g}, expected at most {LIMITS.velocity[axis]:.3g}"
+    message = robot().check(plan_of(moving(axis, sign * most * (1 + NEAR), row)))
+    assert message == f"plan: {NAMES[axis]} moves at {most:.3g}, expected at most {LIMITS.velocity[axis]:.3g}"
 
 
 def test_the_axis_that_is_named_is_the_one_that_is_furthest_beyond_its_own_limit():
@@ -74,8 +74,8 @@ def test_no_joint_leaves_its_range_on_either_side(joint, side):
 def test_a_plan_begins_where_the_robot_is(axis, sign):
     off = sign * np.eye(len(HERE))[axis]
     assert robot(HERE + (AT_START - NEAR) * off).check(plan_of(still())) == ""
-    found = robot(HERE + (AT_START + NEAR) * off).check(plan_of(still()))
-    assert found == "plan: starts 0.001 away from where the robot is"
+    message = robot(HERE + (AT_START + NEAR) * off).check(plan_of(still()))
+    assert message == "plan: starts 0.001 away from where the robot is"
 
 
 def test_nobody_runs_a_plan_from_a_place_that_is_not_known():

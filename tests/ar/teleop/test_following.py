@@ -62,8 +62,8 @@ def test_it_comes_to_where_the_targets_end(followed):
 
 def test_it_keeps_its_limits(followed):
     for order, most in enumerate((LIMITS.velocity, LIMITS.acceleration), 1):
-        found = np.abs(np.diff(followed, order, axis=0)).max(axis=0) / DT**order
-        assert (found <= 1.001 * most).all()
+        largest = np.abs(np.diff(followed, order, axis=0)).max(axis=0) / DT**order
+        assert (largest <= 1.001 * most).all()
 
 
 def test_it_is_where_the_targets_were_the_delay_before(followed):
@@ -76,18 +76,18 @@ def test_it_is_where_the_targets_were_the_delay_before(followed):
 
 
 def test_a_tremble_at_the_swings_period_is_not_followed():
-    found, _ = follow(lambda now: 0.02 * np.sin(2 * np.pi * now / PERIOD), 4.0)
+    rows, _ = follow(lambda now: 0.02 * np.sin(2 * np.pi * now / PERIOD), 4.0)
     plain, _ = follow(lambda now: 0.02 * np.sin(2 * np.pi * now / PERIOD), 4.0, period=0.0)
     assert np.ptp(mount(plain)[-60:]) > 0.03
-    assert np.ptp(mount(found)[-60:]) < 0.05 * np.ptp(mount(plain)[-60:])
+    assert np.ptp(mount(rows)[-60:]) < 0.05 * np.ptp(mount(plain)[-60:])
 
 
 @pytest.mark.parametrize("delay", [0.0, KNOT, 0.2])
 def test_a_short_delay_leaves_less_to_look_ahead_but_follows(delay):
-    found, _ = follow(ramp, 5.0, delay=delay)
+    rows, _ = follow(ramp, 5.0, delay=delay)
     now = round(3.0 / DT)
-    assert abs(mount(found)[now] - ramp(3.0 - delay)) < 0.03
-    assert mount(found)[-1] == pytest.approx(0.2, abs=0.01)
+    assert abs(mount(rows)[now] - ramp(3.0 - delay)) < 0.03
+    assert mount(rows)[-1] == pytest.approx(0.2, abs=0.01)
 
 
 def test_refused_targets_leave_it_at_the_last_and_are_said():
@@ -97,9 +97,9 @@ def test_refused_targets_leave_it_at_the_last_and_are_said():
         refused = hear(follower, now, at(3.0))
         rows = np.concatenate(follower.tick(now))
         if index == 0:
-            kept = rows
+            last = rows
             assert refused.startswith(("out of reach", "limit"))
-    np.testing.assert_allclose(rows, kept, atol=1e-4)
+    np.testing.assert_allclose(rows, last, atol=1e-4)
     assert hear(follower, 5.0, at(0.05)) == ""
 
 

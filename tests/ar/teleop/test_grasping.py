@@ -117,22 +117,22 @@ def test_a_basket_is_gripped_by_its_bar_wherever_it_is(planner):
 
 
 def test_a_basket_that_is_let_go_must_be_near_the_board_with_its_box(planner):
-    held = replace(BASKET, support="held", position=(0.35, 0.05, 0.1))
-    below = below_grip(held)
-    rooms = world(held, TABLE)
+    basket = replace(BASKET, support="held", position=(0.35, 0.05, 0.1))
+    below = below_grip(basket)
+    rooms = world(basket, TABLE)
     near, far = ((0.5, -0.2, 0.1 + below + gap) for gap in (0.03, 0.09))
-    assert planner.plan(request(held, MOUNT, near), rooms, START, STRAIGHT).phases[-1][0] == "release"
+    assert planner.plan(request(basket, MOUNT, near), rooms, START, STRAIGHT).phases[-1][0] == "release"
     with pytest.raises(InputError, match="release: found 90 mm between the basket and"):
-        planner.plan(request(held, MOUNT, far), rooms, START, STRAIGHT)
+        planner.plan(request(basket, MOUNT, far), rooms, START, STRAIGHT)
 
 
 TABLE = Box("the table", (0.3, -0.4, -0.4), (0.7, 0.0, 0.1))
 
 
 def test_what_is_held_is_brought_down_and_let_go(planner):
-    held, commands = replace(BALL, support="held"), STRAIGHT - [0.18, -0.2, -0.2]
+    ball, commands = replace(BALL, support="held"), STRAIGHT - [0.18, -0.2, -0.2]
     goal, place = (0.45, -0.2, 0.4), (0.5, -0.2, 0.1 + BALL.diameter / 2 + 0.03)
-    plan = planner.plan(request(held, goal, place), world(held, TABLE), START, commands)
+    plan = planner.plan(request(ball, goal, place), world(ball, TABLE), START, commands)
     assert [name for name, _ in plan.phases] == ["transfer", "release"]
     release = dict(plan.phases)["release"]
     mounts = mount_pose(plan.joints, OFFSET)[0]
@@ -180,8 +180,8 @@ def test_a_tip_target_near_a_thing_marks_it():
     operator = aiming(BALL)
     targets = operator.intents[-1].targets
     assert targets.thing == BALL.name
-    assert targets.tip.position == operator.given.world.things[0].position
-    far = replace(operator.given.world.things[0], position=(9.0, 9.0, 9.0))
+    assert targets.tip.position == operator.message.world.things[0].position
+    far = replace(operator.message.world.things[0], position=(9.0, 9.0, 9.0))
     targets = operator.step(world=World("elsewhere", (), (far,))).targets
     assert targets.thing == ""
     assert aiming().intents[-1].targets.thing == ""
@@ -202,18 +202,18 @@ def ready(operator: Operator) -> None:
     intent = operator.step(right={"trigger": True})
     assert intent.request is not None
     operator.step(right={"trigger": False})
-    operator.step(plan=PlanReport(intent.request.serial, "d" * 64, "", PACKAGE, operator.given.world.digest))
+    operator.step(plan=PlanReport(intent.request.serial, "d" * 64, "", PACKAGE, operator.message.world.digest))
     assert operator.step(shown="d" * 64).mode == "ready"
 
 
 def test_an_offer_is_shown_and_taken_only_if_the_user_does():
     operator = aiming(BALL)
     ready(operator)
-    own = operator.intents[-1].targets.rigid.position
+    chosen = operator.intents[-1].targets.rigid.position
     offer = Offer(BALL.name, (0.5, 0.1, 0.5), (0.0, 0.0, -1.0), 0.9)
     intent = operator.step(offer=offer)
     assert intent.targets.better == offer
-    assert intent.targets.rigid.position == own  # the user's own stays the default
+    assert intent.targets.rigid.position == chosen  # the user's own stays the default
     operator.wait(0.2, left={"grip": False})
     assert operator.intents[-1].mode == "ready"
     intent = operator.step(left={"primary": True})
@@ -238,15 +238,15 @@ def test_an_offer_for_another_thing_is_none():
 def test_with_a_thing_in_the_arm_the_tip_target_is_where_it_will_be():
     operator = Operator()
     operator.wait(0.5)
-    held = replace(BALL, support="held", position=(0.35, 0.05, 0.1))
-    operator.wait(0.3, left={"grip": True}, world=World("held", (), (held,)))
+    ball = replace(BALL, support="held", position=(0.35, 0.05, 0.1))
+    operator.wait(0.3, left={"grip": True}, world=World("held", (), (ball,)))
     targets = operator.intents[-1].targets
     assert targets.thing == BALL.name
     assert targets.turned == 0.0
-    mount = mount_pose(np.array([operator.given.joints]), OFFSET)[0][0]
-    along = np.linalg.norm(np.array(held.position) - mount)
+    mount = mount_pose(np.array([operator.message.joints]), OFFSET)[0][0]
+    along = np.linalg.norm(np.array(ball.position) - mount)
     assert np.linalg.norm(np.array(targets.tip.position) - targets.rigid.position) == pytest.approx(along, abs=1e-6)
-    assert targets.tip.position[2] - targets.rigid.position[2] == pytest.approx(held.position[2] - mount[2], abs=1e-6)
+    assert targets.tip.position[2] - targets.rigid.position[2] == pytest.approx(ball.position[2] - mount[2], abs=1e-6)
 
 
 def test_messages_with_things_are_read_back_and_replayed():
@@ -254,10 +254,10 @@ def test_messages_with_things_are_read_back_and_replayed():
     ready(operator)
     operator.step(offer=Offer(BALL.name, (0.5, 0.1, 0.5), (0.0, 0.0, -1.0), 0.9))
     state = operator.core.start()
-    for given, intent in zip(operator.inputs, operator.intents, strict=True):
-        assert from_json(Input, to_json(given)) == given
+    for message, intent in zip(operator.inputs, operator.intents, strict=True):
+        assert from_json(Input, to_json(message)) == message
         assert from_json(Intent, to_json(intent)) == intent
-        state, again = operator.core.step(state, from_json(Input, to_json(given)), DT)
+        state, again = operator.core.step(state, from_json(Input, to_json(message)), DT)
         assert to_json(again) == to_json(intent)
 
 
@@ -283,8 +283,8 @@ def test_what_is_heavier_than_the_chart_has_is_not_grasped(planner, row, beyond)
     assert HANDLING.heaviest(shape, diameter) == pytest.approx(most)
     thing = replace(BALL, shape=shape, diameter=diameter, mass=HANDLING.heaviest(shape, diameter) + beyond)
     asked = Targets(Target(MOUNT), Target(thing.position), DOWN, 0.0, 0, 0.0, thing="the ball")
-    found = refused(lambda: planner.grasping.grasp(asked, thing, START))
-    assert found.startswith("payload: the ball weighs ") == (beyond > 0)
+    message = refused(lambda: planner.grasping.grasp(asked, thing, START))
+    assert message.startswith("payload: the ball weighs ") == (beyond > 0)
 
 
 @pytest.mark.parametrize(("shape", "diameter"), [("cylinder", 0.08 + NEAR), ("sphere", 0.05), ("box", 0.5)])
@@ -294,21 +294,21 @@ def test_of_what_the_chart_does_not_have_nothing_is_grasped(shape, diameter):
     assert HANDLING.heaviest("cylinder", 0.001) == 0.5
 
 
-@pytest.mark.parametrize(("gap", "said"), [(0.0, ""), (-NEAR, ""), (NEAR, "release: found 60 mm between the ball")])
-def test_a_thing_is_let_go_no_higher_than_it_may_fall(gap, said):
+@pytest.mark.parametrize(("gap", "start"), [(0.0, ""), (-NEAR, ""), (NEAR, "release: found 60 mm between the ball")])
+def test_a_thing_is_let_go_no_higher_than_it_may_fall(gap, start):
     place = (0.5, 0.1, 0.3)
     top = place[2] - below_grip(BALL) - (HANDLING.beneath + gap if gap else 0.0)
     floor = Box("the floor", (-3.0, -3.0, -1.0), (3.0, 3.0, top))
-    found = refused(lambda: _require_ground(BALL, place, World("world", (floor,)), HANDLING.beneath))
-    assert found.startswith(said)
-    assert bool(found) == bool(said)
+    message = refused(lambda: _require_ground(BALL, place, World("world", (floor,)), HANDLING.beneath))
+    assert message.startswith(start)
+    assert bool(message) == bool(start)
 
 
 def test_a_thing_is_not_let_go_over_nothing_or_within_a_solid():
     place = (0.5, 0.1, 0.3)
     for boxes in ((), (Box("the floor", (-3.0, -3.0, -1.0), (3.0, 3.0, place[2] - below_grip(BALL) + NEAR)),)):
-        found = refused(lambda boxes=boxes: _require_ground(BALL, place, World("world", boxes), HANDLING.beneath))
-        assert found.startswith("release: found nothing between the ball and what is beneath it")
+        message = refused(lambda boxes=boxes: _require_ground(BALL, place, World("world", boxes), HANDLING.beneath))
+        assert message.startswith("release: found nothing between the ball and what is beneath it")
 
 
 @pytest.mark.parametrize("beyond", [-NEAR, NEAR])
@@ -321,5 +321,7 @@ def test_a_tip_may_be_foreseen_as_far_from_its_target_as_the_tolerance(beyond):
                 "tip": np.tile(tip, (len(poses), 1))}  # fmt: skip
 
     wanted = tuple(map(float, tip + [0.0, 0.0, 0.02 + beyond]))
-    found = refused(lambda: bend(Network(ask, 8), wanted, (0.0, 0.0, -1.0), 0.02))
-    assert found == ("out of reach: the soft arm's tip comes no nearer to its target than 20 mm" if beyond > 0 else "")
+    message = refused(lambda: bend(Network(ask, 8), wanted, (0.0, 0.0, -1.0), 0.02))
+    assert message == (
+        "out of reach: the soft arm's tip comes no nearer to its target than 20 mm" if beyond > 0 else ""
+    )

@@ -29,7 +29,7 @@ class Desk:
         if intent.request is not None:
             try:
                 self.plan = self.planner.plan(
-                    intent.request, self.operator.given.world, self.robot.joints, self.robot.commands
+                    intent.request, self.operator.message.world, self.robot.joints, self.robot.commands
                 )
                 report = PlanReport(intent.request.serial, self.plan.digest(), "", PACKAGE, self.plan.world)
             except InputError as error:
@@ -108,8 +108,8 @@ def test_a_robot_under_way_comes_to_rest_on_its_way_and_stays(way):
     }[way]
     for _ in range(30):
         desk.step(left=left, right=right)
-    kept = desk.robot.joints.copy()
-    assert np.abs(desk.plan.joints - kept).max(axis=1).min() < 0.02
+    stopped_at = desk.robot.joints.copy()
+    assert np.abs(desk.plan.joints - stopped_at).max(axis=1).min() < 0.02
     for _ in range(120):
         assert desk.step(left={"secondary": False, "tracked": True}).motion == "hold"
-    np.testing.assert_array_equal(desk.robot.joints, kept)
+    np.testing.assert_array_equal(desk.robot.joints, stopped_at)

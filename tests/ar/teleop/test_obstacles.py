@@ -183,8 +183,8 @@ def bending(pull: np.ndarray) -> Network:
 
     def ask(poses):
         rows = len(poses)
-        found = {"commands": STRAIGHT - pull, "lengths": rest.lengths[0], "tip": rest.position[0]}
-        return {name: np.tile(values, (rows, 1)) for name, values in found.items()}
+        outputs = {"commands": STRAIGHT - pull, "lengths": rest.lengths[0], "tip": rest.position[0]}
+        return {name: np.tile(values, (rows, 1)) for name, values in outputs.items()}
 
     return Network(ask, 8)
 

@@ -76,8 +76,8 @@ def test_a_way_keeps_velocity_acceleration_and_jerk_and_all_axes_arrive_together
         np.testing.assert_allclose(way[[0, -1]], [start, end], atol=1e-9)
         for order, most in enumerate((LIMITS.velocity, LIMITS.acceleration, LIMITS.jerk), 1):
             # rounding of positions of about 1 grows by 1 / step with every difference
-            found = np.abs(np.diff(way[:-1], order, axis=0)).max(axis=0) / step**order
-            assert (found <= most * (1 + 1e-6) + 8e-16 * 4**order / step**order).all(), order
+            largest = np.abs(np.diff(way[:-1], order, axis=0)).max(axis=0) / step**order
+            assert (largest <= most * (1 + 1e-6) + 8e-16 * 4**order / step**order).all(), order
         late = np.abs(way[round(0.9 * len(way))] - end) > 1e-6
         assert late.all()  # none is there long before the others
 
@@ -171,21 +171,21 @@ def test_digest_tells_every_bit(planner):
 
 
 def robot(plan, **changes):
-    given = {"joints": plan.joints[0], "commands": plan.commands[0], "limits": LIMITS, "package": PACKAGE} | changes
-    return SimulatedRobot(**given)
+    arguments = {"joints": plan.joints[0], "commands": plan.commands[0], "limits": LIMITS, "package": PACKAGE} | changes
+    return SimulatedRobot(**arguments)
 
 
 def test_robot_runs_only_the_plan_of_the_digest(planner):
     plan = planner.plan(request(MOUNT, TIP), WORLD, START, STRAIGHT)
-    one = robot(plan)
-    assert one.start(plan, "0" * 64).startswith("digest: found ")
-    assert one.state().mode == "idle"
-    assert one.start(plan, plan.digest()) == ""
-    assert one.start(plan, plan.digest()) == "busy: another plan runs"
+    simulated = robot(plan)
+    assert simulated.start(plan, "0" * 64).startswith("digest: found ")
+    assert simulated.state().mode == "idle"
+    assert simulated.start(plan, plan.digest()) == ""
+    assert simulated.start(plan, plan.digest()) == "busy: another plan runs"
     for _ in range(round(plan.duration / 0.01) + 2):
-        one.advance(0.01)
-    assert one.state().mode == "done"
-    np.testing.assert_allclose(one.joints, plan.joints[-1])
+        simulated.advance(0.01)
+    assert simulated.state().mode == "done"
+    np.testing.assert_allclose(simulated.joints, plan.joints[-1])
 
 
 def test_robot_refuses_by_name(planner):
@@ -201,26 +201,26 @@ def test_robot_refuses_by_name(planner):
 
 def test_a_stop_ends_on_the_way_soon_and_for_good(planner):
     plan = planner.plan(request(MOUNT, TIP), WORLD, START, STRAIGHT)
-    one = robot(plan)
-    one.start(plan, plan.digest())
+    simulated = robot(plan)
+    simulated.start(plan, plan.digest())
     for _ in range(30):
-        one.advance(0.01)
-    one.stop()
+        simulated.advance(0.01)
+    simulated.stop()
     for _ in range(12):
-        one.advance(0.01)
-    assert one.state().mode == "idle"
-    kept = one.joints.copy()
-    off = np.abs(plan.joints - kept).max(axis=1).min()
+        simulated.advance(0.01)
+    assert simulated.state().mode == "idle"
+    stopped_at = simulated.joints.copy()
+    off = np.abs(plan.joints - stopped_at).max(axis=1).min()
     assert off < 0.01  # on the way
-    one.advance(5.0)
-    np.testing.assert_array_equal(one.joints, kept)
+    simulated.advance(5.0)
+    np.testing.assert_array_equal(simulated.joints, stopped_at)
 
 
 def test_robot_moves_a_model_that_it_is_given(planner):
     plan = planner.plan(request(MOUNT, TIP), WORLD, START, STRAIGHT)
     heard = []
-    one = robot(plan, move=lambda joints, commands, dt: heard.append((joints.copy(), commands.copy(), dt)))
-    one.start(plan, plan.digest())
-    one.advance(0.01)
+    simulated = robot(plan, move=lambda joints, commands, dt: heard.append((joints.copy(), commands.copy(), dt)))
+    simulated.start(plan, plan.digest())
+    simulated.advance(0.01)
     np.testing.assert_allclose(heard[0][0], plan.at(0.01)[0])
     assert heard[0][2] == 0.01

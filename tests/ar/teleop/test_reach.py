@@ -40,9 +40,11 @@ def points(count=200, seed=0):
 
 def test_a_point_is_read_as_the_lattice_is_sampled():
     lattice = Lattice(np.full(3, -0.3), SPACING, (61, 61, 71))
-    one = ball(CENTER, 0.1)
+    signed_map = ball(CENTER, 0.1)
     some = np.random.default_rng(1).uniform(-0.29, 0.29, (300, 3))
-    np.testing.assert_allclose([one.at(tuple(p)) for p in some], lattice.sample(one.values, some), atol=1e-7)
+    np.testing.assert_allclose(
+        [signed_map.at(tuple(p)) for p in some], lattice.sample(signed_map.values, some), atol=1e-7
+    )
 
 
 def test_between_two_gravity_angles_the_maps_are_blended():
@@ -51,29 +53,29 @@ def test_between_two_gravity_angles_the_maps_are_blended():
     for angle in np.radians([0.0, 7.0, 30.0, 44.0, 60.0]):
         expected = lattice.sample(blend(fields, ANGLES, angle), points())
         for point, value in zip(points(), expected, strict=True):
-            found = REACH.soft(tuple(map(float, point)), gravity(angle))
-            assert found.where == ("inside" if value <= 0 else "outside")
-            assert found.outside_by == pytest.approx(max(value, 0.0), abs=1e-6)
+            reading = REACH.soft(tuple(map(float, point)), gravity(angle))
+            assert reading.where == ("inside" if value <= 0 else "outside")
+            assert reading.outside_by == pytest.approx(max(value, 0.0), abs=1e-6)
 
 
 def test_what_is_offered_is_the_nearest_reachable_point():
     for point in points():
-        found = REACH.rigid(tuple(map(float, point)), DOWN)
+        reading = REACH.rigid(tuple(map(float, point)), DOWN)
         away = np.linalg.norm(point)
         if away <= 0.2:
             continue
-        assert found.where == "outside"
-        assert found.outside_by == pytest.approx(away - 0.2, abs=1e-3)
-        assert REACH.rigid(found.offer, DOWN).where == "inside"
+        assert reading.where == "outside"
+        assert reading.outside_by == pytest.approx(away - 0.2, abs=1e-3)
+        assert REACH.rigid(reading.offer, DOWN).where == "inside"
         # the nearest of a ball is on its surface, straight towards the point; to within the lattice
-        assert np.linalg.norm(point - found.offer) < away - 0.2 + 0.3 * SPACING
+        assert np.linalg.norm(point - reading.offer) < away - 0.2 + 0.3 * SPACING
 
 
 def test_a_point_beyond_the_lattice_is_outside_by_the_way_to_it_at_least():
-    found = REACH.rigid((0.9, 0.0, 0.0), DOWN)
-    assert found.where == "outside"
-    assert found.outside_by == pytest.approx(0.7, abs=0.01)
-    assert np.linalg.norm(np.array(found.offer) - [0.9, 0.0, 0.0]) < 0.7 + 1e-3
+    reading = REACH.rigid((0.9, 0.0, 0.0), DOWN)
+    assert reading.where == "outside"
+    assert reading.outside_by == pytest.approx(0.7, abs=0.01)
+    assert np.linalg.norm(np.array(reading.offer) - [0.9, 0.0, 0.0]) < 0.7 + 1e-3
 
 
 @pytest.mark.parametrize("turn", [1, -1])
@@ -82,9 +84,9 @@ def test_gravity_in_another_tendons_plane_is_the_same_map_turned(turn):
     for point in points(50):
         there = np.array([[np.cos(third), -np.sin(third), 0], [np.sin(third), np.cos(third), 0], [0, 0, 1]]) @ point
         here = REACH.soft(tuple(map(float, point)), gravity(angle))
-        found = REACH.soft(tuple(map(float, there)), gravity(angle, third))
-        assert found.where == here.where
-        assert found.outside_by == pytest.approx(here.outside_by, abs=1e-6)
+        reading = REACH.soft(tuple(map(float, there)), gravity(angle, third))
+        assert reading.where == here.where
+        assert reading.outside_by == pytest.approx(here.outside_by, abs=1e-6)
 
 
 def test_what_no_map_tells_is_unknown():

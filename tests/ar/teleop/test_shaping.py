@@ -7,7 +7,7 @@ import pytest
 
 from tests.support.bent_chain import stump
 from trunkline.ar.teleop.shaping import mode_shaper, residual, shaped, shaper_of
-from trunkline.ar.teleop.vibration import Swings, slowest, swings
+from trunkline.ar.teleop.vibration import VibrationModes, slowest, vibration_modes
 from trunkline.frames import gravity_in_base
 from trunkline.model.simulation.rest import settle
 from trunkline.model.statics.chain import read_chain
@@ -19,11 +19,11 @@ def swing_left(rows: np.ndarray, step: float, period: float, damping: float, at:
     """Largest distance from its end of an oscillator that follows `rows` (T,), from row `at` on; stepped exactly."""
     decay, pace = 2 * np.pi / period * damping / np.sqrt(1 - damping**2), 2 * np.pi / period
     factor = np.exp((-decay + 1j * pace) * step)
-    state, found = 0j, []
+    state, distances = 0j, []
     for before, now in zip(rows, rows[1:], strict=False):
         state = (state + before - now) * factor  # each change starts a swing about the new place
-        found.append(abs(state))
-    return max(found[at:])
+        distances.append(abs(state))
+    return max(distances[at:])
 
 
 @pytest.mark.parametrize("kind", ["zv", "zvd"])
@@ -39,8 +39,8 @@ def test_two_swings_are_both_ended():
     shaper = shaper_of(periods, dampings, "zvd")
     for period, damping in zip(periods, dampings, strict=True):
         assert residual(shaper, period, damping) < 1e-12
-    one = mode_shaper(periods[0], dampings[0], "zvd")
-    assert residual(one, periods[1], dampings[1]) > 0.01
+    single = mode_shaper(periods[0], dampings[0], "zvd")
+    assert residual(single, periods[1], dampings[1]) > 0.01
     assert (np.diff(shaper.times) >= 0).all()
 
 
@@ -55,21 +55,21 @@ def test_shaped_rows_end_as_they_did_and_swing_no_more():
     step = 1e-3
     rows = np.linspace(0, 1, 200)[:, None] ** [1, 2]
     shaper = mode_shaper(PERIOD, DAMPING, "zv")
-    found = shaped(rows, step, shaper)
-    np.testing.assert_allclose(found[0], rows[0])
-    np.testing.assert_allclose(found[-1], rows[-1])
-    assert len(found) == len(rows) + np.ceil(shaper.delay / step)
-    held = np.concatenate([found[:, 0], np.ones(300)])
+    result = shaped(rows, step, shaper)
+    np.testing.assert_allclose(result[0], rows[0])
+    np.testing.assert_allclose(result[-1], rows[-1])
+    assert len(result) == len(rows) + np.ceil(shaper.delay / step)
+    extended = np.concatenate([result[:, 0], np.ones(300)])
     plain = np.concatenate([rows[:, 0], np.ones(300)])
-    assert swing_left(held, step, PERIOD, DAMPING, len(found)) < 0.01 * swing_left(
+    assert swing_left(extended, step, PERIOD, DAMPING, len(result)) < 0.01 * swing_left(
         plain, step, PERIOD, DAMPING, len(rows)
     )
 
 
 def test_shaping_keeps_every_limit_of_speed():
     rows = np.cumsum(np.random.default_rng(0).uniform(0, 1, (300, 3)), axis=0)
-    found = shaped(rows, 1e-3, shaper_of(np.array([0.2, 0.1]), np.array([0.1, 0.1]), "zvd"))
-    assert np.diff(found, axis=0).max() <= np.diff(rows, axis=0).max() + 1e-12
+    result = shaped(rows, 1e-3, shaper_of(np.array([0.2, 0.1]), np.array([0.1, 0.1]), "zvd"))
+    assert np.diff(result, axis=0).max() <= np.diff(rows, axis=0).max() + 1e-12
 
 
 PENDULUM = """
@@ -81,11 +81,11 @@ PENDULUM = """
 
 def test_a_pendulum_swings_as_the_formula_says():
     model = mujoco.MjModel.from_xml_string(PENDULUM)
-    found = swings(model, np.zeros(0), None, gravity_in_base(0.0))
+    modes = vibration_modes(model, np.zeros(0), None, gravity_in_base(0.0))
     inertia, natural = 0.25, np.sqrt(9.80665 / 0.5)
     damping = 0.1 / (2 * inertia * natural)
-    np.testing.assert_allclose(found.dampings, damping, rtol=1e-5)
-    np.testing.assert_allclose(found.periods, 2 * np.pi / (natural * np.sqrt(1 - damping**2)), rtol=1e-5)
+    np.testing.assert_allclose(modes.dampings, damping, rtol=1e-5)
+    np.testing.assert_allclose(modes.periods, 2 * np.pi / (natural * np.sqrt(1 - damping**2)), rtol=1e-5)
 
 
 def test_swings_are_those_of_the_model_as_it_moves():
@@ -95,8 +95,8 @@ def test_swings_are_those_of_the_model_as_it_moves():
     chain = read_chain(model)
     gravity, change = gravity_in_base(0.3), np.array([-1e-4, 0.0, 0.0])
     command = chain.straight_lengths + [-0.01, 0.02, 0.02]
-    found = swings(model, command, change, gravity)
-    slow = slowest(found, 1)
+    modes = vibration_modes(model, command, change, gravity)
+    slow = slowest(modes, 1)
     assert 0.02 < slow.periods[0] < 2.0
     rest = settle(model, np.stack([command - change, command]), gravity)
     data = mujoco.MjData(model)
@@ -117,14 +117,14 @@ def test_swings_are_those_of_the_model_as_it_moves():
 
 
 def test_the_slowest_are_chosen_among_those_that_matter():
-    found = Swings(
+    modes = VibrationModes(
         np.array([0.1, 0.6, 0.3, 2.0]), np.array([0.05, 0.03, 0.5, 0.03]), np.array([9, 8, 7, 0.1]), np.zeros(3)
     )
-    np.testing.assert_array_equal(slowest(found, 3).periods, [0.6, 0.1])
-    np.testing.assert_array_equal(slowest(found, 1).periods, [0.6])
+    np.testing.assert_array_equal(slowest(modes, 3).periods, [0.6, 0.1])
+    np.testing.assert_array_equal(slowest(modes, 1).periods, [0.6])
 
 
 def test_swings_alike_count_once():
     periods = np.array([0.60, 0.59, 0.56, 0.2])
-    found = Swings(periods, np.full(4, 0.03), np.ones(4), np.zeros(3))
-    np.testing.assert_array_equal(slowest(found, 4).periods, [0.60, 0.56, 0.2])
+    modes = VibrationModes(periods, np.full(4, 0.03), np.ones(4), np.zeros(3))
+    np.testing.assert_array_equal(slowest(modes, 4).periods, [0.60, 0.56, 0.2])

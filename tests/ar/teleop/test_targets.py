@@ -25,7 +25,7 @@ def targets(rigid=INSIDE, tip=INSIDE, turned=0.0):
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("targets", "reason"),
     [
         (None, "both targets are needed: hold a grip to set each"),
         (targets(), ""),
@@ -40,8 +40,8 @@ def targets(rigid=INSIDE, tip=INSIDE, turned=0.0):
         (targets(INSIDE, BLOCKED, None), "tip target is inside the table"),
     ],
 )
-def test_why_no_plan_can_be_asked_for(given, said):
-    assert why_not(given) == said
+def test_why_no_plan_can_be_asked_for(targets, reason):
+    assert why_not(targets) == reason
 
 
 def cup(name, x):
@@ -64,8 +64,8 @@ WITHIN = config().core.mark
     ],
 )
 def test_the_nearest_thing_within_reach_of_the_tip_target_is_marked(things, name):
-    found = marked((0.0, 0.0, 0.0), World("world", (), things), WITHIN)
-    assert (found.name if found else None) == name
+    thing = marked((0.0, 0.0, 0.0), World("world", (), things), WITHIN)
+    assert (thing.name if thing else None) == name
 
 
 @pytest.mark.parametrize("axis", range(3))
@@ -75,9 +75,9 @@ def test_a_target_in_a_solid_is_blocked_wherever_a_map_has_it(axis, side, sign):
     place = [0.0, 0.0, 0.0]
     for beyond, reach in ((-NEAR, "blocked"), (0.0, "blocked"), (NEAR, "inside")):
         place[axis] = getattr(box, side)[axis] + sign * beyond
-        found = _target(tuple(place), Reading("inside"), World("world", (box,)))
-        assert found.reach == reach
-        assert found.solid == ("the table" if reach == "blocked" else "")
+        target = _target(tuple(place), Reading("inside"), World("world", (box,)))
+        assert target.reach == reach
+        assert target.solid == ("the table" if reach == "blocked" else "")
 
 
 def test_what_a_map_says_is_kept_where_nothing_is():
@@ -116,6 +116,6 @@ def direction(degrees):
     ],
 )
 def test_the_end_effector_follows_the_controller_as_fast_and_as_far_as_it_may(before, toward, dt, after, limited):
-    found, said = tilted(direction(before), direction(toward), dt, TILT)
-    np.testing.assert_allclose(found, direction(after), atol=1e-9)
-    assert said == limited
+    turned, at_limit = tilted(direction(before), direction(toward), dt, TILT)
+    np.testing.assert_allclose(turned, direction(after), atol=1e-9)
+    assert at_limit == limited

@@ -22,20 +22,20 @@ def poor(chain, gravity, asked=None):
     """A network of directions that answers half of the pull that it takes, and foresees what was asked for."""
     tensions = np.zeros((1, chain.tendons))
     tensions[0, 0] = 0.5 * chain.max_tension[0]
-    held = equilibrium(chain, 0.5 * tensions, STANDARD_GRAVITY * gravity)
+    rest = equilibrium(chain, 0.5 * tensions, STANDARD_GRAVITY * gravity)
 
     def ask(poses):
         if asked is not None:
             asked.append(poses)
         rows = len(poses)
         return {
-            "commands": np.tile(held.commands, (rows, 1)),
-            "lengths": np.tile(held.lengths, (rows, 1)),
+            "commands": np.tile(rest.commands, (rows, 1)),
+            "lengths": np.tile(rest.lengths, (rows, 1)),
             "tip": poses[:, -7:-4],
         }
 
     target = equilibrium(chain, tensions, STANDARD_GRAVITY * gravity).position[0]
-    return Network(ask, len(DIRECTION)), tuple(map(float, target)), held.position[0]
+    return Network(ask, len(DIRECTION)), tuple(map(float, target)), rest.position[0]
 
 
 @pytest.mark.parametrize("azimuth", [0.0, 1.0, 4.0])
@@ -43,10 +43,10 @@ def test_statics_bring_the_tip_where_a_poor_network_leaves_it_short(chain, azimu
     down = downwards(0.6, azimuth)
     network, target, short = poor(chain, down)
     assert np.linalg.norm(short - target) > 0.02 * chain.length
-    found = bend(network, target, tuple(map(float, down)), 0.02, chain)
-    np.testing.assert_allclose(found.tip, target, atol=1e-4)
-    rest = settle(hardening_stump(), found.commands[None], STANDARD_GRAVITY * down)
-    np.testing.assert_allclose(rest.position[0], found.tip, atol=5e-4)
+    bent = bend(network, target, tuple(map(float, down)), 0.02, chain)
+    np.testing.assert_allclose(bent.tip, target, atol=1e-4)
+    rest = settle(hardening_stump(), bent.commands[None], STANDARD_GRAVITY * down)
+    np.testing.assert_allclose(rest.position[0], bent.tip, atol=5e-4)
 
 
 def test_a_network_of_directions_is_told_gravity_as_it_is(chain):

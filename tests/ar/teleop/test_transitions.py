@@ -89,8 +89,8 @@ def moved(operator):
 
 VOIDS = {
     "target": moved,
-    "world": lambda o: o.step(world=replace(o.given.world, digest="moved")),
-    "alignment": lambda o: o.step(alignment=Pose((0.21, 0.0, 1.0), o.given.alignment.quaternion)),
+    "world": lambda o: o.step(world=replace(o.message.world, digest="moved")),
+    "alignment": lambda o: o.step(alignment=Pose((0.21, 0.0, 1.0), o.message.alignment.quaternion)),
     "package": lambda o: o.step(package="b" * 64),
 }
 
@@ -98,7 +98,12 @@ VOIDS = {
 # A grip is what keeps the delay running; the targets are those of the plan.
 @pytest.mark.parametrize(
     ("mode", "change"),
-    [(mode, one) for mode in ("preview", "ready", "delay") for one in VOIDS if (mode, one) != ("delay", "target")],
+    [
+        (mode, change)
+        for mode in ("preview", "ready", "delay")
+        for change in VOIDS
+        if (mode, change) != ("delay", "target")
+    ],
 )
 def test_any_change_of_target_world_alignment_or_package_voids_the_plan(mode, change):
     operator = Operator()
@@ -127,8 +132,8 @@ def test_an_answer_to_an_earlier_request_is_no_plan():
     operator = Operator()
     operator.to("plan")
     for report in (
-        PlanReport(operator.state.serial - 1, PLAN, "", operator.given.package, "world"),
-        PlanReport(operator.state.serial + 1, PLAN, "", operator.given.package, "world"),
+        PlanReport(operator.state.serial - 1, PLAN, "", operator.message.package, "world"),
+        PlanReport(operator.state.serial + 1, PLAN, "", operator.message.package, "world"),
     ):
         assert operator.step(plan=report).mode == "plan"
     assert operator.step(plan=PlanReport(operator.state.serial, PLAN, "", "b" * 64, "world")).notice == (
@@ -159,8 +164,8 @@ def test_followed_targets_are_those_of_so_long_ago():
     operator.to("follow")
     for i in range(90):
         operator.step(left={"position": (0.001 * i, 0.0, 0.0)})
-    now = operator.given.stamp
-    then = max(i for i, given in enumerate(operator.inputs) if given.stamp <= now - 0.5)
+    now = operator.message.stamp
+    then = max(i for i, message in enumerate(operator.inputs) if message.stamp <= now - 0.5)
     assert operator.intents[-1].follow == operator.intents[then].targets
     assert operator.intents[-1].follow != operator.intents[-1].targets
 

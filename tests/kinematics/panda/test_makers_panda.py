@@ -4,8 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from studies.franka_panda import panda
-from studies.rigid_labels import Mink
+from tests.support.franka_panda import panda
+from tests.support.mink_solver import Mink
 from trunkline.kinematics.panda.collision import clearance
 from trunkline.kinematics.panda.kinematics import Q_MAX, Q_MIN, mount_pose
 from trunkline.kinematics.panda.labels import draw_points, label

@@ -24,12 +24,13 @@ from trunkline.identification.simulate.population import Population
 from trunkline.model.arm.joints import Branch, Joints, Slider
 from trunkline.model.elements import arm_hinges, cables, give_way, let_hang
 from trunkline.model.simulation import motion
+from trunkline.model.simulation.divergence import CountingBatch
 from trunkline.model.simulation.motion import batch_of, hold, move
 from trunkline.pipeline.identify import CAD_MODEL, run
 from trunkline.recordings.trials.trial import write_trials
 
 SECONDS = 0.5
-BOUND = 5e-6  # m, of any site in that time, as docs/cluster.md states it
+BOUND = 5e-6  # m, of any site in that time, as docs/speed.md states it
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 
 
@@ -94,13 +95,13 @@ def test_workers_and_a_gpu_are_not_used_together(warp, monkeypatch):
 @pytest.mark.parametrize("name", ["", "mujoco"])
 def test_mujoco_moves_what_nobody_gives_to_warp(no_library, monkeypatch, name):
     monkeypatch.setenv("TRUNKLINE_BATCHES", name)
-    assert type(batch_of(small_model(), 2, rough=True)) is Batch
+    assert type(batch_of(small_model(), 2, rough=True)) is CountingBatch
 
 
 def test_mujoco_moves_small_batches_and_those_that_have_to_be_exact(no_library, monkeypatch):
-    assert type(batch_of(small_model(), 2)) is Batch
+    assert type(batch_of(small_model(), 2)) is CountingBatch
     monkeypatch.setattr(motion, "LEAST_BY_WARP", 3)
-    assert type(batch_of(small_model(), 2, rough=True)) is Batch
+    assert type(batch_of(small_model(), 2, rough=True)) is CountingBatch
 
 
 def test_a_missing_library_is_told(no_library):

@@ -14,13 +14,13 @@ from trunkline.identification.simulate.experiment import prepare
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.recordings.trials.splits import DECIDING, IDENTIFY, TEST
 from trunkline.recordings.trials.trial import Trial
-from trunkline.report.certificate.certificate import Asked, Certificate, certify
+from trunkline.report.certificate.certificate import Certificate, CertificateSettings, certify
 from trunkline.report.certificate.page import page
 from trunkline.report.certificate.words import Use
 from trunkline.report.figures.certificate import pose_figure, uncertainty_figure
 from trunkline.report.figures.style import save_figure
 
-ASKED = Asked(
+ASKED = CertificateSettings(
     arm="small arm <of tests>", session="sample", seed=1, poses=12, arms=6, each=20, covered=12, frames=40, factor=3.0,
     uses=[Use(1.0, "previewing reaches"), Use(3.0, "showing how it moves")],
 )  # fmt: skip
@@ -31,9 +31,10 @@ def sample_trials(model: mujoco.MjModel) -> list[Trial]:
     """Of the splits that may decide."""
     trials = [tilt(model, angle) for angle in (0, 30, 60)]
     trials += [static_pull(model, pull) for pull in ([20, 0, 0], [0, 9, 9])]
-    held = [tilt(model, angle, DECIDING[1]) for angle in (20, 45)] + [static_pull(model, [0, 15, 0], split=DECIDING[1])]
+    validation = [tilt(model, angle, DECIDING[1]) for angle in (20, 45)]
+    validation.append(static_pull(model, [0, 15, 0], split=DECIDING[1]))
     moving = [release(model, 0.2, split, frames=40) for split in DECIDING] + [curl(model, 15, frames=40)]
-    return [*trials, *held, *moving]
+    return [*trials, *validation, *moving]
 
 
 def sample(model: mujoco.MjModel | None = None, trials: list[Trial] | None = None) -> Certificate:
@@ -66,11 +67,11 @@ def table(trials: list[Trial]) -> dict:
 def metrics(model: mujoco.MjModel, trials: list[Trial]) -> dict:
     """As the stages write them; those of the last score are of the same trials under another name."""
 
-    def of(own: list[Trial]) -> dict:
-        experiments = [prepare(trial, model, 40) for trial in own]
-        found = replay(model, experiments, segments_of(model))
-        predictions = {"identified": Prediction(found, experiments), "cad": Prediction(found, experiments)}
-        predictions |= references(own, experiments, model, found)
+    def of(subset: list[Trial]) -> dict:
+        experiments = [prepare(trial, model, 40) for trial in subset]
+        replayed = replay(model, experiments, segments_of(model))
+        predictions = {"identified": Prediction(replayed, experiments), "cad": Prediction(replayed, experiments)}
+        predictions |= references(subset, experiments, model, replayed)
         return {name: prediction.scores() for name, prediction in predictions.items()}
 
     scored = [*trials[:1], *(replace(trial, split=TEST) for trial in trials if trial.split != IDENTIFY)]
@@ -79,15 +80,15 @@ def metrics(model: mujoco.MjModel, trials: list[Trial]) -> dict:
 
 
 def write(file: Path) -> None:
-    found = sample()
-    facts = found.facts | {"files": {"artifacts/identify_control/arm.xml": "0" * 64}, "code": "0" * 64}
-    uncertainty = uncertainty_figure(found.budget.tips, found.budget.radius)
-    figures, pictures = {"uncertainty": uncertainty, "poses": pose_figure(found.shapes)}, {}
+    certificate = sample()
+    facts = certificate.facts | {"files": {"artifacts/identify_control/arm.xml": "0" * 64}, "code": "0" * 64}
+    uncertainty = uncertainty_figure(certificate.budget.tips, certificate.budget.radius)
+    figures, pictures = {"uncertainty": uncertainty, "poses": pose_figure(certificate.shapes)}, {}
     for name, figure in figures.items():
         save_figure(figure, file.with_suffix(".png"), 60)
         pictures[name] = file.with_suffix(".png").read_bytes()
     file.with_suffix(".png").unlink()
-    file.write_text(page(facts, found.replays, pictures), encoding="utf-8")
+    file.write_text(page(facts, certificate.replays, pictures), encoding="utf-8")
 
 
 if __name__ == "__main__":

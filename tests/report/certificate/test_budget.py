@@ -12,7 +12,7 @@ from trunkline.report.certificate.arms import arm_of
 from trunkline.report.certificate.budget import FRICTION, NOISE, Inputs, budget, lacking_draws
 from trunkline.report.certificate.discrepancy import Discrepancy, discrepancy
 from trunkline.report.certificate.identified import Identified, identified
-from trunkline.report.certificate.poses import Conditions, Poses, draw_poses
+from trunkline.report.certificate.poses import Conditions, StaticPoses, draw_poses
 
 SMALL = 1e-3  # rad, of a mount: tips move along straight lines
 
@@ -24,10 +24,10 @@ def model():
     return model
 
 
-def straight(model, count=1) -> Poses:
+def straight(model, count=1) -> StaticPoses:
     """Without weight and pull."""
     chain = arm_of(model).chain
-    return Poses(np.zeros((count, 3)), np.tile(chain.straight_lengths + SLACK, (count, 1)))
+    return StaticPoses(np.zeros((count, 3)), np.tile(chain.straight_lengths + SLACK, (count, 1)))
 
 
 def mounts(correlation: float, degrees: float = 1e6) -> Identified:
@@ -43,27 +43,27 @@ def nothing_known() -> Identified:
     return Identified([], [], none, none, none, np.zeros((0, 0)), none, none)
 
 
-def contributions(found) -> dict[str, float]:
-    return {source.name: float(source.contributions[0]) for source in found.sources}
+def contributions(result) -> dict[str, float]:
+    return {source.name: float(source.contributions[0]) for source in result.sources}
 
 
 def test_two_uncorrelated_tilts_add_up_as_in_the_guide(model):
     length, rng = arm_of(model).chain.length, np.random.default_rng(0)
-    found = budget(Inputs(model, mounts(0.0), None, 0.0), straight(model), 3000, 2, rng)
-    told = contributions(found)
-    assert told["mount_tilt_x"] == pytest.approx(length * SMALL, rel=1e-3)
-    assert told["mount_tilt_y"] == pytest.approx(length * SMALL, rel=1e-3)
-    assert told[FRICTION] == told[NOISE] == 0
-    assert found.combined[0] == pytest.approx(np.sqrt(2) * length * SMALL, rel=1e-3)
-    assert found.radius[0] == pytest.approx(chi(2).ppf(0.95) * length * SMALL, rel=0.03)
+    result = budget(Inputs(model, mounts(0.0), None, 0.0), straight(model), 3000, 2, rng)
+    lines = contributions(result)
+    assert lines["mount_tilt_x"] == pytest.approx(length * SMALL, rel=1e-3)
+    assert lines["mount_tilt_y"] == pytest.approx(length * SMALL, rel=1e-3)
+    assert lines[FRICTION] == lines[NOISE] == 0
+    assert result.combined[0] == pytest.approx(np.sqrt(2) * length * SMALL, rel=1e-3)
+    assert result.radius[0] == pytest.approx(chi(2).ppf(0.95) * length * SMALL, rel=0.03)
 
 
 def test_tilts_that_are_one_move_the_tip_along_a_line(model):
     """u² does not change, as they move it across each other; but its radius is that of one normal variable."""
     length, rng = arm_of(model).chain.length, np.random.default_rng(1)
-    found = budget(Inputs(model, mounts(1.0), None, 0.0), straight(model), 3000, 2, rng)
-    assert found.correlated[0] == pytest.approx(0, abs=1e-3 * (length * SMALL) ** 2)
-    assert found.radius[0] == pytest.approx(chi(1).ppf(0.95) * np.sqrt(2) * length * SMALL, rel=0.03)
+    result = budget(Inputs(model, mounts(1.0), None, 0.0), straight(model), 3000, 2, rng)
+    assert result.correlated[0] == pytest.approx(0, abs=1e-3 * (length * SMALL) ** 2)
+    assert result.radius[0] == pytest.approx(chi(1).ppf(0.95) * np.sqrt(2) * length * SMALL, rel=0.03)
 
 
 def test_correlation_adds_where_inputs_move_the_tip_the_same_way(model):
@@ -75,27 +75,27 @@ def test_correlation_adds_where_inputs_move_the_tip_the_same_way(model):
     for correlation in (-1.0, 0.0, 1.0):
         matrix = np.array([[1, correlation], [correlation, 1]])
         far = np.full(2, 1e6)
-        known = Identified(names, ["a", "a"], np.zeros(2), units, far, matrix, -far, far)
-        found = budget(Inputs(model, known, None, 0.0), straight(model), 4, 1, np.random.default_rng(2))
-        combined[correlation] = found.combined[0]
-        told = contributions(found)
-    one, two = told["mount_tilt_x"], told["rest_bend_x"]
-    assert min(one, two) > 1e-4
-    assert combined[0.0] == pytest.approx(np.hypot(one, two), rel=1e-6)
-    assert sorted([combined[-1.0], combined[1.0]]) == pytest.approx([abs(one - two), one + two], rel=1e-3)
+        estimates = Identified(names, ["a", "a"], np.zeros(2), units, far, matrix, -far, far)
+        result = budget(Inputs(model, estimates, None, 0.0), straight(model), 4, 1, np.random.default_rng(2))
+        combined[correlation] = result.combined[0]
+        lines = contributions(result)
+    first, second = lines["mount_tilt_x"], lines["rest_bend_x"]
+    assert min(first, second) > 1e-4
+    assert combined[0.0] == pytest.approx(np.hypot(first, second), rel=1e-6)
+    assert sorted([combined[-1.0], combined[1.0]]) == pytest.approx([abs(first - second), first + second], rel=1e-3)
 
 
 def test_few_degrees_of_freedom_make_it_wider_by_student_s_factor(model):
     rng = np.random.default_rng(3)
-    found = budget(Inputs(model, mounts(1.0, degrees=4), None, 0.0), straight(model), 20_000, 1, rng)
+    result = budget(Inputs(model, mounts(1.0, degrees=4), None, 0.0), straight(model), 20_000, 1, rng)
     length = arm_of(model).chain.length
-    assert found.radius[0] == pytest.approx(student(4).ppf(0.975) * np.sqrt(2) * length * SMALL, rel=0.04)
+    assert result.radius[0] == pytest.approx(student(4).ppf(0.975) * np.sqrt(2) * length * SMALL, rel=0.04)
 
 
 def test_noise_alone_is_a_ball_of_its_own(model):
-    found = budget(Inputs(model, nothing_known(), None, 1e-3), straight(model), 20_000, 1, np.random.default_rng(4))
-    assert found.combined[0] == pytest.approx(np.sqrt(3) * 1e-3)
-    assert found.radius[0] == pytest.approx(chi(3).ppf(0.95) * 1e-3, rel=0.02)
+    result = budget(Inputs(model, nothing_known(), None, 1e-3), straight(model), 20_000, 1, np.random.default_rng(4))
+    assert result.combined[0] == pytest.approx(np.sqrt(3) * 1e-3)
+    assert result.radius[0] == pytest.approx(chi(3).ppf(0.95) * 1e-3, rel=0.02)
 
 
 def test_friction_is_rectangular_between_the_ends_of_its_band(model):
@@ -103,22 +103,22 @@ def test_friction_is_rectangular_between_the_ends_of_its_band(model):
     rubbing.tendon_frictionloss[:] = 0.3
     arm = arm_of(rubbing)
     pulls = np.array([[0.015, -SLACK, -SLACK]])
-    poses = Poses(np.array([[0.0, 0.0, -9.81]]), arm.chain.straight_lengths - pulls)
+    poses = StaticPoses(np.array([[0.0, 0.0, -9.81]]), arm.chain.straight_lengths - pulls)
     half = np.linalg.norm(arm.friction(poses)[0])
     assert half > 5e-4
-    found = budget(Inputs(rubbing, nothing_known(), None, 0.0), poses, 20_000, 1, np.random.default_rng(5))
-    assert contributions(found)[FRICTION] == pytest.approx(half / np.sqrt(3))
-    assert found.radius[0] == pytest.approx(0.95 * half, rel=0.01)
+    result = budget(Inputs(rubbing, nothing_known(), None, 0.0), poses, 20_000, 1, np.random.default_rng(5))
+    assert contributions(result)[FRICTION] == pytest.approx(half / np.sqrt(3))
+    assert result.radius[0] == pytest.approx(0.95 * half, rel=0.01)
 
 
 def test_what_the_model_lacks_has_the_variance_that_it_says():
-    known = np.zeros((2, 2))
-    known[0, 1] = 1.0  # of the scales 0.01 and 0.02, for sure
-    lacking = Discrepancy(np.array([0.01, 0.02]), known, 5)
+    likelihood = np.zeros((2, 2))
+    likelihood[0, 1] = 1.0  # of the scales 0.01 and 0.02, for sure
+    lacking = Discrepancy(np.array([0.01, 0.02]), likelihood, 5)
     ways, arms = np.array([[0.1, 0.0], [0.1, 0.3]]), np.array([[0, 0, -0.5], [0.3, 0, -0.3]])
     draws = lacking_draws(lacking, ways, arms, 20_000, np.random.default_rng(6))
-    found = np.sqrt((draws**2).sum(axis=2).mean(axis=0))
-    np.testing.assert_allclose(found, [1e-3, np.hypot(1e-3, 6e-3)], rtol=0.02)
+    deviation = np.sqrt((draws**2).sum(axis=2).mean(axis=0))
+    np.testing.assert_allclose(deviation, [1e-3, np.hypot(1e-3, 6e-3)], rtol=0.02)
     assert np.abs(np.einsum("dnk,nk->dn", draws, arms)).max() < 1e-15, "across the arm"
 
 
@@ -131,8 +131,8 @@ def test_scales_of_what_the_model_lacks_come_back_from_many_residuals_and_few_le
     np.testing.assert_allclose(many.rms, true, rtol=0.1)
     few = discrepancy(residuals[:4], ways[:4], np.zeros(4))
 
-    def spread(found: Discrepancy) -> float:
-        return float(np.std(np.log(found.draw(4000, np.random.default_rng(8))[:, 1])))
+    def spread(lacking: Discrepancy) -> float:
+        return float(np.std(np.log(lacking.draw(4000, np.random.default_rng(8))[:, 1])))
 
     assert spread(few) > 4 * spread(many)
 
@@ -147,23 +147,23 @@ def test_residuals_that_other_sources_explain_leave_nothing_to_the_model():
 
 def table(**rows) -> dict:
     """A stage's parameters.json. rows: value, half width, and range."""
-    told = {
+    parameters = {
         name: {"value": value, "interval_95_given_model": [value - half, value + half], "range": list(span)}
         for name, (value, half, span) in rows.items()
     }
     correlation = {a: {b: 1.0 if a == b else 0.5 for b in rows} for a in rows}
-    return {"parameters": told, "correlation": correlation, "fitted_to": dict.fromkeys("abcde")}
+    return {"parameters": parameters, "correlation": correlation, "fitted_to": dict.fromkeys("abcde")}
 
 
 def test_intervals_become_standard_uncertainties_and_later_stages_win():
     wide = {"mount_tilt_x": (0.01, 0.002, (-0.1, 0.1)), "mount_tilt_y": (0.0, 0.003, (-0.1, 0.1))}
     first, second = table(**wide), table(mount_tilt_y=(0.02, 0.001, (-0.1, 0.1)))
-    found = identified({"one": first, "two": second})
-    assert found.names == ["mount_tilt_x", "mount_tilt_y"]
-    assert found.stages == ["one", "two"]
+    merged = identified({"one": first, "two": second})
+    assert merged.names == ["mount_tilt_x", "mount_tilt_y"]
+    assert merged.stages == ["one", "two"]
     scale, factor = PARAMETERS["mount_tilt_x"].scale, student(4).ppf(0.975)
-    np.testing.assert_allclose(found.deviation, np.array([0.002, 0.001]) / scale / factor)
-    np.testing.assert_array_equal(found.correlation, np.eye(2))
+    np.testing.assert_allclose(merged.deviation, np.array([0.002, 0.001]) / scale / factor)
+    np.testing.assert_array_equal(merged.correlation, np.eye(2))
     alone = identified({"one": first})
     assert alone.correlation[0, 1] == 0.5
     draws = alone.draw(40_000, np.random.default_rng(10))

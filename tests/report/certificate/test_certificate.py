@@ -54,9 +54,10 @@ def test_the_verdict_is_of_the_trials_that_decided_nothing(certificate):
 )  # fmt: skip
 def test_what_it_is_good_for_follows_from_numbers(share, null, says):
     identified = IDENTIFIED | {"e_position_pct": share}
-    told = verdict("On some", identified, {"e_position_mm": null}, ASKED.uses, ASKED.factor, 7.0, ["loads at the tip"])
-    assert says in told
-    assert told.endswith("not for loads at the tip.")
+    rest = {"e_position_mm": null}
+    sentence = verdict("On some", identified, rest, ASKED.uses, ASKED.factor, 7.0, ["loads at the tip"])
+    assert says in sentence
+    assert sentence.endswith("not for loads at the tip.")
 
 
 def test_what_it_is_not_good_for_is_what_no_trial_had(certificate):
@@ -71,30 +72,31 @@ def test_what_it_is_not_good_for_is_what_no_trial_had(certificate):
 
 
 def test_what_is_open_comes_with_the_experiments_that_would_tell_it():
-    told = table(sample_trials(small_model(4))[:1])
-    (line,) = open_lines(told)
+    parameters = table(sample_trials(small_model(4))[:1])
+    (line,) = open_lines(parameters)
     assert line.startswith("mount_tilt_y is not determined; told by static tilts")
-    assert strong_pairs(told) == ["mount_tilt_x and mount_tilt_y rise together (+0.95)"]
+    assert strong_pairs(parameters) == ["mount_tilt_x and mount_tilt_y rise together (+0.95)"]
 
 
 def test_an_interval_that_ends_with_its_range_is_open():
-    told = table(sample_trials(small_model(4))[:1])
-    told["parameters"]["mount_tilt_x"]["interval_95_given_model"] = [-0.02, 0.1]
-    assert open_lines(told)[0].startswith("mount_tilt_x is told to one side alone: its interval ends with its range;")
+    parameters = table(sample_trials(small_model(4))[:1])
+    parameters["parameters"]["mount_tilt_x"]["interval_95_given_model"] = [-0.02, 0.1]
+    first = open_lines(parameters)[0]
+    assert first.startswith("mount_tilt_x is told to one side alone: its interval ends with its range;")
 
 
 def test_the_held_out_trials_at_rest_tell_what_the_model_lacks(certificate):
     """Springs that are too stiff by so much make tips be off by a share of the way that gravity moves them."""
     truth = small_model(4)
-    trials, found = sample_trials(truth), []
+    trials, accepted = sample_trials(truth), []
     for factor in (1.0, 1.1, 1.3):
         model = truth.__copy__()
         model.jnt_stiffness[:] *= factor
         inputs = inputs_of(model, trials, {}, INGESTED, 2, np.random.default_rng(0))
         assert inputs.lacking
         assert inputs.lacking.trials == 3
-        found.append(inputs.lacking.rms[0])
-    assert found[0] < 0.5 * found[1] < 0.25 * found[2] * 1.5
+        accepted.append(inputs.lacking.rms[0])
+    assert accepted[0] < 0.5 * accepted[1] < 0.25 * accepted[2] * 1.5
     assert certificate.metrics["open"] == 1
 
 
@@ -137,15 +139,15 @@ def test_the_code_has_one_digest_which_every_change_of_it_changes(tmp_path):
     (tmp_path / "rooms/__pycache__").mkdir(parents=True)
     (tmp_path / "stage.py").write_text("a")
     (tmp_path / "rooms/one.py").write_text("b")
-    parts, found = ["stage.py", "rooms"], set()
-    found.add(digest_of_code(tmp_path, parts))
+    parts, digests = ["stage.py", "rooms"], set()
+    digests.add(digest_of_code(tmp_path, parts))
     (tmp_path / "rooms/__pycache__/one.pyc").write_text("left by Python")
-    assert {digest_of_code(tmp_path, parts[::-1])} == found
+    assert {digest_of_code(tmp_path, parts[::-1])} == digests
     (tmp_path / "rooms/one.py").write_text("c")
-    found.add(digest_of_code(tmp_path, parts))
+    digests.add(digest_of_code(tmp_path, parts))
     (tmp_path / "rooms/one.py").rename(tmp_path / "rooms/two.py")
-    found.add(digest_of_code(tmp_path, parts))
-    assert len(found) == 3
+    digests.add(digest_of_code(tmp_path, parts))
+    assert len(digests) == 3
 
 
 def test_the_committed_certificate_names_the_committed_code():
@@ -159,8 +161,8 @@ def test_the_page_stands_by_itself(html):
     assert html.count("<h1>") == 1
     assert "small arm &lt;of tests&gt;" in html
     assert "<of tests>" not in html
-    told = json.loads(re.search(r'id="replays">(.*?)</script>', html, re.DOTALL)[1])
-    assert told["trials"]
+    replays = json.loads(re.search(r'id="replays">(.*?)</script>', html, re.DOTALL)[1])
+    assert replays["trials"]
     for words in ("Errors", "Replay", "Parameters", "Uncertainty of the tip", "Data quality", COMMAND, "Signature"):
         assert words in html, words
     assert len(html) < 15e6

@@ -13,7 +13,7 @@ from trunkline.report.certificate.certificate import certify
 from trunkline.report.certificate.coverage import Coverage, covered, from_beyond, is_inside, share_of
 from trunkline.report.certificate.discrepancy import discrepancy
 from trunkline.report.certificate.page import _measured
-from trunkline.report.certificate.poses import Conditions, Poses, draw_poses
+from trunkline.report.certificate.poses import Conditions, StaticPoses, draw_poses
 
 CONDITIONS = Conditions(60.0, 0.0, 0.02, 0.03)
 
@@ -49,17 +49,17 @@ def test_a_pose_in_which_the_twin_itself_finds_no_rest_is_outside():
 )
 def test_the_interval_is_wilson_s(hits, count, low, high):
     """(p + z²/2n ± z sqrt(p (1 - p)/n + z²/4n²)) / (1 + z²/n) with z = 1.959964."""
-    found = share_of(np.arange(count) < hits)
-    assert found == pytest.approx({"share": hits / count, "low": low, "high": high, "poses": count}, abs=1e-6)
+    share = share_of(np.arange(count) < hits)
+    assert share == pytest.approx({"share": hits / count, "low": low, "high": high, "poses": count}, abs=1e-6)
 
 
 def test_pulled_poses_are_counted_apart():
     """Those that only hang are all inside, and carry the whole."""
     inside, pulled = np.array([True] * 5 + [False] * 5), np.arange(10) >= 4
-    found = Coverage(inside, pulled).metrics()
-    assert (found["share"], found["poses"], found["stated"]) == (0.5, 10, COVERAGE)
-    assert (found["pulled"]["share"], found["pulled"]["poses"]) == (pytest.approx(1 / 6), 6)
-    assert found["pulled"]["high"] < found["high"]
+    metrics = Coverage(inside, pulled).metrics()
+    assert (metrics["share"], metrics["poses"], metrics["stated"]) == (0.5, 10, COVERAGE)
+    assert (metrics["pulled"]["share"], metrics["pulled"]["poses"]) == (pytest.approx(1 / 6), 6)
+    assert metrics["pulled"]["high"] < metrics["high"]
     assert "pulled" not in Coverage(inside, np.zeros(10, bool)).metrics()
 
 
@@ -73,21 +73,21 @@ def test_half_of_the_pulled_poses_come_from_beyond_and_none_that_hangs(count):
 
 def test_most_poses_are_pulled_and_the_rig_is_sent_what_the_twin_is():
     """The rig is asked for pulls from the straight arm's path length, more than 0 for motors that pull."""
-    chain, asked = arm_of(small_model(3)).chain, []
+    chain, requests = arm_of(small_model(3)).chain, []
     poses = draw_poses(chain, CONDITIONS, 200, np.random.default_rng(0))
 
     def bring(pulls, gravity, back):
-        asked.append((pulls, gravity, back))
+        requests.append((pulls, gravity, back))
         return np.zeros((len(pulls), 3))
 
-    found = covered(chain, poses, stated(np.ones(200)), bring, np.random.default_rng(1))
-    ((pulls, gravity, back),) = asked
+    coverage = covered(chain, poses, stated(np.ones(200)), bring, np.random.default_rng(1))
+    ((pulls, gravity, back),) = requests
     np.testing.assert_allclose(chain.straight_lengths - pulls, poses.commands)
     np.testing.assert_array_equal(gravity, poses.gravity)
-    np.testing.assert_array_equal(found.pulled, (pulls > 0).any(axis=1))
-    assert 0.7 < found.pulled.mean() < 0.9
-    assert back.sum() == found.pulled.sum() // 2
-    assert found.inside.all()
+    np.testing.assert_array_equal(coverage.pulled, (pulls > 0).any(axis=1))
+    assert 0.7 < coverage.pulled.mean() < 0.9
+    assert back.sum() == coverage.pulled.sum() // 2
+    assert coverage.inside.all()
 
 
 @pytest.fixture(scope="module")
@@ -101,11 +101,11 @@ def certified(truth):
     arm, trials = arm_of(truth), sample_trials(truth)
 
     def bring(pulls, gravity, back):
-        return arm.tips(Poses(gravity, arm.chain.straight_lengths - pulls))
+        return arm.tips(StaticPoses(gravity, arm.chain.straight_lengths - pulls))
 
-    asked, tables = replace(ASKED, covered=12, poses=4, arms=3), {"identify_stiffness": table(trials)}
+    config, tables = replace(ASKED, covered=12, poses=4, arms=3), {"identify_stiffness": table(trials)}
     of = metrics(truth, trials)
-    return [certify(asked, truth, trials, tables, of, rig) for rig in (None, bring)]
+    return [certify(config, truth, trials, tables, of, rig) for rig in (None, bring)]
 
 
 @pytest.mark.parametrize(("offset", "share"), [(0.0, 1.0), (0.5, 0.0), (np.nan, 0.0)])
@@ -113,31 +113,31 @@ def test_an_arm_that_is_the_twin_is_inside_and_one_elsewhere_or_without_rest_is_
     arm, rng = arm_of(truth), np.random.default_rng(2)
     poses = draw_poses(arm.chain, CONDITIONS, 12, rng)
     tips = arm.tips(poses)
-    found = covered(arm.chain, poses, stated(np.full(12, 1e-3), tips), lambda *_: tips + [0, 0, offset], rng).metrics()
-    assert (found["share"], found["pulled"]["share"], found["poses"]) == (share, share, 12)
+    result = covered(arm.chain, poses, stated(np.full(12, 1e-3), tips), lambda *_: tips + [0, 0, offset], rng).metrics()
+    assert (result["share"], result["pulled"]["share"], result["poses"]) == (share, share, 12)
 
 
 def test_with_a_rig_the_share_is_a_metric_and_stands_beside_the_stated_one(certified):
-    _, found = certified
-    coverage = found.metrics["coverage"]
+    _, certificate = certified
+    coverage = certificate.metrics["coverage"]
     assert coverage["share"] == 1.0
     assert coverage["poses"] == 12
-    assert coverage["stated"] == found.facts["uncertainty"]["coverage"] == COVERAGE
-    words = _measured(found.facts["uncertainty"])
+    assert coverage["stated"] == certificate.facts["uncertainty"]["coverage"] == COVERAGE
+    words = _measured(certificate.facts["uncertainty"])
     assert "100.0 % of 12 poses" in words
     assert f"of {coverage['pulled']['poses']} poses with a pull" in words
     assert "stated 95 %" in words
 
 
 def test_without_a_rig_nothing_is_measured_and_the_page_says_so(certified):
-    found, _ = certified
-    assert "coverage" not in found.metrics
-    assert found.facts["uncertainty"]["measured"] is None
-    assert "not measured" in _measured(found.facts["uncertainty"])
+    certificate, _ = certified
+    assert "coverage" not in certificate.metrics
+    assert certificate.facts["uncertainty"]["measured"] is None
+    assert "not measured" in _measured(certificate.facts["uncertainty"])
 
 
 def test_what_is_measured_changes_nothing_else(certified):
-    without, with_rig = (found.metrics for found in certified)
+    without, with_rig = (certificate.metrics for certificate in certified)
     assert {key: value for key, value in with_rig.items() if key != "coverage"} == without
 
 

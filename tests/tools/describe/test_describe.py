@@ -1,4 +1,4 @@
-"""`python -m trunkline.tools.describe`: an arm in words, before anything is recorded."""
+"""`trunkline describe`: an arm in words, before anything is recorded."""
 
 import subprocess
 from dataclasses import replace
@@ -56,24 +56,24 @@ def test_markers_beside_the_axis_are_told(model):
 
 def test_what_no_log_will_tell_is_said():
     one_side = arm(tendons=[Tendon(0.0), Tendon(40.0), Tendon(-40.0)]).build(ACTUATION, SOLVER, ROOT).spec.compile()
-    said = doubt_lines(one_side, None)
-    assert said[0].startswith("masses are as described")
-    assert said[1] == "no tendon bends the arm towards -180°: neighbours are 280° apart"
+    lines = doubt_lines(one_side, None)
+    assert lines[0].startswith("masses are as described")
+    assert lines[1] == "no tendon bends the arm towards -180°: neighbours are 280° apart"
     still = session(["static_path"], frame={"up": [0, 0, 1], "gravity": "none"}, segments={"marker": "unit_05"})
-    said = "\n".join(doubt_lines(one_side, still))
-    assert "tells joint_friction, damping, tendon_friction, friction_time, kv, time_constant" in said
-    assert "stiffness and kp show in their ratio alone" in said
-    assert "one tracked point" in said
+    text = "\n".join(doubt_lines(one_side, still))
+    assert "tells joint_friction, damping, tendon_friction, friction_time, kv, time_constant" in text
+    assert "stiffness and kp show in their ratio alone" in text
+    assert "one tracked point" in text
     whole = doubt_lines(one_side, session(["static_tilt", "release", "motion"]))
     assert not any("tells" in line and "no trial" in line for line in whole)
 
 
 def test_names_that_the_arm_has_not_are_noted(model):
     named = {"motors": {"m1": {"unit": "m", "tendons": {"tendon_1": 1, "tendon2": -1}}}, "segments": {"a": "middle"}}
-    said = doubt_lines(model, session(["motion"], **named))
-    assert "session.yaml: motors: found 'tendon2', the arm has tendon_1, tendon_2, tendon_3" in said
+    lines = doubt_lines(model, session(["motion"], **named))
+    assert "session.yaml: motors: found 'tendon2', the arm has tendon_1, tendon_2, tendon_3" in lines
     assert any("found 'base'" in line for line in doubt_lines(model, session(["motion"], segments={"a": "base"})))
-    assert any(line.startswith("session.yaml: segments: found 'middle', the arm has unit_01,") for line in said)
+    assert any(line.startswith("session.yaml: segments: found 'middle', the arm has unit_01,") for line in lines)
 
 
 def test_what_is_hardly_meant_is_noted():
@@ -90,10 +90,10 @@ def test_what_is_hardly_meant_is_noted():
 def test_the_command_describes_a_file_and_draws_it(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main([str(ROOT / "conf/build_mjcf/arm/ftdcr.yaml")]) == 0
-    told = capsys.readouterr().out
-    assert "15 units, 186.5 mm" in told
-    assert "tendon_9: at -122.5°" in told
-    assert "drawn in artifacts/describe/ftdcr.png" in told
+    output = capsys.readouterr().out
+    assert "15 units, 186.5 mm" in output
+    assert "tendon_9: at -122.5°" in output
+    assert "drawn in artifacts/describe/ftdcr.png" in output
     assert (tmp_path / "artifacts/describe/ftdcr.png").stat().st_size > 10_000
     ignored = ["git", "check-ignore", "-q"]
     for folder in (".", "examples/pairs"):
@@ -131,7 +131,7 @@ def test_keys_that_an_arm_lacks_are_told_at_once(tmp_path):
     lacking.write_text("kind: sections\nsections: [{length: 0.1, units: 2, width: 0.04, bending_stiffness: 0.05}]\n")
     with pytest.raises(InputError) as caught:
         read_drawing(lacking, ROOT)
-    said = str(caught.value)
-    assert "missing, expected a value; also missing: " in said
+    message = str(caught.value)
+    assert "missing, expected a value; also missing: " in message
     for key in ("joint_range_deg", "damping_ratio", "tendons", "hole_ratio", "tip_load", "segments", "mass"):
-        assert key in said
+        assert key in message

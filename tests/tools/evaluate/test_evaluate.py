@@ -1,4 +1,4 @@
-"""`python -m trunkline.tools.evaluate`: any model against any session, and what it refuses in one line."""
+"""`trunkline evaluate`: any model against any session, and what it refuses in one line."""
 
 import json
 import shutil
@@ -86,13 +86,13 @@ def test_it_prints_and_writes_every_trial_beside_what_its_errors_stand_beside(la
         "segments.png",
     }
     metrics = json.loads((out / "metrics.json").read_text())
-    told, cad, null = (metrics[name] for name in ("model", "cad", "null"))
-    assert told["trials"] == 7
+    identified, cad, null = (metrics[name] for name in ("model", "cad", "null"))
+    assert identified["trials"] == 7
     for kind in ("static_tilt", "release", "curl"):
         for error in ("e_position_mm", "e_tip_mm"):
-            own = told["by_experiment"][kind][error]
-            assert own < 0.3 * cad["by_experiment"][kind][error]
-            assert own < 0.1 * null["by_experiment"][kind][error]
+            error_of_model = identified["by_experiment"][kind][error]
+            assert error_of_model < 0.3 * cad["by_experiment"][kind][error]
+            assert error_of_model < 0.1 * null["by_experiment"][kind][error]
     assert "static_tilt" not in metrics["null_held"]["by_experiment"]
     table = pd.read_csv(out / "trials.csv")
     assert set(table.split) == set(SPLITS)
@@ -136,20 +136,20 @@ def test_trials_that_the_model_was_fitted_to_are_marked_and_another_session_s_ar
     root, _, folder = lab
     config = settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.5, 8.0)})
     run("identify_stiffness", replace(config, optimizer=config.fine), root / "artifacts/build_mjcf/arm.xml")
-    found = root / "artifacts/identify_stiffness/arm.xml"
-    evaluate(found, folder)
+    model_path = root / "artifacts/identify_stiffness/arm.xml"
+    evaluate(model_path, folder)
     printed = capsys.readouterr().out
     assert "the model was fitted to these 2 of 7 trials" in printed
     assert "\ntilt_30_identify *" in printed
     assert "\ntilt_45_validate *" not in printed
     later = root / "artifacts/identify_damping"  # goes on from this model, with trials of its own
-    shutil.copytree(found.parent, later)
+    shutil.copytree(model_path.parent, later)
     table = json.loads((later / "parameters.json").read_text()) | {"fitted_to": {}}
     (later / "parameters.json").write_text(json.dumps(table))
     evaluate(later / "arm.xml", folder)
     assert "the model was fitted to these 2 of 7 trials" in capsys.readouterr().out
     write_trials(folder, [replace(t, positions=t.positions + 1e-4) for t in read_trials(folder, SPLITS)])
-    evaluate(found, folder)
+    evaluate(model_path, folder)
     assert "was fitted" not in capsys.readouterr().out
 
 
@@ -161,11 +161,11 @@ def test_logs_give_the_trials_that_the_stages_make_of_them(tmp_path, monkeypatch
     run_stage("ingest", ingest.Config, ingest.main)
     run_stage("filter", filter_stage.Config, filter_stage.main)
     expected = read_trials(filter_stage.PROCESSED, SPLITS)
-    found = trials_of(tmp_path / "data/raw/demo", tmp_path, "evaluate")
-    assert len(expected) == len(found) == 4
-    for one, other in zip(expected, found, strict=True):
-        assert one.name == other.name
-        assert one.positions.tobytes() == other.positions.tobytes()
+    trials = trials_of(tmp_path / "data/raw/demo", tmp_path, "evaluate")
+    assert len(expected) == len(trials) == 4
+    for first, other in zip(expected, trials, strict=True):
+        assert first.name == other.name
+        assert first.positions.tobytes() == other.positions.tobytes()
     capsys.readouterr()
 
 
@@ -177,9 +177,9 @@ def test_what_is_said_of_logs_begins_with_who_asked_and_names_repairs(tmp_path, 
         values[60:110, [1, 2]] = values[60:110, [2, 1]]
     write_log(folder / "release_a.mcap", measured)
     trials_of(folder, tmp_path, "ask")
-    told, said = capsys.readouterr()
-    assert all(line.startswith("ask: ") for line in (told + said).splitlines())
-    (line,) = [line for line in said.splitlines() if "taken for each other" in line]
+    output, errors = capsys.readouterr()
+    assert all(line.startswith("ask: ") for line in (output + errors).splitlines())
+    (line,) = [line for line in errors.splitlines() if "taken for each other" in line]
     first, second = SEGMENTS[:2]
     assert line.startswith(f"ask: repaired: release_a: {first!r} and {second!r} were taken for each other in ")
 

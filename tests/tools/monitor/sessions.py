@@ -45,8 +45,8 @@ def record(folder: Path, share: float, repeats: int, seed: int) -> Path:
         measure(truth, settings, np.random.default_rng(draw), index * settings.pause_s)
         for index, (truth, draw) in enumerate(zip(truths, draws, strict=True))
     ]
-    for one in measured:
-        write_log(folder / f"{one.name}.mcap", one)
+    for trial in measured:
+        write_log(folder / f"{trial.name}.mcap", trial)
     write_session(folder, measured, settings)
     return folder
 

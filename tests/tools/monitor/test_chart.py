@@ -5,7 +5,7 @@ import pytest
 
 from tests.tools.monitor.scores import drawn
 from trunkline.tools.monitor.baseline import Baseline
-from trunkline.tools.monitor.chart import Chart, Line, chart_of, limit_of
+from trunkline.tools.monitor.chart import Chart, ParameterChart, chart_of, limit_of
 
 KINDS = ("static_tilt", "release", "curl")
 
@@ -17,13 +17,13 @@ def baseline(rng, each: int = 10) -> Baseline:
 def test_false_alarms_are_as_rare_as_asked_for():
     """Over many references, each with charts of its own; the limit depends on the numbers of trials alone."""
     rng, rate = np.random.default_rng(1), 1 / 50
-    found = baseline(rng)
-    limit = limit_of(found, 0, rate)
+    reference = baseline(rng)
+    limit = limit_of(reference, 0, rate)
     count = trials = 0
     for _ in range(150):
-        found = baseline(rng)
-        best = min(one.deviation for one, _ in found.typical(0))
-        chart = Chart(found, {0: Line(limit, best)}, restart=True)
+        reference = baseline(rng)
+        best = min(departure.deviation for departure, _ in reference.typical(0))
+        chart = Chart(reference, {0: ParameterChart(limit, best)}, restart=True)
         for _ in range(60):
             count += bool(chart.add(drawn(KINDS[rng.integers(3)], rng)).alarms)
             trials += 1

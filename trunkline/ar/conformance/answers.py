@@ -36,8 +36,8 @@ class Answers:
         """The wrist of the robot's `joints`, and how `align` turns it."""
         wrist = wrist_of(tuple(joints), self.core.mount_offset)
         plane = self.core.settings.bending_plane
-        found = align(tuple(tip), tuple(mount), tuple(pointing), wrist, Aligned(**last), plane)
-        return {"wrist": wrist._asdict(), "aligned": found._asdict()}
+        aligned = align(tuple(tip), tuple(mount), tuple(pointing), wrist, Aligned(**last), plane)
+        return {"wrist": wrist._asdict(), "aligned": aligned._asdict()}
 
     def rigid_reach(self, mount, pointing) -> Case:
         return self.core.reach.rigid(tuple(mount), tuple(pointing))._asdict()
@@ -49,17 +49,17 @@ class Answers:
         """Both targets as `place` has them in a world of `boxes`."""
         wrist = wrist_of(tuple(joints), self.core.mount_offset)
         world = World("world", tuple(Box(box["name"], tuple(box["low"]), tuple(box["high"])) for box in boxes))
-        found = place(
+        targets = place(
             tuple(rigid), tuple(tip), tuple(pointing), False, wrist, Aligned(**last), world, self.core.reach,
             self.core.settings,
         )  # fmt: skip
-        return TARGETS.dump_python(found, mode="json")
+        return TARGETS.dump_python(targets, mode="json")
 
     def network(self, pose) -> Case:
         """Its outputs, and whether they are to be doubted."""
-        found = {name: values[0] for name, values in ask(self._session, np.array([pose])).items()}
-        doubtful = bool(found.pop("doubtful"))
-        rounded = {name: np.round(values.astype(float), DIGITS).tolist() for name, values in found.items()}
+        outputs = {name: values[0] for name, values in ask(self._session, np.array([pose])).items()}
+        doubtful = bool(outputs.pop("doubtful"))
+        rounded = {name: np.round(values.astype(float), DIGITS).tolist() for name, values in outputs.items()}
         return rounded | {"doubtful": doubtful}
 
     @property

@@ -43,9 +43,9 @@ def within_reach(answers: Answers, joints: Joints, rng: np.random.Generator) -> 
         if answers.rigid_reach(rigid, DOWN)["where"] != "inside":
             continue
         tip = add(rigid, _vector(rng.uniform(*BELOW)))
-        found = answers.targets(rigid, tip, DOWN, joints, FIRST._asdict(), [])
-        inside = found["rigid"]["reach"] == found["tip"]["reach"] == "inside"
-        if inside and found["turned"] is not None and distance(rigid, tip) > APART:
+        targets = answers.targets(rigid, tip, DOWN, joints, FIRST._asdict(), [])
+        inside = targets["rigid"]["reach"] == targets["tip"]["reach"] == "inside"
+        if inside and targets["turned"] is not None and distance(rigid, tip) > APART:
             return rigid, tip
     raise InputError(f"maps: found no mount and tip within reach in {TRIES} tries, expected those of a robot")
 
@@ -63,45 +63,45 @@ def cases(answers: Answers, joints: Joints, rigid: Vector, tip: Vector, rng: np.
 
 def _alignments(answers: Answers, joints: Joints, mount: Vector, rng: np.random.Generator) -> list[Case]:
     """At random, and around the arm and back in steps of 8°, each with the answer before: half-planes change late."""
-    found = [
+    cases = [
         {"tip": add(mount, _vector(rng.uniform(*BELOW))), "mount": mount, "pointing": _pointing(rng.uniform(0, 1), rng),
          "joints": joints, "last": FIRST._asdict()}
         for _ in range(MANY)
     ]  # fmt: skip
-    way, last = [*range(0, 360, 8), *range(360, 0, -8)], FIRST._asdict()
-    for degrees in way:
+    angles, last = [*range(0, 360, 8), *range(360, 0, -8)], FIRST._asdict()
+    for degrees in angles:
         angle = math.radians(degrees)
         tip = add(mount, (0.2 * math.cos(angle), 0.2 * math.sin(angle), -0.3))
-        found.append({"tip": tip, "mount": mount, "pointing": DOWN, "joints": joints, "last": last})
-        last = answers.alignment(**found[-1])["aligned"]
-    return found
+        cases.append({"tip": tip, "mount": mount, "pointing": DOWN, "joints": joints, "last": last})
+        last = answers.alignment(**cases[-1])["aligned"]
+    return cases
 
 
 def _rigid(answers: Answers, rng: np.random.Generator) -> list[Case]:
-    found = [{"mount": _vector(rng.uniform(*AROUND)), "pointing": DOWN} for _ in range(MANY)]
-    found += _offered(answers.rigid_reach, "mount", found)
-    return found + [{"mount": case["mount"], "pointing": _pointing(0.5, rng)} for case in found[:2]]
+    cases = [{"mount": _vector(rng.uniform(*AROUND)), "pointing": DOWN} for _ in range(MANY)]
+    cases += _offered(answers.rigid_reach, "mount", cases)
+    return cases + [{"mount": case["mount"], "pointing": _pointing(0.5, rng)} for case in cases[:2]]
 
 
 def _soft(answers: Answers, rng: np.random.Generator) -> list[Case]:
     """Under gravity from any side, and in the plane of tendon 1, which maps of one tilt know."""
-    found = [
+    cases = [
         {"tip": _vector(rng.uniform(*BELOW)), "gravity": _tilted(tilt) if number % 2 else _pointing(tilt, rng)}
         for tilt in TILTS
         for number in range(MANY // 4)
     ]
-    return found + _offered(answers.soft_reach, "tip", found)
+    return cases + _offered(answers.soft_reach, "tip", cases)
 
 
-def _offered(ask: Callable[..., Case], name: str, found: list[Case]) -> list[Case]:
+def _offered(ask: Callable[..., Case], name: str, cases: list[Case]) -> list[Case]:
     """The same questions about the points that were offered, so that there are as many within reach."""
-    answered = [(case, ask(**case)["offer"]) for case in found]
+    answered = [(case, ask(**case)["offer"]) for case in cases]
     return [case | {name: offer} for case, offer in answered if offer is not None]
 
 
 def _targets(joints: Joints, rigid: Vector, tip: Vector, rng: np.random.Generator) -> list[Case]:
     """The arm near both targets, turned to several sides with them, some in a solid."""
-    found = []
+    cases = []
     for number in range(MANY):
         pointing = _pointing(TILTS[number % 4], rng)
         away = rotate(least_rotation(DOWN, pointing), subtract(tip, rigid))
@@ -109,24 +109,24 @@ def _targets(joints: Joints, rigid: Vector, tip: Vector, rng: np.random.Generato
         end = add(add(mount, away), _vector(rng.normal(scale=0.02, size=3)))
         x, y, z = (mount, end, (9.0, 9.0, 9.0))[number % 3]
         box = Box("the table", (x - 0.05, y - 0.05, z - 0.05), (x + 0.05, y + 0.05, z + 0.05))
-        found.append({"rigid": mount, "tip": end, "pointing": pointing, "joints": joints, "last": FIRST._asdict(),
+        cases.append({"rigid": mount, "tip": end, "pointing": pointing, "joints": joints, "last": FIRST._asdict(),
                       "boxes": [asdict(box)]})  # fmt: skip
-    return found
+    return cases
 
 
 def _poses(answers: Answers, rng: np.random.Generator) -> list[Case]:
     """Tip poses of an arm that only bends, at places that it reaches and that it cannot, as the network is asked."""
-    found = []
+    cases = []
     for number in range(MANY):
         tilt = float(rng.uniform(0, 1.2))
         gravity = _pointing(tilt, rng) if answers.inputs > 8 else _tilted(tilt)
         tip = _vector(rng.uniform(*BELOW))
         tip = answers.soft_reach(tip, gravity)["offer"] or tip if number % 4 else scale(tip, 3.0)
         axis = (-tip[1] / math.hypot(tip[0], tip[1]), tip[0] / math.hypot(tip[0], tip[1]), 0.0)
-        told = gravity if answers.inputs > 8 else (tilt,)
-        asked = [{"pose": [*told, *tip, *about(axis, float(bend))]} for bend in BENDS]
-        found.append(min(asked, key=lambda case, tip=tip: distance(answers.network(**case)["tip"], tip)))
-    return found
+        gravity_inputs = gravity if answers.inputs > 8 else (tilt,)
+        candidates = [{"pose": [*gravity_inputs, *tip, *about(axis, float(bend))]} for bend in BENDS]
+        cases.append(min(candidates, key=lambda case, tip=tip: distance(answers.network(**case)["tip"], tip)))
+    return cases
 
 
 def _tilted(tilt: float) -> Vector:

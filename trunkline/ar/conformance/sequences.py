@@ -23,35 +23,38 @@ TREMBLING = 24  # steps
 
 def sequences(core: Teleoperation, joints: Joints, rigid: Vector, tip: Vector) -> dict[str, list[tuple[float, Input]]]:
     """By name: what the core is given from its start, with the time of each step, s. Both targets are within reach."""
-    given = _first(core, joints, rigid, tip)
+    first_input = _first(core, joints, rigid, tip)
     scripts: dict[str, Callable[[Recorder], object]] = {
-        f"{mode}, {event}": lambda one, mode=mode, event=event: (one.to(mode), one.cause(event))
+        f"{mode}, {event}": lambda recorder, mode=mode, event=event: (recorder.to(mode), recorder.cause(event))
         for mode, event in TRANSITIONS
     }
     scripts |= {
-        f"{name} while executing": lambda one, name=name: (one.to("execute"), FAULTS[name](one)) for name in EXECUTING
+        f"{name} while executing": lambda recorder, name=name: (recorder.to("execute"), FAULTS[name](recorder))
+        for name in EXECUTING
     }
-    scripts |= {f"{name} while watching": lambda one, name=name: _unheard(one, FAULTS[name]) for name in WATCHING}
+    scripts |= {
+        f"{name} while watching": lambda recorder, name=name: _unheard(recorder, FAULTS[name]) for name in WATCHING
+    }
     scripts |= {"faults while aiming": _faults, "reach": _reach, "follow a hand": _follow, "tremble": _tremble}
-    found = {}
+    recorded = {}
     for name, script in scripts.items():
-        recorder = Recorder(core, given, DT)
+        recorder = Recorder(core, first_input, DT)
         script(recorder)
-        found[name] = [(dt, heard) for dt, heard, _ in recorder.steps]
-    return found
+        recorded[name] = [(dt, heard) for dt, heard, _ in recorder.steps]
+    return recorded
 
 
 def _first(core: Teleoperation, joints: Joints, rigid: Vector, tip: Vector) -> Input:
     """Controllers whose rays end at both targets, nothing pressed."""
     back, settings = conjugate(ALIGNMENT.quaternion), core.settings
-    held = [
+    controllers = [
         Controller(
             subtract(rotate(back, subtract(target, ALIGNMENT.position)), scale(AHEAD, settings.rays.start)),
             (1.0, 0.0, 0.0, 0.0),
         )
         for target in (rigid, tip)
     ]
-    left, right = held if settings.rigid_hand == "left" else held[::-1]
+    left, right = controllers if settings.rigid_hand == "left" else controllers[::-1]
     return Input(10.0, left, right, ALIGNMENT, joints, World("world"), core.package)
 
 
@@ -108,7 +111,7 @@ def _reach(recorder: Recorder) -> None:
 def _follow(recorder: Recorder) -> None:
     """Sideways within reach, and then far out of it."""
     recorder.to("follow")
-    x, y, z = recorder.given.left.position
+    x, y, z = recorder.message.left.position
     for number in range(10):
         recorder.step(left={"position": (x + 0.002 * number, y, z)})
     recorder.wait(0.8, left={"position": (x, y, z - 2.0)})
@@ -117,7 +120,7 @@ def _follow(recorder: Recorder) -> None:
 def _tremble(recorder: Recorder) -> None:
     rng = np.random.default_rng(0)
     recorder.to("aim")
-    left, right = recorder.given.left.position, recorder.given.right.position
+    left, right = recorder.message.left.position, recorder.message.right.position
     for number in range(TREMBLING):
         turn = about((0.0, 1.0, 0.0), float(rng.normal(scale=0.05)))
         recorder.step(

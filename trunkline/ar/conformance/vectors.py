@@ -53,24 +53,24 @@ def with_shared_vectors(files: dict[str, bytes], core: Teleop) -> dict[str, byte
 
 def vectors(files: dict[str, bytes]) -> int:
     """How many shared vectors a package has: answers that a client is held to."""
-    told = [json.loads(data) for path, data in files.items() if path.startswith(FOLDER) and path.endswith(".json")]
-    steps = sum(len(sequence["steps"]) for one in told for sequence in one.get("sequences", []))
-    return steps + sum(len(one.get("cases", [])) for one in told)
+    documents = [json.loads(data) for path, data in files.items() if path.startswith(FOLDER) and path.endswith(".json")]
+    steps = sum(len(sequence["steps"]) for document in documents for sequence in document.get("sequences", []))
+    return steps + sum(len(document.get("cases", [])) for document in documents)
 
 
 def steps_file(core: Teleoperation, recorded: dict[str, list[tuple[float, Input]]]) -> bytes:
     """Sequences of inputs, with the time of each step, s, and the intents that follow from the core's start."""
-    told = []
+    sequences = []
     for name, steps in recorded.items():
         state, lines = core.start(), []
-        for dt, given in steps:
-            state, intent = core.step(state, given, dt)
-            lines.append(b'{"dt":%b,"input":%b,"intent":%b}' % (_json(dt), to_json(given), to_json(intent)))
-        told.append(b'{"name":%b,"steps":%b}' % (_json(name), _lines(lines)))
+        for dt, message in steps:
+            state, intent = core.step(state, message, dt)
+            lines.append(b'{"dt":%b,"input":%b,"intent":%b}' % (_json(dt), to_json(message), to_json(intent)))
+        sequences.append(b'{"name":%b,"steps":%b}' % (_json(name), _lines(lines)))
     head = b'"settings":%b,"package":%b,"mount_offset":%b' % (
         SETTINGS.dump_json(core.settings), _json(core.package), _json(core.mount_offset),
     )  # fmt: skip
-    return b'{%b,"sequences":%b}\n' % (head, _lines(told))
+    return b'{%b,"sequences":%b}\n' % (head, _lines(sequences))
 
 
 def cases_file(answers: Answers, name: str, questions: list[Case]) -> bytes:

@@ -1,4 +1,4 @@
-"""What operators did, as a dataset for LeRobot: `python -m trunkline.ar.dataset LOG... --out FOLDER`
+"""What operators did, as a dataset for LeRobot: `trunkline export-dataset LOG... --out FOLDER`
 
 LOG is the log of a live session. An episode goes from when the robot was let move until it was done: a plan that was
 executed, or a stretch of following. Each frame has the joints and pulls as measured and the tip, what was aimed at, the
@@ -14,7 +14,7 @@ from trunkline.ar.dataset.episodes import Episode, episodes
 from trunkline.ar.dataset.recording import read_recording
 from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.stage import output_folder
-from trunkline.program import called
+from trunkline.program import program_name
 
 ROBOT = "panda_with_soft_arm"
 
@@ -22,7 +22,7 @@ ROBOT = "panda_with_soft_arm"
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.ar.dataset"), description=__doc__,
+        prog=program_name("export-dataset"), description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
     parser.add_argument("logs", type=Path, nargs="+", metavar="LOG")
@@ -33,28 +33,30 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--aiming", action="store_true", help="with how the user came to it; the robot stands meanwhile"
     )
-    told = parser.parse_args(arguments)
-    if told.fps < 1:
-        raise InputError(f"--fps: found {told.fps}, expected 1 or more")
-    if told.out.exists() and (not told.out.is_dir() or any(told.out.iterdir())):
-        raise InputError(f"--out: {told.out}: found something there, expected a new folder")
-    kept: list[Episode] = []
-    for path in told.logs:
-        found = [*episodes(read_recording(path), told.fps, told.aiming)]
-        own = [episode for episode in found if episode.succeeded or told.all]
-        for episode in own:
-            _require_same(path, episode, (kept or own)[0])
-        kept += own
-        ended = "".join(f"; {one.end}: {one.task}" for one in found if not one.succeeded)
-        print(f"{path}: {len(found)} demonstrations, {len(own)} taken{ended}")
-    if not kept:
+    args = parser.parse_args(arguments)
+    if args.fps < 1:
+        raise InputError(f"--fps: found {args.fps}, expected 1 or more")
+    if args.out.exists() and (not args.out.is_dir() or any(args.out.iterdir())):
+        raise InputError(f"--out: {args.out}: found something there, expected a new folder")
+    selected: list[Episode] = []
+    for path in args.logs:
+        recorded = [*episodes(read_recording(path), args.fps, args.aiming)]
+        accepted = [episode for episode in recorded if episode.succeeded or args.all]
+        for episode in accepted:
+            _require_same(path, episode, (selected or accepted)[0])
+        selected += accepted
+        ended = "".join(f"; {episode.end}: {episode.task}" for episode in recorded if not episode.succeeded)
+        print(f"{path}: {len(recorded)} demonstrations, {len(accepted)} taken{ended}")
+    if not selected:
         raise InputError("LOG: found no demonstration to take, expected a plan that was executed (--all: or tried)")
-    if told.task:
-        kept = [Episode(told.task, one.succeeded, one.end, one.frames, one.names) for one in kept]
-    with output_folder(told.out) as folder:
-        write_dataset(folder, kept, told.fps, ROBOT)
-    count = sum(len(one.frames["action"]) for one in kept)
-    print(f"demonstrations: {len(kept)} episodes, {count} frames at {told.fps} a second, written to {told.out}")
+    if args.task:
+        selected = [
+            Episode(args.task, episode.succeeded, episode.end, episode.frames, episode.names) for episode in selected
+        ]
+    with output_folder(args.out) as folder:
+        write_dataset(folder, selected, args.fps, ROBOT)
+    count = sum(len(episode.frames["action"]) for episode in selected)
+    print(f"demonstrations: {len(selected)} episodes, {count} frames at {args.fps} a second, written to {args.out}")
     return 0
 
 

@@ -30,15 +30,15 @@ def write_dataset(folder: Path, episodes: Sequence[Episode], fps: int, robot: st
     tasks = list(dict.fromkeys(episode.task for episode in episodes))
     frames, rows, first = [], [], 0
     for number, episode in enumerate(episodes):
-        own = _frames(episode, number, first, tasks.index(episode.task), fps)
-        frames.append(own)
-        row = {"episode_index": number, "tasks": [episode.task], "length": len(own["index"]),
+        columns = _frames(episode, number, first, tasks.index(episode.task), fps)
+        frames.append(columns)
+        row = {"episode_index": number, "tasks": [episode.task], "length": len(columns["index"]),
                "data/chunk_index": 0, "data/file_index": 0, "dataset_from_index": first,
-               "dataset_to_index": first + len(own["index"])}  # fmt: skip
-        row |= {f"stats/{name}/{key}": value for name, v in own.items() for key, value in _stats(v).items()}
+               "dataset_to_index": first + len(columns["index"])}  # fmt: skip
+        row |= {f"stats/{name}/{key}": value for name, v in columns.items() for key, value in _stats(v).items()}
         rows.append(row | {"meta/episodes/chunk_index": 0, "meta/episodes/file_index": 0})
-        first += len(own["index"])
-    whole = {name: np.concatenate([own[name] for own in frames]) for name in frames[0]}
+        first += len(columns["index"])
+    whole = {name: np.concatenate([columns[name] for columns in frames]) for name in frames[0]}
     for place in ("meta/episodes/chunk-000", "data/chunk-000"):
         (folder / place).mkdir(parents=True)
     pq.write_table(pa.table({name: _column(values) for name, values in whole.items()}), folder / "data" / FILE)
@@ -58,10 +58,10 @@ def write_dataset(folder: Path, episodes: Sequence[Episode], fps: int, robot: st
 def _frames(episode: Episode, number: int, first: int, task: int, fps: int) -> dict[str, np.ndarray]:
     """Columns of an episode's rows."""
     count = len(next(iter(episode.frames.values())))
-    found = {n: v if v.dtype == bool else v.astype(np.float32) for n, v in episode.frames.items()}
+    columns = {n: v if v.dtype == bool else v.astype(np.float32) for n, v in episode.frames.items()}
     rows = np.arange(count)
     indices = (rows, np.full(count, number), first + rows, np.full(count, task))
-    return found | {"timestamp": (rows / fps).astype(np.float32)} | dict(zip(INDICES, indices, strict=True))
+    return columns | {"timestamp": (rows / fps).astype(np.float32)} | dict(zip(INDICES, indices, strict=True))
 
 
 def _feature(values: np.ndarray, names: tuple[str, ...] | None) -> dict:
@@ -79,10 +79,10 @@ def _stats(values: np.ndarray) -> dict[str, list]:
     """Of each number of a feature over its rows."""
     table = values.reshape(len(values), -1)
     wide = table.astype(float)
-    found = {"min": table.min(axis=0), "max": table.max(axis=0), "mean": wide.mean(axis=0), "std": wide.std(axis=0),
+    stats = {"min": table.min(axis=0), "max": table.max(axis=0), "mean": wide.mean(axis=0), "std": wide.std(axis=0),
              "count": np.array([len(table)])}  # fmt: skip
-    found |= {name: np.quantile(wide, share, axis=0) for name, share in QUANTILES.items()}
-    return {name: value.tolist() for name, value in found.items()}
+    stats |= {name: np.quantile(wide, share, axis=0) for name, share in QUANTILES.items()}
+    return {name: value.tolist() for name, value in stats.items()}
 
 
 def _write_json(path: Path, table: dict) -> None:

@@ -6,7 +6,7 @@ from itertools import groupby
 
 import numpy as np
 
-from trunkline.ar.dataset.recording import Recording, Step
+from trunkline.ar.dataset.recording import RecordedStep, SessionRecording
 from trunkline.ar.session.preview_validation import Execution, executions
 from trunkline.ar.teleop.messages import Targets, Thing, Vector
 from trunkline.errors import InputError
@@ -41,7 +41,7 @@ class Episode:
     names: dict[str, tuple[str, ...]]
 
 
-def episodes(recording: Recording, fps: int, aiming: bool = False) -> Iterator[Episode]:
+def episodes(recording: SessionRecording, fps: int, aiming: bool = False) -> Iterator[Episode]:
     """In their order.
 
     A frame has what was last told by its time. Its action is what was last sent by the next frame's time.
@@ -72,17 +72,23 @@ def episodes(recording: Recording, fps: int, aiming: bool = False) -> Iterator[E
 
 
 def _episode(
-    recording: Recording, last: int, times: np.ndarray, fps: int, planned: Targets | None, end: str, succeeded: bool
+    recording: SessionRecording,
+    last: int,
+    times: np.ndarray,
+    fps: int,
+    planned: Targets | None,
+    end: str,
+    succeeded: bool,
 ) -> Episode:
     """At `times`; `last` is the number of the last step in which the robot was let move."""
     began = np.array([step.time for step in recording.steps[: last + 1]])
-    seen = [recording.steps[n] for n in np.searchsorted(began, times, side="right") - 1]
-    wanted = [_wanted(step, planned) for step in seen]
+    steps = [recording.steps[n] for n in np.searchsorted(began, times, side="right") - 1]
+    wanted = [_wanted(step, planned) for step in steps]
     state = np.concatenate([recording.measured.at(times), recording.tip.at(times)], axis=1)
     frames = {
         STATE: state,
-        ENVIRONMENT: np.array([_goal(targets, step) for targets, step in zip(wanted, seen, strict=True)]),
-        OPERATOR: np.array([_rays(step.intent.rays) for step in seen]),
+        ENVIRONMENT: np.array([_goal(targets, step) for targets, step in zip(wanted, steps, strict=True)]),
+        OPERATOR: np.array([_rays(step.intent.rays) for step in steps]),
         ACTION: recording.sent.at(times + 1_000_000_000 // fps),
         DONE: np.arange(len(times)) == len(times) - 1,
         SUCCESS: (np.arange(len(times)) == len(times) - 1) & succeeded,
@@ -96,23 +102,27 @@ def _episode(
                 f"{recording.path}: {feature}: {column}: found nothing told of it by the first frame, or no number, "
                 "expected a number for each frame"
             )
-    return Episode(_task(wanted[-1], seen[-1], followed=planned is None), succeeded, end, frames, names)
+    return Episode(_task(wanted[-1], steps[-1], followed=planned is None), succeeded, end, frames, names)
 
 
-def _judged(recording: Recording, judged: list[Execution], step: Step) -> tuple[str, bool]:
+def _judged(recording: SessionRecording, judged: list[Execution], step: RecordedStep) -> tuple[str, bool]:
     """How the execution that begins at a step ended, and whether what was wanted came about."""
     logbook = recording.logbook
     since = 1e-9 * (step.time - logbook.zero) - logbook.begin["time"]
-    same = [one for one in judged if one.digest == step.intent.execute and abs(one.time - since) < NEAR]
+    same = [
+        execution
+        for execution in judged
+        if execution.digest == step.intent.execute and abs(execution.time - since) < NEAR
+    ]
     if not same:
         return "refused by the robot", False
-    found = min(same, key=lambda one: abs(one.time - since))
-    if found.success is False:
+    execution = min(same, key=lambda execution: abs(execution.time - since))
+    if execution.success is False:
         return "not held", False
-    return found.end, found.end == "done"
+    return execution.end, execution.end == "done"
 
 
-def _planned(recording: Recording, first: int) -> Targets | None:
+def _planned(recording: SessionRecording, first: int) -> Targets | None:
     """Those for which the plan was asked for that is executed from step number `first` on."""
     step = recording.steps[first]
     reports = {
@@ -126,29 +136,29 @@ def _planned(recording: Recording, first: int) -> Targets | None:
     return step.intent.targets
 
 
-def _wanted(step: Step, planned: Targets | None) -> Targets:
-    found = planned if step.intent.motion == "execute" else step.intent.follow or step.intent.targets
-    if found is None:
+def _wanted(step: RecordedStep, planned: Targets | None) -> Targets:
+    targets = planned if step.intent.motion == "execute" else step.intent.follow or step.intent.targets
+    if targets is None:
         raise InputError(f"/core/intent: found no targets in mode {step.intent.mode!r}, expected those of what moves")
-    return found
+    return targets
 
 
-def _goal(targets: Targets, step: Step) -> list[float]:
+def _goal(targets: Targets, step: RecordedStep) -> list[float]:
     thing = _thing(targets, step)
-    known = [0.0, 0.0, 0.0, 0.0] if thing is None else [1.0, *thing.position]
-    return [*targets.rigid.position, *targets.tip.position, *targets.pointing, targets.heading, *known]
+    thing_pose = [0.0, 0.0, 0.0, 0.0] if thing is None else [1.0, *thing.position]
+    return [*targets.rigid.position, *targets.tip.position, *targets.pointing, targets.heading, *thing_pose]
 
 
-def _thing(targets: Targets, step: Step) -> Thing | None:
+def _thing(targets: Targets, step: RecordedStep) -> Thing | None:
     """What is to be grasped or brought, where it is believed to be."""
-    return next((thing for thing in step.given.world.things if thing.name == targets.thing), None)
+    return next((thing for thing in step.message.world.things if thing.name == targets.thing), None)
 
 
 def _rays(rays: tuple[Vector | None, Vector | None]) -> list[float]:
     return [x for ray in rays for x in ([0.0, 0.0, 0.0, 0.0] if ray is None else [1.0, *ray])]
 
 
-def _task(targets: Targets, step: Step, followed: bool) -> str:
+def _task(targets: Targets, step: RecordedStep, followed: bool) -> str:
     thing = _thing(targets, step)
     if followed:
         return f"carry the {thing.shape} along with the hands" if thing else "follow the hands with mount and tip"

@@ -17,6 +17,7 @@ import numpy as np
 
 from trunkline.ar.drivers.driver import Watchdog
 from trunkline.ar.drivers.driver_frames import Setpoint
+from trunkline.ar.teleop.minimum_jerk import minimum_jerk
 from trunkline.kinematics.panda.kinematics import Q_MAX, Q_MIN
 from trunkline.kinematics.panda.limits import ACCELERATION, JERK, VELOCITY
 
@@ -71,7 +72,7 @@ class Bridge:
         """The offset `dt` s later, (7,)."""
         self._time = min(self._time + dt, BRIDGED)
         s = self._time / BRIDGED
-        place = 1 - s**3 * (10 - 15 * s + 6 * s**2)
+        place = 1 - minimum_jerk(s)
         speed = s - s**3 * (6 - 8 * s + 3 * s**2)
         gain = s**2 / 2 - s**3 * (3 - 3 * s + s**2) / 2
         return place * self._place + BRIDGED * speed * self._speed + BRIDGED**2 * gain * self._gain

@@ -9,7 +9,7 @@ from trunkline.ar.drivers.setpoint_filter import RobotLimits
 from trunkline.ar.teleop.executor import BRAKE, SimulatedRobot
 from trunkline.ar.teleop.following import Follower, Following
 from trunkline.ar.teleop.plan import Plan
-from trunkline.ar.teleop.trajectory import JOINTS, Limits
+from trunkline.ar.teleop.trajectory import JOINTS, MotionLimits
 
 SHARE = 0.95  # of the Panda's accelerations that a stop makes use of
 LEAST = 0.3  # of them, whatever the plan itself accelerates there
@@ -31,7 +31,7 @@ class TimeScaledRobot(SimulatedRobot):
         self,
         joints: np.ndarray,
         commands: np.ndarray,
-        limits: Limits,
+        limits: MotionLimits,
         package: str,
         move: Callable[[np.ndarray, np.ndarray, float], None],
         robot: RobotLimits,

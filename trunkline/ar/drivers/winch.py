@@ -8,7 +8,7 @@ has fallen to about 1, the force on the cable is
 
 Its poles are at -0.54 ω and ω (-0.23 ± 0.31 i). k, what a cable's tension grows by with its pull, and f, the friction
 of motor and cable, spare the integral most of its work. ω stays below what one lab saw at 14 to 17 Hz: the encoder's
-reading moves with the current, nine times a turn, and a quick loop answers that (docs/execution.md).
+reading moves with the current, nine times a turn, and a quick loop answers that (docs/hardware.md).
 """
 
 import math

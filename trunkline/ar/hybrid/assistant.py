@@ -8,15 +8,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from trunkline.ar.hybrid.posterior import Doubts, Draws, draw
-from trunkline.ar.hybrid.preview import Holding, asked, joined
-from trunkline.ar.hybrid.rollouts import Twin, Way, futures
+from trunkline.ar.hybrid.posterior import Posterior, PosteriorSamples, sample
+from trunkline.ar.hybrid.preview import Holding, interruptible, joined
+from trunkline.ar.hybrid.rollouts import CommandTrajectory, ComposedTwin, rollouts
 
 
 def try_places(
-    twin: Twin,
-    way: Way,
-    doubts: Doubts,
+    twin: ComposedTwin,
+    trajectory: CommandTrajectory,
+    posterior: Posterior,
     holding: Holding,
     offsets: np.ndarray,
     count: int,
@@ -29,11 +29,11 @@ def try_places(
         offsets: where the mount of each place is, less that of the plan, world axes, m. Shape (P, 3).
         go_on: as `preview`.
     """
-    one, places = draw(doubts, twin.arm, count, seed), len(offsets)
-    moved = np.tile(one.offsets, (places, 1)) - np.repeat(offsets, count, axis=0)
-    values = {name: np.tile(column, places) for name, column in one.values.items()}
-    many = Draws(values, np.tile(one.friction, places), moved, np.tile(one.turns, places))
-    motion = joined(list(asked(futures(twin, way, many), go_on)))
+    samples, places = sample(posterior, twin.arm, count, seed), len(offsets)
+    moved = np.tile(samples.offsets, (places, 1)) - np.repeat(offsets, count, axis=0)
+    values = {name: np.tile(column, places) for name, column in samples.values.items()}
+    many = PosteriorSamples(values, np.tile(samples.friction, places), moved, np.tile(samples.turns, places))
+    motion = joined(list(interruptible(rollouts(twin, trajectory, many), go_on)))
     return holding.holds(motion).reshape(places, count).mean(axis=1)
 
 

@@ -55,8 +55,8 @@ class Part:
 
     def variance(self) -> np.ndarray:
         """Mean square distance of its mass from its centre along the object's axes, m². Shape (3,)."""
-        own = self.half**2 / 3 if self.shape == "box" else self.half**2 / [4, 4, 3]
-        return np.abs(self.turn) @ own
+        variance = self.half**2 / 3 if self.shape == "box" else self.half**2 / [4, 4, 3]
+        return np.abs(self.turn) @ variance
 
 
 def centre_height(basket: Basket, height: float) -> float:

@@ -19,8 +19,8 @@ import mujoco
 import numpy as np
 
 from trunkline.ar.hybrid.friction import SOLIMP, SOLREF, coefficients, make_holding
-from trunkline.ar.hybrid.objects import Thing
-from trunkline.ar.hybrid.worlds import World
+from trunkline.ar.hybrid.objects import GraspObject
+from trunkline.ar.hybrid.worlds import WorldGeometry
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.kinematics.panda.mounts import Robot
@@ -43,14 +43,18 @@ class Placed:
         hanging: whether it hangs from the world's hook.
     """
 
-    thing: Thing
+    thing: GraspObject
     position: np.ndarray
     quaternion: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
     hanging: bool = False
 
 
 def compose(
-    arm: mujoco.MjSpec, robot: Robot, world: World | None = None, placed: Placed | None = None, touch: bool = True
+    arm: mujoco.MjSpec,
+    robot: Robot,
+    world: WorldGeometry | None = None,
+    placed: Placed | None = None,
+    touch: bool = True,
 ) -> mujoco.MjSpec:
     """The whole model. Compile it with `.compile()`.
 

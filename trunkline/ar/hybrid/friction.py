@@ -17,7 +17,7 @@ ROLLING = 1e-4  # m, idle with condim 4
 SOLREF = (0.01, 1.0)  # s and damping ratio of contacts: as those of the arm's joint limits
 # MuJoCo's friction is a soft constraint: what is held creeps at a rate in proportion to the load on it and to
 # (1 - d) / IMPRATIO, d the impedance that SOLIMP ends with. With MuJoCo's own values what is held slides
-# away within seconds; tests/ar/hybrid/test_holding.py says how far it may creep with these.
+# away within seconds; tests/ar/hybrid/test_friction.py says how far it may creep with these.
 IMPRATIO = 100.0  # friction over normal impedance
 SOLIMP = (0.99, 0.999, 0.001, 0.5, 2.0)
 CONDIM = 4  # sliding and torsional friction

@@ -18,7 +18,7 @@ Offset = Annotated[float, Field(ge=-0.2, le=0.2)]
 
 
 @dataclass(frozen=True)
-class Placement:
+class GraspPose:
     """Positions are in the world, less that of what the arm wraps, m.
 
     Attributes:
@@ -46,7 +46,7 @@ class Grip(Protocol):
         """m, by which the mount rises as the arm opens again, to let go."""
         ...
 
-    def placed(self, rotation: np.ndarray, mount: np.ndarray) -> Placement:
+    def placed(self, rotation: np.ndarray, mount: np.ndarray) -> GraspPose:
         """With the mount where the user has it."""
         ...
 
@@ -86,13 +86,13 @@ class SideGrip:
     def rise(self) -> float:
         return self.settings.rise
 
-    def placed(self, rotation: np.ndarray, mount: np.ndarray) -> Placement:
+    def placed(self, rotation: np.ndarray, mount: np.ndarray) -> GraspPose:
         front = _in_front(rotation, mount)
         towards = rotation[:, 0] if front else -rotation[:, 0]
         closed = pulls_of("dorsal" if front else "ventral", self.settings.pull)
         loose = -self.settings.loose
         opened, closed = np.where(closed > 0, 0.0, loose), np.where(closed > 0, closed, loose)
-        return Placement(rotation, mount, mount - self.settings.aside * towards, opened, closed, self.settings.sink)
+        return GraspPose(rotation, mount, mount - self.settings.aside * towards, opened, closed, self.settings.sink)
 
     def near(self, rotation: np.ndarray, mount: np.ndarray, diameter: float) -> np.ndarray:
         s = self.settings

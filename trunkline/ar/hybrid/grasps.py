@@ -59,21 +59,6 @@ def object_in_base(geometry: ChainGeometry, diameter: float, grasp: Grasp, pull:
     return np.array([side * ((diameter + width_at(geometry, s)) / 2 + grasp.gap), 0.0, -s])
 
 
-def mount_for(
-    geometry: ChainGeometry, position: np.ndarray, diameter: float, rotation: np.ndarray, grasp: Grasp, pull: Pull
-) -> np.ndarray:
-    """Where to put the mount so that the arm wraps an object.
-
-    Args:
-        position: of the object's centre in the world, m. Shape (3,). diameter: m.
-        rotation: matrix of the arm's base frame in the world; the object is best along its y. Shape (3, 3).
-
-    Returns:
-        The origin of the base frame in the world, m. Shape (3,).
-    """
-    return np.asarray(position) - np.asarray(rotation) @ object_in_base(geometry, diameter, grasp, pull)
-
-
 def pulls_of(pull: Pull, shortening: float) -> np.ndarray:
     """How much shorter than in the straight arm each cable is commanded, m; 0 for those paid out. Shape (3,)."""
     return CABLES[pull] * shortening

@@ -33,7 +33,7 @@ GRIP = "object_grip"  # the site in the middle of what the arm wraps
 
 
 @dataclass
-class Thing:
+class GraspObject:
     """An object.
 
     Attributes:
@@ -135,13 +135,13 @@ def object_geoms(model: mujoco.MjModel) -> np.ndarray:
 def touched(model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
     """Whether the arm touches the object, in each pose of a composed model. Shapes (B, nq) to (B,)."""
     thing, arm = object_geoms(model), np.flatnonzero(model.geom_contype & ARM)
-    data, found = mujoco.MjData(model), np.zeros(len(qpos), dtype=bool)
+    data, touching = mujoco.MjData(model), np.zeros(len(qpos), dtype=bool)
     for row in np.flatnonzero(np.isfinite(qpos).all(axis=1)):
         data.qpos[:] = qpos[row]
         mujoco.mj_fwdPosition(model, data)
         pairs = data.contact.geom[data.contact.dist <= 0]
-        found[row] = (np.isin(pairs, thing).any(axis=1) & np.isin(pairs, arm).any(axis=1)).any()
-    return found
+        touching[row] = (np.isin(pairs, thing).any(axis=1) & np.isin(pairs, arm).any(axis=1)).any()
+    return touching
 
 
 def _size(shape: str, half: np.ndarray) -> list[float]:

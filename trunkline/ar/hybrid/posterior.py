@@ -45,7 +45,7 @@ class Contact:
 
 
 @dataclass(frozen=True)
-class Doubts:
+class Posterior:
     """names: of P parameters. deviation: of each on its own axis. Shape (P,). correlation: shape (P, P)."""
 
     names: tuple[str, ...] = ()
@@ -53,13 +53,13 @@ class Doubts:
     correlation: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     contact: Contact = field(default_factory=Contact)
 
-    def scaled(self, factor: float) -> "Doubts":
+    def scaled(self, factor: float) -> "Posterior":
         """The same with all deviations of the parameters times `factor`."""
-        return Doubts(self.names, factor * self.deviation, self.correlation, self.contact)
+        return Posterior(self.names, factor * self.deviation, self.correlation, self.contact)
 
 
 @dataclass(frozen=True)
-class Draws:
+class PosteriorSamples:
     """B futures: `values` of the parameters by name (B,), `friction` factors (B,), `offsets` of the object's centre
     (B, 3), m, and its `turns` about the vertical (B,), rad."""
 
@@ -72,60 +72,60 @@ class Draws:
         return len(self.friction)
 
 
-def draw(doubts: Doubts, arm: mujoco.MjModel, count: int, seed: int) -> Draws:
+def sample(posterior: Posterior, arm: mujoco.MjModel, count: int, seed: int) -> PosteriorSamples:
     """`count` futures of the identified `arm`; the same for the same seed.
 
     Raises:
         InputError: naming a parameter that the arm has not.
     """
-    for name in doubts.names:
+    for name in posterior.names:
         if not PARAMETERS[name].belongs_to(arm):
             raise InputError(f"{name}: found an arm without its part, expected one of which it is a parameter")
     rng = np.random.default_rng(seed)
-    values, vectors = np.linalg.eigh(doubts.correlation)
-    off = rng.normal(size=(count, len(values))) * np.sqrt(np.maximum(values, 0)) @ vectors.T * doubts.deviation
+    values, vectors = np.linalg.eigh(posterior.correlation)
+    off = rng.normal(size=(count, len(values))) * np.sqrt(np.maximum(values, 0)) @ vectors.T * posterior.deviation
     drawn = {}
-    for name, column in zip(doubts.names, off.T, strict=True):
+    for name, column in zip(posterior.names, off.T, strict=True):
         parameter = PARAMETERS[name]
         drawn[name] = np.asarray(parameter.value(parameter.coordinate(parameter.read(arm)) + column))
-    contact = doubts.contact
+    contact = posterior.contact
     friction = np.exp(contact.friction * rng.normal(size=count))
     offsets = np.array(contact.place) * rng.normal(size=(count, 3))
-    return Draws(drawn, friction, offsets, contact.turn * rng.normal(size=count))
+    return PosteriorSamples(drawn, friction, offsets, contact.turn * rng.normal(size=count))
 
 
-def nominal_draw() -> Draws:
+def nominal_sample() -> PosteriorSamples:
     """One future: all as believed."""
-    return Draws({}, np.ones(1), np.zeros((1, 3)), np.zeros(1))
+    return PosteriorSamples({}, np.ones(1), np.zeros((1, 3)), np.zeros(1))
 
 
-def doubts_of(stages: list[dict], contact: Contact | None = None) -> Doubts:
+def posterior_of(stages: list[dict], contact: Contact | None = None) -> Posterior:
     """What `parameters.json` of stages says, the latest last: it counts for what several have identified.
 
     Raises:
         InputError: naming a parameter that is unknown or whose interval is none.
     """
-    found: dict[str, tuple[int, float]] = {}
+    identified: dict[str, tuple[int, float]] = {}
     for number, stage in enumerate(stages):
         for name, row in stage["parameters"].items():
             if name in OF_THE_MARKER:
                 continue
             if name not in PARAMETERS:
                 raise InputError(f"parameters.{name}: found no such parameter, expected one of {', '.join(PARAMETERS)}")
-            found[name] = (number, _deviation(name, row["interval_95_given_model"]))
-    names = tuple(found)
+            identified[name] = (number, _deviation(name, row["interval_95_given_model"]))
+    names = tuple(identified)
     correlation = np.eye(len(names))
-    for i, one in enumerate(names):
+    for i, name in enumerate(names):
         for j, other in enumerate(names[:i]):
-            if found[one][0] == found[other][0]:
-                correlation[i, j] = correlation[j, i] = stages[found[one][0]]["correlation"][one][other]
-    deviation = np.array([found[name][1] for name in names])
-    return Doubts(names, deviation, correlation, contact or Contact())
+            if identified[name][0] == identified[other][0]:
+                correlation[i, j] = correlation[j, i] = stages[identified[name][0]]["correlation"][name][other]
+    deviation = np.array([identified[name][1] for name in names])
+    return Posterior(names, deviation, correlation, contact or Contact())
 
 
-def read_doubts(files: list[Path], contact: Contact | None = None) -> Doubts:
-    """`doubts_of` the files `parameters.json` of stages, the latest last."""
-    return doubts_of([json.loads(existing(file).read_text(encoding="utf-8")) for file in files], contact)
+def read_posterior(files: list[Path], contact: Contact | None = None) -> Posterior:
+    """`posterior_of` the files `parameters.json` of stages, the latest last."""
+    return posterior_of([json.loads(existing(file).read_text(encoding="utf-8")) for file in files], contact)
 
 
 def _deviation(name: str, interval: list[float | None]) -> float:

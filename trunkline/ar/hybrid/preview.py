@@ -13,16 +13,16 @@ from typing import Annotated, Protocol
 import numpy as np
 from pydantic import Field
 
-from trunkline.ar.hybrid.posterior import Doubts, Draws, draw, nominal_draw
+from trunkline.ar.hybrid.posterior import Posterior, PosteriorSamples, nominal_sample, sample
 from trunkline.ar.hybrid.rates import wilson
-from trunkline.ar.hybrid.rollouts import FRAME, Piece, Twin, Way, futures
+from trunkline.ar.hybrid.rollouts import FRAME, CommandTrajectory, ComposedTwin, Piece, rollouts
 
 Metres = Annotated[float, Field(gt=0, le=1)]
 WITHIN = 0.9  # share of futures whose tips are within the spread
 EVERY = 0.1  # s between the times at which a spread is stated
 
 
-class Outcome(Protocol):
+class Criterion(Protocol):
     """What is asked of a plan: `Holding`, or `trunkline.ar.hybrid.released.Resting`."""
 
     def holds(self, motion: Piece) -> np.ndarray:
@@ -69,20 +69,20 @@ class Stated:
 
 
 @dataclass(frozen=True)
-class Preview:
+class PlanPreview:
     """What may come of a plan. Positions in the world, m.
 
     Attributes:
         nominal: the motion of the twin as it is believed, B = 1.
         motion: of the B futures.
-        draws: what each future has.
-        held: which of them hold the object, or do what else was asked; None if nobody asked. Shape (B,).
+        samples: what each future has.
+        success: which of them hold the object, or do what else was asked; None if nobody asked. Shape (B,).
     """
 
     nominal: Piece
     motion: Piece
-    draws: Draws
-    held: np.ndarray | None
+    samples: PosteriorSamples
+    success: np.ndarray | None
 
     @property
     def median(self) -> np.ndarray:
@@ -110,29 +110,29 @@ class Preview:
     @property
     def probability(self) -> float | None:
         """Share of the futures that hold the object; one that MuJoCo warned of does not."""
-        return None if self.held is None else float(self.held.mean())
+        return None if self.success is None else float(self.success.mean())
 
     @property
     def interval(self) -> tuple[float, float] | None:
         """Of the probability, 95 %, Wilson's."""
-        return None if self.held is None else wilson(int(self.held.sum()), len(self.held))
+        return None if self.success is None else wilson(int(self.success.sum()), len(self.success))
 
 
-def nominal(twin: Twin, way: Way) -> Iterator[Piece]:
+def nominal(twin: ComposedTwin, trajectory: CommandTrajectory) -> Iterator[Piece]:
     """The motion as it is believed, in pieces of a quarter of a second, each as soon as it is simulated."""
-    return futures(twin, way, nominal_draw())
+    return rollouts(twin, trajectory, nominal_sample())
 
 
 def preview(
-    twin: Twin,
-    way: Way,
-    doubts: Doubts,
-    holding: Outcome | None = None,
+    twin: ComposedTwin,
+    trajectory: CommandTrajectory,
+    posterior: Posterior,
+    holding: Criterion | None = None,
     count: int = 32,
     seed: int = 0,
     show: Callable[[Piece], None] = lambda piece: None,
     go_on: Callable[[], None] = lambda: None,
-) -> Preview:
+) -> PlanPreview:
     """Try a plan in `count` futures.
 
     Args:
@@ -140,15 +140,15 @@ def preview(
         show: called with each piece of the nominal motion, before any future is simulated.
         go_on: called before each piece, and after the last; what it raises ends the preview.
     """
-    begun, draws = [], draw(doubts, twin.arm, count, seed)
-    for piece in asked(nominal(twin, way), go_on):
+    begun, samples = [], sample(posterior, twin.arm, count, seed)
+    for piece in interruptible(nominal(twin, trajectory), go_on):
         show(piece)
         begun.append(piece)
-    motion = joined(list(asked(futures(twin, way, draws), go_on)))
-    return Preview(joined(begun), motion, draws, holding.holds(motion) if holding is not None else None)
+    motion = joined(list(interruptible(rollouts(twin, trajectory, samples), go_on)))
+    return PlanPreview(joined(begun), motion, samples, holding.holds(motion) if holding is not None else None)
 
 
-def asked(pieces: Iterator[Piece], go_on: Callable[[], None]) -> Iterator[Piece]:
+def interruptible(pieces: Iterator[Piece], go_on: Callable[[], None]) -> Iterator[Piece]:
     """The pieces, `go_on` called before each and after the last."""
     go_on()
     for piece in pieces:

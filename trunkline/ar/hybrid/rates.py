@@ -5,8 +5,8 @@ from scipy.stats import binomtest
 LEVEL = 0.95
 
 
-def wilson(found: int, count: int) -> tuple[float, float]:
+def wilson(successes: int, count: int) -> tuple[float, float]:
     """Interval of a share at LEVEL (E. B. Wilson, "Probable inference, the law of succession, and statistical
     inference", Journal of the American Statistical Association, 1927)."""
-    interval = binomtest(found, count).proportion_ci(LEVEL, method="wilson")
+    interval = binomtest(successes, count).proportion_ci(LEVEL, method="wilson")
     return float(interval.low), float(interval.high)

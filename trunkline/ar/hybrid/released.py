@@ -13,7 +13,7 @@ LAST = 0.5  # s
 
 
 @dataclass(frozen=True)
-class Resting:
+class RestCriterion:
     """On a level board, at the end of a motion.
 
     Attributes:

@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from trunkline.ar.hybrid.compose import panda_joints
 from trunkline.ar.hybrid.objects import GRIP, object_geoms
-from trunkline.ar.hybrid.posterior import Draws
+from trunkline.ar.hybrid.posterior import PosteriorSamples
 from trunkline.ar.hybrid.string import EYE, STRING
 from trunkline.ar.hybrid.torques import joint_torques, servo_commands
 from trunkline.errors import InputError
@@ -40,7 +40,7 @@ RECORD = ("qpos", "site_xpos", "xpos", "xquat")
 
 
 @dataclass(frozen=True)
-class Way:
+class CommandTrajectory:
     """Rows every `step` s of what is commanded: `joints` of the Panda (T, 7), rad, or (T, 0) on a fixed mount, and
     `commands` of the motors (T, K), m. `let_go`: s after which what hangs is let go, None for never."""
 
@@ -64,7 +64,7 @@ class Way:
 
 
 @dataclass(frozen=True)
-class Twin:
+class ComposedTwin:
     """A composed `model`, and the `arm` in it by itself, both compiled of the same spec. The model has the state in
     which all begins as `start` (nq,), the arm straight by default."""
 
@@ -72,11 +72,11 @@ class Twin:
     arm: mujoco.MjModel
     start: np.ndarray | None = None
 
-    def stepped(self, timestep: float) -> "Twin":
+    def stepped(self, timestep: float) -> "ComposedTwin":
         """The same with another time step, s: a coarser one costs less."""
         model = copy.copy(self.model)
         model.opt.timestep = timestep
-        return Twin(model, self.arm, self.start)
+        return ComposedTwin(model, self.arm, self.start)
 
     @cached_property
     def centers(self) -> list[int]:
@@ -109,44 +109,44 @@ class Piece:
     sound: np.ndarray
 
 
-def futures(twin: Twin, way: Way, draws: Draws) -> Iterator[Piece]:
+def rollouts(twin: ComposedTwin, trajectory: CommandTrajectory, samples: PosteriorSamples) -> Iterator[Piece]:
     """Simulate the futures, piece by piece, each as soon as it is done.
 
     Raises:
         InputError: the plan has another number of joints or cables than the model.
     """
-    model, count = twin.model, len(draws)
+    model, count = twin.model, len(samples)
     joints, motors = panda_joints(model), actuators(model)
-    if way.joints.shape[1:] != (len(joints),) or way.commands.shape[1:] != (len(motors),):
+    if trajectory.joints.shape[1:] != (len(joints),) or trajectory.commands.shape[1:] != (len(motors),):
         raise InputError(
-            f"plan: found {way.joints.shape[1]} joints and {way.commands.shape[1]} cables, "
+            f"plan: found {trajectory.joints.shape[1]} joints and {trajectory.commands.shape[1]} cables, "
             f"expected {len(joints)} and {len(motors)}"
         )
     ties = [tie for name in ("hanging", EYE) if (tie := _number(model, mujoco.mjtObj.mjOBJ_EQUALITY, name)) >= 0]
     batch = batch_of(eased(model, bool(ties)), count)
-    _set_parameters(batch, twin, draws)
-    _place(batch, model, twin.start, way, draws)
+    _set_parameters(batch, twin, samples)
+    _place(batch, model, twin.start, trajectory, samples)
     timestep = model.opt.timestep
     every = max(round(FRAME / timestep), 1)
-    frames = max(round(way.duration / (every * timestep)), 1)
-    servos = _servos(model, way, twin.start)
+    frames = max(round(trajectory.duration / (every * timestep)), 1)
+    servos = _servos(model, trajectory, twin.start)
     first = np.zeros((count, model.nu))
-    first[:, motors] = way.commands[0]
-    first[:, servos.motors] = servos.at(np.zeros(1), way.joints[:1])
+    first[:, motors] = trajectory.commands[0]
+    first[:, servos.motors] = servos.at(np.zeros(1), trajectory.joints[:1])
     hold(batch, model, first)
-    winches, own = Winches(batch, first[:, motors]), np.arange(count, dtype=np.int32)
+    winches, simulations = Winches(batch, first[:, motors]), np.arange(count, dtype=np.int32)
     for begin in range(0, frames, FRAMES):
         number = min(FRAMES, frames - begin)
         time = timestep * (begin * every + np.arange(number * every))
-        if ties and way.let_go is not None and time[0] >= way.let_go - timestep / 2:
+        if ties and trajectory.let_go is not None and time[0] >= trajectory.let_go - timestep / 2:
             batch.bind("eq_active")[:, ties] = 0
-        rows = way.at(time)
+        rows = trajectory.at(time)
         controls = np.zeros((count, len(time), model.nu))
         controls[:, :, servos.motors] = servos.at(time, rows[:, : len(joints)])
         sent = np.repeat(rows[None, :, len(joints) :], count, axis=0)
-        controls[:, :, motors] = winches.deliver(sent, own)
-        found = move(batch, controls, RECORD, every, every - 1)
-        yield _piece(twin, batch, time[every - 1 :: every], found)
+        controls[:, :, motors] = winches.deliver(sent, simulations)
+        recorded = move(batch, controls, RECORD, every, every - 1)
+        yield _piece(twin, batch, time[every - 1 :: every], recorded)
 
 
 def eased(model: mujoco.MjModel, hanging: bool) -> mujoco.MjModel:
@@ -174,17 +174,17 @@ class _Servos:
         return angles + (np.column_stack(columns) if columns else 0.0)
 
 
-def _servos(model: mujoco.MjModel, way: Way, start: np.ndarray | None) -> _Servos:
+def _servos(model: mujoco.MjModel, trajectory: CommandTrajectory, start: np.ndarray | None) -> _Servos:
     """What the Panda's servos are sent so that they stand where the plan says, bearing the arm as it is at first.
 
     A servo's torque is k_p (u - q) - k_v q̇, so u = q + (k_v q̇ + τ) / k_p.
     """
     joints = panda_joints(model)
-    times = FRAME * np.arange(int(np.ceil(way.duration / FRAME)) + 1)
+    times = FRAME * np.arange(int(np.ceil(trajectory.duration / FRAME)) + 1)
     if not len(joints):
         return _Servos([], times, np.zeros((len(times), 0)))
     motors = [model.actuator(f"{name}_position").id for name in JOINTS]
-    before, angles, after = (way.at(times + part * BESIDE)[:, : len(joints)] for part in (-1, 0, 1))
+    before, angles, after = (trajectory.at(times + part * BESIDE)[:, : len(joints)] for part in (-1, 0, 1))
     speeds, gains = (after - before) / (2 * BESIDE), (after - 2 * angles + before) / BESIDE**2
     qpos = np.tile(model.qpos0 if start is None else start, (len(times), 1))
     qvel, qacc = np.zeros((2, len(times), model.nv))
@@ -195,13 +195,13 @@ def _servos(model: mujoco.MjModel, way: Way, start: np.ndarray | None) -> _Servo
     return _Servos(motors, times, stand - angles + ratio * speeds)
 
 
-def _set_parameters(batch: Batch, twin: Twin, draws: Draws) -> None:
+def _set_parameters(batch: Batch, twin: ComposedTwin, samples: PosteriorSamples) -> None:
     """Give each future its own parameters."""
-    if not draws.values:
+    if not samples.values:
         return
-    for name, values in candidate_fields(twin.arm, draws.values).items():
+    for name, values in candidate_fields(twin.arm, samples.values).items():
         batch.expand(name)[:, rows_of(name, twin.model, twin.arm)] = values[:, rows_of(name, twin.arm, twin.arm)]
-    if any("jnt_pos" in PARAMETERS[name].fields for name in draws.values):
+    if any("jnt_pos" in PARAMETERS[name].fields for name in samples.values):
         batch.set_const()
 
 
@@ -218,33 +218,39 @@ def rows_of(field: str, model: mujoco.MjModel, arm: mujoco.MjModel) -> np.ndarra
     return np.concatenate(rows) if rows else np.zeros(0, dtype=int)
 
 
-def _place(batch: Batch, model: mujoco.MjModel, start: np.ndarray | None, way: Way, draws: Draws) -> None:
+def _place(
+    batch: Batch,
+    model: mujoco.MjModel,
+    start: np.ndarray | None,
+    trajectory: CommandTrajectory,
+    samples: PosteriorSamples,
+) -> None:
     """Put robot and object where they begin, and give the object its friction."""
     places = batch.bind("qpos")
     if start is not None:
         places[:] = start
     else:
-        places[:, model.jnt_qposadr[panda_joints(model)]] = way.joints[0]
+        places[:, model.jnt_qposadr[panda_joints(model)]] = trajectory.joints[0]
         give_way(model, places)
     joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, "object")
     if joint < 0:
         return
     address = model.jnt_qposadr[joint]
     pose = places[:, address : address + 7]
-    turned = Rotation.from_rotvec(np.outer(draws.turns, [0, 0, 1])) * rotation_from_wxyz(pose[:, 3:])
-    pose[:, 3:] = np.where(draws.turns[:, None] != 0, wxyz_from_rotation(turned), pose[:, 3:])
-    pose[:, :3] += draws.offsets
+    turned = Rotation.from_rotvec(np.outer(samples.turns, [0, 0, 1])) * rotation_from_wxyz(pose[:, 3:])
+    pose[:, 3:] = np.where(samples.turns[:, None] != 0, wxyz_from_rotation(turned), pose[:, 3:])
+    pose[:, :3] += samples.offsets
     friction = batch.expand("geom_friction")
     for geom in object_geoms(model):
-        friction[:, geom, :2] *= draws.friction[:, None]
+        friction[:, geom, :2] *= samples.friction[:, None]
     tie = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_EQUALITY, "hanging")
     if (string := _number(model, mujoco.mjtObj.mjOBJ_BODY, STRING)) >= 0:  # its hook moves along
-        batch.expand("body_pos")[:, string] += draws.offsets
+        batch.expand("body_pos")[:, string] += samples.offsets
     if tie >= 0:  # the hook moves along
         arms = rotation_from_wxyz(pose[:, 3:]).apply(model.eq_data[tie, :3])
         batch.expand("eq_data")[:, tie, 3:6] = pose[:, :3] + arms
     if string < 0 and tie < 0:  # what it stands on moves along
-        batch.expand("geom_pos")[:, model.geom_bodyid == 0] += draws.offsets[:, None]
+        batch.expand("geom_pos")[:, model.geom_bodyid == 0] += samples.offsets[:, None]
 
 
 def _number(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
@@ -252,19 +258,19 @@ def _number(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
     return mujoco.mj_name2id(model, kind, name)
 
 
-def _piece(twin: Twin, batch: Batch, time: np.ndarray, found: dict[str, np.ndarray]) -> Piece:
+def _piece(twin: ComposedTwin, batch: Batch, time: np.ndarray, recorded: dict[str, np.ndarray]) -> Piece:
     model = twin.model
     tip, mount = model.site("tip").id, model.body("base").id
-    count, number = found["qpos"].shape[:2]
+    count, number = recorded["qpos"].shape[:2]
     thing = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "object")
     pose, away = np.full((count, number, 7), np.nan), np.full((count, number), np.nan)
     grip = pose[:, :, :3]
     if thing >= 0:
-        pose = np.concatenate([found["xpos"][:, :, thing], found["xquat"][:, :, thing]], axis=2)
-        sites = found["site_xpos"]
+        pose = np.concatenate([recorded["xpos"][:, :, thing], recorded["xquat"][:, :, thing]], axis=2)
+        sites = recorded["site_xpos"]
         grip = sites[:, :, model.site(GRIP).id]
         gaps = sites[:, :, twin.centers] - grip[:, :, None]
         away = np.linalg.norm(gaps, axis=3).min(axis=2)
     sound = ~batch.warning.any(axis=(1, 2))
-    tips, mounts = found["site_xpos"][:, :, tip], found["xpos"][:, :, mount]
-    return Piece(time, found["qpos"], tips, mounts, pose, grip, away, sound)
+    tips, mounts = recorded["site_xpos"][:, :, tip], recorded["xpos"][:, :, mount]
+    return Piece(time, recorded["qpos"], tips, mounts, pose, grip, away, sound)

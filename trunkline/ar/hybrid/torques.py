@@ -1,4 +1,4 @@
-"""What the Panda's joints bear with arm, motors and load, and the refusal of what is too much.
+"""What the Panda's joints bear with arm, motors and load.
 
     τ = M(q) q̈ + c(q, q̇) - Jᵀ m (g - a)
 
@@ -14,7 +14,6 @@ import numpy as np
 
 from trunkline.ar.hybrid.compose import panda_joints
 from trunkline.errors import InputError
-from trunkline.kinematics.panda.limits import TORQUE
 from trunkline.kinematics.panda.shipped import JOINTS
 
 
@@ -61,21 +60,6 @@ def _of_load(model: mujoco.MjModel, data: mujoco.MjData, site: int, qacc: np.nda
     mujoco.mj_jac(model, data, linear, None, point, body)
     mujoco.mj_jacDot(model, data, slope, None, point, body)
     return linear.T @ (linear @ qacc + slope @ data.qvel - model.opt.gravity)
-
-
-def require_torques(torques: np.ndarray, limits: np.ndarray = TORQUE) -> None:
-    """Refuse torques (T, 7), N m, beyond the limits (7,), by the joint that exceeds its own by most.
-
-    Raises:
-        InputError: one line with the joint's name, the torque and the limit.
-    """
-    share = np.where(np.isfinite(torques), np.abs(torques), np.inf) / limits
-    row, joint = np.unravel_index(np.argmax(share), share.shape)
-    if share[row, joint] > 1:
-        raise InputError(
-            f"{JOINTS[joint]}: found {torques[row, joint]:.1f} N m at row {row}, expected at most "
-            f"{limits[joint]:g} N m either way"
-        )
 
 
 def servo_commands(model: mujoco.MjModel, angles: np.ndarray, torques: np.ndarray) -> np.ndarray:

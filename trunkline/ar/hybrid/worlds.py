@@ -19,7 +19,7 @@ RGBA = {"wood": (0.72, 0.55, 0.36, 1), "plastic": (0.75, 0.77, 0.8, 1), "paper":
 
 
 @dataclass
-class Surface:
+class SupportSurface:
     """A level board on which things stand. top: the middle of its upper side, m. size: along x, y and z, m."""
 
     top: Annotated[list[Metres], Field(min_length=3, max_length=3)]
@@ -28,11 +28,11 @@ class Surface:
 
 
 @dataclass
-class World:
+class WorldGeometry:
     """floor: its height, m, or null. surfaces: by name. hook: where things hang, m, or null."""
 
     floor: Metres | None
-    surfaces: dict[str, Surface]
+    surfaces: dict[str, SupportSurface]
     hook: Annotated[list[Metres], Field(min_length=3, max_length=3)] | None
 
     def add_to(self, spec: mujoco.MjSpec) -> None:

@@ -20,15 +20,15 @@ def network_of(files: dict[str, bytes]) -> tendons.Network:
         session = tendons.session_of(files[block["file"]])
     except tendons.NO_NETWORK as error:
         raise InputError(f"network: found {str(error).splitlines()[0]}, expected an ONNX file") from None
-    took, gave = ([one.shape[-1] for one in ends] for ends in (session.get_inputs(), session.get_outputs()))
+    took, gave = ([node.shape[-1] for node in ends] for ends in (session.get_inputs(), session.get_outputs()))
     require_widths(took, gave, block["input_order"], block["output_order"], "network")
     return tendons.network_of(session)
 
 
-def doubts_of(files: dict[str, bytes], contact: posterior.Contact | None = None) -> posterior.Doubts:
+def posterior_of(files: dict[str, bytes], contact: posterior.Contact | None = None) -> posterior.Posterior:
     """What is not known of the arm, and of what it touches.
 
     Raises:
         InputError: naming a parameter that is unknown or whose interval is none.
     """
-    return posterior.doubts_of(json.loads(file_of(files, "parameters"))["stages"], contact)
+    return posterior.posterior_of(json.loads(file_of(files, "parameters"))["stages"], contact)

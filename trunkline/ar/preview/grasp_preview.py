@@ -12,10 +12,10 @@ import numpy as np
 from trunkline.ar.hybrid.assistant import best, try_places
 from trunkline.ar.hybrid.grasp_poses import Grip
 from trunkline.ar.hybrid.posterior import Contact
-from trunkline.ar.hybrid.preview import Holding, Preview, preview
-from trunkline.ar.hybrid.released import Resting
-from trunkline.ar.hybrid.rollouts import Twin, Way
-from trunkline.ar.preview.preview_twin import Believed, compose_twin
+from trunkline.ar.hybrid.preview import Holding, PlanPreview, preview
+from trunkline.ar.hybrid.released import RestCriterion
+from trunkline.ar.hybrid.rollouts import CommandTrajectory, ComposedTwin
+from trunkline.ar.preview.preview_twin import RobotModel, compose_twin
 from trunkline.ar.preview.settings import Previewing
 from trunkline.ar.teleop.alignment import base_quaternion
 from trunkline.ar.teleop.messages import Offer, Targets, Thing, World
@@ -27,26 +27,26 @@ NOWHERE = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
-class Foreseen:
+class PlanPrediction:
     """preview: from `begins` s of the plan on. offer: the assistant's, None where it has nothing better."""
 
-    preview: Preview
+    preview: PlanPreview
     begins: float
     offer: Offer | None = None
 
     @property
     def probability(self) -> float:
         """That all goes well, as the futures say."""
-        found = self.preview.probability
-        assert found is not None
-        return found
+        probability = self.preview.probability
+        assert probability is not None
+        return probability
 
 
 @dataclass(frozen=True)
-class Foresight:
+class GraspPreviewer:
     """grips: those of the planner, by the way of grasping."""
 
-    known: Believed
+    robot_model: RobotModel
     grips: dict[str, Grip]
     settings: Previewing
 
@@ -59,7 +59,7 @@ class Foresight:
         hangs: np.ndarray | None,
         seed: int,
         go_on: Callable[[], None] = lambda: None,
-    ) -> Iterator[Foreseen]:
+    ) -> Iterator[PlanPrediction]:
         """Futures of a plan to grasp; where they are not sure to hold, once more with what the assistant offers.
 
         Args:
@@ -67,15 +67,17 @@ class Foresight:
                 nobody has seen it.
             go_on: as `preview`.
         """
-        s, way, begins = self.settings, *self.way(plan, "curl")
-        lean = self.known.lean(hangs)
-        twin = compose_twin(self.known, world, thing, way.joints[0], way.commands[0], s, lean)
-        holding = Holding(way.duration - s.hold, s.sag, s.slip, s.lifted)
-        found = Foreseen(preview(twin, way, self.known.doubts, holding, s.futures, seed, go_on=go_on), begins)
-        yield found
-        if found.probability < s.sure and s.assistant:
-            offer = self._offer(twin, way, holding, targets, thing, found.probability, seed, go_on)
-            yield replace(found, offer=offer)
+        s, trajectory, begins = self.settings, *self.trajectory_from(plan, "curl")
+        lean = self.robot_model.lean(hangs)
+        twin = compose_twin(self.robot_model, world, thing, trajectory.joints[0], trajectory.commands[0], s, lean)
+        holding = Holding(trajectory.duration - s.hold, s.sag, s.slip, s.lifted)
+        prediction = PlanPrediction(
+            preview(twin, trajectory, self.robot_model.posterior, holding, s.futures, seed, go_on=go_on), begins
+        )
+        yield prediction
+        if prediction.probability < s.sure and s.assistant:
+            offer = self._offer(twin, trajectory, holding, targets, thing, prediction.probability, seed, go_on)
+            yield replace(prediction, offer=offer)
 
     def bring(
         self,
@@ -84,69 +86,90 @@ class Foresight:
         thing: Thing,
         world: World,
         hangs: np.ndarray | None,
-        before: Foreseen,
+        before: PlanPrediction,
         seed: int,
         go_on: Callable[[], None] = lambda: None,
-    ) -> Foreseen:
+    ) -> PlanPrediction:
         """Futures of a plan to bring what is held elsewhere: whether it rests there.
 
         Args:
             before: of the grasp. What is not known of the thing's place is none of a thing in the arm.
             go_on: as `preview`.
         """
-        s, way, begins = self.settings, *self.way(plan, "transfer")
-        twin = self.carrying(thing, world, way, hangs, before)
-        doubts = replace(self.known.doubts, contact=Contact(self.known.doubts.contact.friction, NOWHERE, 0.0))
+        s, trajectory, begins = self.settings, *self.trajectory_from(plan, "transfer")
+        twin = self.carrying(thing, world, trajectory, hangs, before)
+        posterior = replace(
+            self.robot_model.posterior, contact=Contact(self.robot_model.posterior.contact.friction, NOWHERE, 0.0)
+        )
         board = beneath(targets.tip.position, world)
         assert board is not None  # else the planner refuses
         opens = plan.step * dict(plan.phases)["release"]
-        resting = Resting(opens, np.array(board.low), np.array(board.high), twin.model)
-        return Foreseen(preview(twin, way, doubts, resting, s.futures, seed, go_on=go_on), begins)
+        resting = RestCriterion(opens, np.array(board.low), np.array(board.high), twin.model)
+        return PlanPrediction(preview(twin, trajectory, posterior, resting, s.futures, seed, go_on=go_on), begins)
 
-    def reach(self, plan: Plan, world: World, seed: int) -> Foreseen:
+    def reach(self, plan: Plan, world: World, seed: int) -> PlanPrediction:
         """Futures of a plan that grasps nothing, beside nothing that may be touched."""
-        way = self.whole(plan)
-        twin = compose_twin(self.known, world, None, way.joints[0], way.commands[0], self.settings)
-        return self.free(twin, way, seed)
+        trajectory = self.whole(plan)
+        twin = compose_twin(self.robot_model, world, None, trajectory.joints[0], trajectory.commands[0], self.settings)
+        return self.free(twin, trajectory, seed)
 
-    def free(self, twin: Twin, way: Way, seed: int, go_on: Callable[[], None] = lambda: None) -> Foreseen:
+    def free(
+        self, twin: ComposedTwin, trajectory: CommandTrajectory, seed: int, go_on: Callable[[], None] = lambda: None
+    ) -> PlanPrediction:
         """Futures of which nothing is asked but where the tip goes. `go_on`: as `preview`."""
-        return Foreseen(preview(twin, way, self.known.doubts, None, self.settings.futures, seed, go_on=go_on), 0.0)
+        return PlanPrediction(
+            preview(twin, trajectory, self.robot_model.posterior, None, self.settings.futures, seed, go_on=go_on), 0.0
+        )
 
-    def whole(self, plan: Plan) -> Way:
+    def whole(self, plan: Plan) -> CommandTrajectory:
         """All of a plan, held for a while at its end where it has phases."""
-        return self.way(plan, plan.phases[0][0])[0] if plan.phases else Way(plan.step, plan.joints, plan.commands)
+        return (
+            self.trajectory_from(plan, plan.phases[0][0])[0]
+            if plan.phases
+            else CommandTrajectory(plan.step, plan.joints, plan.commands)
+        )
 
-    def carrying(self, thing: Thing, world: World, way: Way, hangs: np.ndarray | None, before: Foreseen) -> Twin:
+    def carrying(
+        self,
+        thing: Thing,
+        world: World,
+        trajectory: CommandTrajectory,
+        hangs: np.ndarray | None,
+        before: PlanPrediction,
+    ) -> ComposedTwin:
         """The twin with the thing in its arm, as the nominal preview of its grasp left both."""
-        lean, pose = self.known.lean(hangs), before.preview.nominal.qpos[0, -1]
-        return compose_twin(self.known, world, thing, way.joints[0], way.commands[0], self.settings, lean, pose)
+        lean, pose = self.robot_model.lean(hangs), before.preview.nominal.qpos[0, -1]
+        return compose_twin(
+            self.robot_model, world, thing, trajectory.joints[0], trajectory.commands[0], self.settings, lean, pose
+        )
 
-    def way(self, plan: Plan, first: str) -> tuple[Way, float]:
+    def trajectory_from(self, plan: Plan, first: str) -> tuple[CommandTrajectory, float]:
         """The plan from the phase `first` on, held for a while at its end, and when that phase begins, s."""
         row, more = dict(plan.phases)[first], round(self.settings.hold / plan.step)
         joints, commands = (
             np.concatenate([rows[row:], np.tile(rows[-1], (more, 1))]) for rows in (plan.joints, plan.commands)
         )
-        return Way(plan.step, joints, commands), plan.step * row
+        return CommandTrajectory(plan.step, joints, commands), plan.step * row
 
     def _offer(
         self,
-        twin: Twin,
-        way: Way,
+        twin: ComposedTwin,
+        trajectory: CommandTrajectory,
         holding: Holding,
         targets: Targets,
         thing: Thing,
-        own: float,
+        probability: float,
         seed: int,
         go_on: Callable[[], None],
     ) -> Offer | None:
         s, centre = self.settings, np.array(grip_of(thing))
         mount = np.array(targets.rigid.position) - centre
         places = self.grips[way_of_grasping(thing)].near(_rotation(targets), mount, thing.diameter)
-        shares = try_places(twin, way, self.known.doubts, holding, places - mount, s.assistant, seed + 1, go_on)
+        shares = try_places(
+            twin, trajectory, self.robot_model.posterior, holding, places - mount, s.assistant, seed + 1, go_on
+        )
         chosen = best(places - mount, shares)
-        if shares[chosen] <= own:
+        if shares[chosen] <= probability:
             return None
         x, y, z = (float(value) for value in centre + places[chosen])
         return Offer(thing.name, (x, y, z), targets.pointing, float(shares[chosen]))

@@ -11,7 +11,7 @@ import numpy as np
 from trunkline.ar.hybrid.grasp_poses import Grip, SideGrip
 from trunkline.ar.preview import contents
 from trunkline.ar.teleop.alignment import base_quaternion
-from trunkline.ar.teleop.config import Config
+from trunkline.ar.teleop.config import TeleoperationConfig
 from trunkline.ar.teleop.grasping import Grasping
 from trunkline.ar.teleop.messages import Targets
 from trunkline.ar.teleop.planner import Planner
@@ -20,7 +20,7 @@ from trunkline.ar.teleop.rigid_ik import RigidIK
 from trunkline.ar.teleop.tendons import Network
 from trunkline.ar.teleop.trajectory import limits_of
 from trunkline.ar.teleop.vectors import DOWN, Vector, conjugate, rotate
-from trunkline.ar.teleop.vibration import shaper_for, slowest, swings
+from trunkline.ar.teleop.vibration import shaper_for, slowest, vibration_modes
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.model.arm.contact_geometry import read_geometry
@@ -48,7 +48,7 @@ class Package:
     rate_limit: float
     files: dict[str, bytes] = field(repr=False)
 
-    def planner(self, config: Config) -> Planner:
+    def planner(self, config: TeleoperationConfig) -> Planner:
         """The planner that this package and the settings of teleoperation make."""
         limits = limits_of(config.motors, self.rate_limit, len(self.straight))
         shaper, rigid = shaper_for(self.model, config.shaping), RigidIK(config.mount_offset)
@@ -58,7 +58,7 @@ class Package:
             grasping=grasping,
         )  # fmt: skip
 
-    def grips(self, config: Config) -> dict[str, Grip]:
+    def grips(self, config: TeleoperationConfig) -> dict[str, Grip]:
         """The ways of grasping things, by their names."""
         return {"hanging": SideGrip(config.hanging, self.geometry), "basket": SideGrip(config.basket, self.geometry)}
 
@@ -66,7 +66,7 @@ class Package:
     def period(self) -> float:
         """s, of the slowest swing of the straight arm that a moved mount gives its tip; 0 where there is none."""
         gravity = np.array([0.0, 0.0, -STANDARD_GRAVITY])
-        return float(max(slowest(swings(self.model, self.straight, None, gravity), 1).periods, default=0.0))
+        return float(max(slowest(vibration_modes(self.model, self.straight, None, gravity), 1).periods, default=0.0))
 
     def tip(self, mount: Vector, targets: Targets, commands: np.ndarray) -> np.ndarray:
         """Where the twin's tip comes to rest, base frame, m (3,): the arm at `mount` as `targets` turn it, its motors
@@ -83,10 +83,10 @@ def only_package(folder: Path = PACKAGES) -> Path:
     Raises:
         InputError: there is none, or more than one.
     """
-    found = sorted(folder.glob("*.tgz"))
-    if len(found) != 1:
-        raise InputError(f"{folder}: found {len(found)} packages (*.tgz), expected one: `make demo` makes it")
-    return found[0]
+    packages = sorted(folder.glob("*.tgz"))
+    if len(packages) != 1:
+        raise InputError(f"{folder}: found {len(packages)} packages (*.tgz), expected one: `make demo` makes it")
+    return packages[0]
 
 
 def read_package(path: Path) -> Package:

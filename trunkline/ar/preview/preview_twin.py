@@ -7,12 +7,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from trunkline.ar.hybrid.compose import Placed, compose, panda_joints
-from trunkline.ar.hybrid.objects import Thing as Shaped
-from trunkline.ar.hybrid.posterior import Contact, Doubts
-from trunkline.ar.hybrid.rollouts import Twin
+from trunkline.ar.hybrid.objects import GraspObject as Shaped
+from trunkline.ar.hybrid.posterior import Contact, Posterior
+from trunkline.ar.hybrid.rollouts import ComposedTwin
 from trunkline.ar.hybrid.string import hang
-from trunkline.ar.hybrid.worlds import Surface
-from trunkline.ar.hybrid.worlds import World as Room
+from trunkline.ar.hybrid.worlds import SupportSurface
+from trunkline.ar.hybrid.worlds import WorldGeometry as Room
 from trunkline.ar.preview import contents
 from trunkline.ar.preview.settings import Previewing
 from trunkline.ar.teleop.messages import Box, Thing, World
@@ -30,11 +30,11 @@ LEANS = 4  # times that it is corrected: each leaves a tenth or less
 
 
 @dataclass(frozen=True)
-class Believed:
+class RobotModel:
     """What the package says. doubts: about the arm's parameters, contacts and places."""
 
     arm: mujoco.MjSpec
-    doubts: Doubts
+    posterior: Posterior
     robot: PandaRobot
 
     def lean(self, hangs: np.ndarray | None) -> Rotation | None:
@@ -44,14 +44,14 @@ class Believed:
             return None
         arm = self.arm.copy().compile()
         straight = arm.tendon_length0[arm.actuator_trnid[:, 0]]
-        found = Rotation.identity()
+        rotation = Rotation.identity()
         for _ in range(LEANS):
-            own = settle(arm, straight[None], found.inv().apply(GRAVITY)).position
-            found = Rotation.align_vectors(hangs[None], found.apply(own))[0] * found  # of one pair the least
-        return found
+            tip = settle(arm, straight[None], rotation.inv().apply(GRAVITY)).position
+            rotation = Rotation.align_vectors(hangs[None], rotation.apply(tip))[0] * rotation  # of one pair the least
+        return rotation
 
 
-def believed(settings: Previewing, files: dict[str, bytes]) -> Believed:
+def robot_model_of(settings: Previewing, files: dict[str, bytes]) -> RobotModel:
     """Out of the files of a package.
 
     Raises:
@@ -62,11 +62,11 @@ def believed(settings: Previewing, files: dict[str, bytes]) -> Believed:
     robot = unpacked.robot_of(files)
     if not isinstance(robot, PandaRobot):
         raise InputError(f"package: found a robot of kind {robot.kind}, expected panda: plans move that")
-    return Believed(unpacked.arm_of(files), contents.doubts_of(files, contact), robot)
+    return RobotModel(unpacked.arm_of(files), contents.posterior_of(files, contact), robot)
 
 
 def compose_twin(
-    known: Believed,
+    robot_model: RobotModel,
     world: World,
     thing: Thing | None,
     joints: np.ndarray,
@@ -74,11 +74,11 @@ def compose_twin(
     settings: Previewing,
     lean: Rotation | None = None,
     left: np.ndarray | None = None,
-) -> Twin:
+) -> ComposedTwin:
     """The twin at rest at `joints` (7,), rad, its motors at `commands` (K,), m, beside a thing that hangs or stands;
     `lean` is how its arm is turned on its mount, None where nobody has seen that. With a thing in the arm all is as an
     earlier preview `left` it: the pose (nq,) at its end, of a model with a string or without."""
-    robot = replace(known.robot, ready=joints.tolist())
+    robot = replace(robot_model.robot, ready=joints.tolist())
     boards, placed = {box.name: _surface(box) for box in world.boxes}, None
     if thing is not None:
         place, turn = np.array(thing.position), thing.quaternion
@@ -87,20 +87,20 @@ def compose_twin(
             turn = _upright(turn)
             _stand(place, shaped.half_height, list(boards.values()))
         placed = Placed(shaped, place, turn)
-    spec = compose(known.arm, robot, Room(None, boards, None), placed)
+    spec = compose(robot_model.arm, robot, Room(None, boards, None), placed)
     lean = lean or Rotation.identity()
     spec.body("base").quat = wxyz_from_rotation(lean)
     if thing is not None and thing.support == "hanging":
         hang(spec, np.array(thing.position), thing.diameter / 2, settings.string)
-    twin = Twin(spec.compile(), known.arm.copy().compile()).stepped(settings.step)
+    twin = ComposedTwin(spec.compile(), robot_model.arm.copy().compile()).stepped(settings.step)
     if left is None:
         return at_rest(twin, joints, commands, robot.mount_offset, lean)
     return replace(twin, start=left[: twin.model.nq].copy())  # a string, which comes last, is left out
 
 
 def at_rest(
-    twin: Twin, joints: np.ndarray, commands: np.ndarray, mount_offset: float, lean: Rotation | None = None
-) -> Twin:
+    twin: ComposedTwin, joints: np.ndarray, commands: np.ndarray, mount_offset: float, lean: Rotation | None = None
+) -> ComposedTwin:
     """The same twin, its arm at rest at other `joints` (7,), rad, and `commands` (K,), m."""
     start = _start(twin.model, twin.arm, joints, commands, mount_offset, lean or Rotation.identity())
     return replace(twin, start=start)
@@ -133,7 +133,7 @@ def _upright(quaternion: Quaternion) -> Quaternion:
     return unit((w, 0.0, 0.0, z))
 
 
-def _stand(place: np.ndarray, half_height: float, surfaces: list[Surface]) -> None:
+def _stand(place: np.ndarray, half_height: float, surfaces: list[SupportSurface]) -> None:
     """Put the board under `place` (3,), m, to where what stands there says that it is: both are seen not quite true."""
     under = [board for board in surfaces if (np.abs(place[:2] - board.top[:2]) <= np.array(board.size[:2]) / 2).all()]
     if under:
@@ -141,6 +141,6 @@ def _stand(place: np.ndarray, half_height: float, surfaces: list[Surface]) -> No
         highest.top[2] = float(place[2] - half_height)
 
 
-def _surface(box: Box) -> Surface:
+def _surface(box: Box) -> SupportSurface:
     low, high = np.array(box.low), np.array(box.high)
-    return Surface([*((low + high) / 2)[:2].tolist(), float(high[2])], (high - low).tolist(), "wood")
+    return SupportSurface([*((low + high) / 2)[:2].tolist(), float(high[2])], (high - low).tolist(), "wood")

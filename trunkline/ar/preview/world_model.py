@@ -16,7 +16,7 @@ def make_world(boxes: tuple[Box, ...], things: tuple[Thing, ...] = ()) -> World:
     return World(hashlib.sha256(repr((boxes, things)).encode()).hexdigest(), boxes, things)
 
 
-def believe(world: World, pose: np.ndarray, phases: Collection[str], lift: float) -> World:
+def update_world(world: World, pose: np.ndarray, phases: Collection[str], lift: float) -> World:
     """The world with its one thing seen at `pose` (7,), NaN where nothing is seen.
 
     Args:

@@ -1,11 +1,11 @@
 """A live session in a browser or a headset, on the simulated robot unless a real one is named.
 
-    python -m trunkline.ar.session PACKAGE [--host ADDRESS --tls | --cert FILE --key FILE] [--port N]
+    trunkline live PACKAGE [--host ADDRESS --tls | --cert FILE --key FILE] [--port N]
                              [--dry-run | [--robot panda|fr3|ros2] [--motors gm6020 --bus can0 [--interface NAME]]]
 
 PACKAGE: the folder or .tgz that the stage package_unity writes. It listens on this machine alone; a headset comes over
 USB: `adb reverse tcp:8443 tcp:8443`. Another address needs TLS. The address that is printed opens the session: whoever
-has it may control the robot. What happens is logged: docs/live_log.md.
+has it may control the robot. What happens is logged: docs/live-sessions.md.
 """
 
 import argparse
@@ -19,7 +19,7 @@ from trunkline.ar.session.auth import is_local, names_of
 from trunkline.ar.session.certificate import fingerprint, make_certificate, tls_context
 from trunkline.ar.session.hardware import MOTORS, ROBOTS
 from trunkline.errors import InputError, in_one_line
-from trunkline.program import called
+from trunkline.program import program_name
 
 PORT = 8443  # kept: anchors of a headset belong to scheme, host and port
 ANY = ("0.0.0.0", "::", "")
@@ -31,7 +31,7 @@ def parsed(arguments: list[str]) -> argparse.Namespace:
         InputError: an address that others reach, without TLS.
     """
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.ar.session"), description=(__doc__ or "").partition("\n")[0]
+        prog=program_name("live"), description=(__doc__ or "").partition("\n")[0]
     )
     parser.add_argument("package", type=Path, metavar="PACKAGE", help="folder or .tgz that package_unity writes")
     parser.add_argument("--host", default="127.0.0.1", help="an address of this machine")
@@ -40,7 +40,7 @@ def parsed(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--cert", type=Path, help="a certificate of your own, PEM")
     parser.add_argument("--key", type=Path, help="its key, PEM")
     parser.add_argument("--dry-run", action="store_true", help="on the simulated robot, as without --robot, --motors")
-    parser.add_argument("--robot", choices=ROBOTS, default=ROBOTS[0], help="docs/execution.md says what was tried")
+    parser.add_argument("--robot", choices=ROBOTS, default=ROBOTS[0], help="docs/hardware.md says what was tried")
     parser.add_argument("--motors", choices=MOTORS, default=MOTORS[0], help="of the tendons")
     parser.add_argument("--bus", default="", help=f"the motors', such as can0; {SIMULATED}: simulated motors behind it")
     parser.add_argument("--interface", default="", help="python-can's, for the bus; socketcan unless it is named")

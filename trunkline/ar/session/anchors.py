@@ -1,6 +1,5 @@
 """Anchors that a headset has fastened to the room near the robot's base, kept from one session to the next."""
 
-import os
 import threading
 from pathlib import Path
 
@@ -9,6 +8,7 @@ from pydantic.dataclasses import dataclass
 
 from trunkline.ar.teleop.messages import Pose, Vector
 from trunkline.errors import InputError
+from trunkline.files import written_whole
 
 MOST = 8  # a headset keeps no more of one page
 
@@ -68,6 +68,5 @@ class Anchors:
         """
         with self._saving:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            part = self.path.with_name(f"{self.path.name}.part")
-            part.write_bytes(_FILE.dump_json(list(self.stored), indent=1) + b"\n")
-            os.replace(part, self.path)
+            with written_whole(self.path) as part:
+                part.write_bytes(_FILE.dump_json(list(self.stored), indent=1) + b"\n")

@@ -1,4 +1,5 @@
-"""What is fast, in binary: one table of both directions. Little-endian, no padding; docs/protocol.md tells the rest.
+"""What is fast, in binary: one table of both directions. Little-endian, no padding; docs/live-sessions.md tells the
+rest.
 
 A message is a head and rows of float32. Positions in m, in the rigid robot's base frame, z up; quaternions w first.
 What a client sends of its controllers is in its own reference frame, in which `hello` says how it stands.

@@ -1,8 +1,9 @@
-"""The wire's table for others: a module of the client, and the tables of docs/protocol.md.
+"""The wire's table for others: a module of the client, and the tables of docs/live-sessions.md.
 
     python -m trunkline.ar.session.binary_table [CHECKOUT]
 
-writes `client/src/wire_table.js` and the generated blocks of `docs/protocol.md` of a checkout, by default this one.
+writes `client/src/wire_table.js` and the generated blocks of `docs/live-sessions.md` of a checkout, by default this
+one.
 """
 
 import json
@@ -15,7 +16,7 @@ from trunkline.ar.session import binary, messages
 from trunkline.ar.session.binary import BinaryMessage
 from trunkline.errors import InputError, in_one_line
 
-MODULE, PAGE = Path("client/src/wire_table.js"), Path("docs/protocol.md")
+MODULE, PAGE = Path("client/src/wire_table.js"), Path("docs/live-sessions.md")
 COMMAND = "python -m trunkline.ar.session.binary_table"
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from trunkline.ar.preview.package import Package, read_package
-from trunkline.ar.preview.preview_twin import believed, compose_twin
+from trunkline.ar.preview.preview_twin import compose_twin, robot_model_of
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import preview_process, simulated
 from trunkline.ar.session.bodies import drawn_bodies
@@ -20,7 +20,7 @@ from trunkline.ar.session.robot import RobotProcess
 from trunkline.ar.session.scene import Shells, scene
 from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.session.simulated import Simulation
-from trunkline.ar.teleop.config import Config as Teleop
+from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.messages import Box
 from trunkline.ar.teleop.rigid_ik import RigidIK
@@ -107,9 +107,9 @@ def robot_of(simulation: Simulation, hardware: Hardware | None) -> RobotProcess:
 
 def simulation_of(package: Package, teleop: Teleop, config: SessionConfig, joints: np.ndarray) -> Simulation:
     """The simulated robot, at rest at `joints` (7,), rad, with its arm straight."""
-    belief = believed(config.preview, package.files)
+    robot_model = robot_model_of(config.preview, package.files)
     world = make_world(solids(config))
-    twin = compose_twin(belief, world, config.thing, joints, package.straight, config.preview)
+    twin = compose_twin(robot_model, world, config.thing, joints, package.straight, config.preview)
     limits = limits_of(teleop.motors, package.rate_limit, len(package.straight))
     bodies, offset = drawn_bodies(twin.model), teleop.mount_offset
     return Simulation(twin, joints, package.straight, bodies, limits, package.digest, offset)

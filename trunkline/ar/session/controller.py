@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from trunkline.ar.preview.world_model import believe
+from trunkline.ar.preview.world_model import update_world
 from trunkline.ar.session import messages, preview_process
 from trunkline.ar.session.binary import MARKERS, Received
 from trunkline.ar.session.controller_input import NOWHERE, controllers
@@ -307,7 +307,7 @@ class SessionController:
         phases = tuple(name for name, _ in self.plan.phases) if done and self.plan is not None else ()
         if done:
             self._believed = executor.digest
-        self.world = believe(self.world, robot_state.thing, phases, self.lift)
+        self.world = update_world(self.world, robot_state.thing, phases, self.lift)
 
     # --- what is told
 

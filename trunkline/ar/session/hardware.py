@@ -10,7 +10,7 @@ from trunkline.ar.drivers.ros_settings import RosSettings
 from trunkline.ar.drivers.setpoint_filter import LIMITS, RobotLimits
 from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.ar.drivers.simulated_motors import SIMULATED
-from trunkline.ar.teleop.config import Config as Teleop
+from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.errors import InputError
 
 ROBOTS = ("simulated", "panda", "fr3", "ros2")

@@ -19,14 +19,14 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from trunkline.ar.hybrid.preview import WITHIN, nominal
-from trunkline.ar.hybrid.rollouts import FRAME, Twin, Way
-from trunkline.ar.preview.grasp_preview import Foreseen, Foresight
+from trunkline.ar.hybrid.rollouts import FRAME, CommandTrajectory, ComposedTwin
+from trunkline.ar.preview.grasp_preview import GraspPreviewer, PlanPrediction
 from trunkline.ar.preview.package import Package, read_package
-from trunkline.ar.preview.preview_twin import at_rest, believed, compose_twin
+from trunkline.ar.preview.preview_twin import at_rest, compose_twin, robot_model_of
 from trunkline.ar.preview.settings import Previewing
 from trunkline.ar.session import messages
 from trunkline.ar.session.bodies import BodyPoses
-from trunkline.ar.teleop.config import Config
+from trunkline.ar.teleop.config import TeleoperationConfig
 from trunkline.ar.teleop.following import sought
 from trunkline.ar.teleop.messages import PlanReport, Request, Target, Targets, Thing, World
 from trunkline.ar.teleop.plan import Plan
@@ -121,20 +121,22 @@ class Overtaken(Exception):
 class PreviewPlanner:
     """Plans and previews. `bodies`: names of those whose poses are told."""
 
-    def __init__(self, planner: Planner, foresight: Foresight, bodies: tuple[str, ...]) -> None:
+    def __init__(self, planner: Planner, foresight: GraspPreviewer, bodies: tuple[str, ...]) -> None:
         self.planner, self.foresight, self.bodies = planner, foresight, bodies
-        self.belief, self.previewing = foresight.known, foresight.settings
-        self._composed: tuple[tuple, Twin | None] = ((), None)
-        self._grasped: Foreseen | None = None  # the last grasp: of a thing that is held, the one that was run
+        self.robot_model, self.previewing = foresight.robot_model, foresight.settings
+        self._composed: tuple[tuple, ComposedTwin | None] = ((), None)
+        self._grasped: PlanPrediction | None = None  # the last grasp: of a thing that is held, the one that was run
 
     @classmethod
-    def of(cls, package: Package, config: Config, previewing: Previewing, bodies: tuple[str, ...]) -> "PreviewPlanner":
+    def of(
+        cls, package: Package, config: TeleoperationConfig, previewing: Previewing, bodies: tuple[str, ...]
+    ) -> "PreviewPlanner":
         """By a package alone.
 
         Raises:
             InputError: it has nothing to preview with.
         """
-        foresight = Foresight(believed(previewing, package.files), package.grips(config), previewing)
+        foresight = GraspPreviewer(robot_model_of(previewing, package.files), package.grips(config), previewing)
         return cls(package.planner(config), foresight, bodies)
 
     def answers(self, order: Order | FollowRequest, go_on: Callable[[], None] = lambda: None) -> Iterator[Answer]:
@@ -168,17 +170,19 @@ class PreviewPlanner:
         """Compose its twin, which the next order takes, where nothing has changed."""
         self._twin(order.world, _beside(order), order.joints, order.commands)
 
-    def _twin(self, world: World, thing: Thing | None, joints: np.ndarray, commands: np.ndarray) -> Twin:
+    def _twin(self, world: World, thing: Thing | None, joints: np.ndarray, commands: np.ndarray) -> ComposedTwin:
         """The last one where nothing has changed: to compile another takes longer than a piece of a preview."""
         composed, twin = self._composed
         if twin is not None and composed == (world.boxes, thing):
-            twin = at_rest(twin, joints, commands, self.belief.robot.mount_offset)
+            twin = at_rest(twin, joints, commands, self.robot_model.robot.mount_offset)
         else:
-            twin = compose_twin(self.belief, world, thing, joints, commands, self.previewing)
+            twin = compose_twin(self.robot_model, world, thing, joints, commands, self.previewing)
         self._composed = (world.boxes, thing), twin
         return twin
 
-    def _shown(self, serial: int, twin: Twin, way: Way, go_on: Callable[[], None]) -> Iterator[Answer]:
+    def _shown(
+        self, serial: int, twin: ComposedTwin, way: CommandTrajectory, go_on: Callable[[], None]
+    ) -> Iterator[Answer]:
         poses, first, piece_answer = BodyPoses(twin.model, self.bodies), 0, None
         for piece in nominal(twin, way):
             if piece_answer is not None:
@@ -194,8 +198,8 @@ class PreviewPlanner:
             yield PreviewPiece(serial, piece_answer.first, piece_answer.time, piece_answer.poses, True)
 
     def _foreseen(
-        self, order: Order, plan: Plan, twin: Twin, way: Way, go_on: Callable[[], None]
-    ) -> Iterator[Foreseen]:
+        self, order: Order, plan: Plan, twin: ComposedTwin, way: CommandTrajectory, go_on: Callable[[], None]
+    ) -> Iterator[PlanPrediction]:
         targets, serial = order.request.targets, order.request.serial
         thing, held_object = order.world.thing(targets.thing) if targets.thing else None, _held_object(order)
         if thing is not None and held_object is None:
@@ -208,14 +212,14 @@ class PreviewPlanner:
             yield self.foresight.free(twin, way, serial, go_on)
 
 
-def prediction_message(digest: str, prediction: Foreseen) -> messages.PredictionMessage:
+def prediction_message(digest: str, prediction: PlanPrediction) -> messages.PredictionMessage:
     """As clients hear it: times from the plan's beginning on."""
     preview, stated = prediction.preview, prediction.preview.stated
     low_high = preview.interval or (None, None)
     tips = tuple((float(x), float(y), float(z)) for x, y, z in stated.tips)
     return messages.PredictionMessage(
         digest, preview.probability, *low_high, tuple(map(float, prediction.begins + stated.times)), tips,
-        tuple(map(float, stated.radii)), WITHIN, len(preview.draws), prediction.offer,
+        tuple(map(float, stated.radii)), WITHIN, len(preview.samples), prediction.offer,
     )  # fmt: skip
 
 
@@ -304,7 +308,14 @@ class PreviewProcess:
 
 
 def run(
-    answers, orders, newest, path: Path, config: Config, previewing: Previewing, bodies: tuple[str, ...], world: World
+    answers,
+    orders,
+    newest,
+    path: Path,
+    config: TeleoperationConfig,
+    previewing: Previewing,
+    bodies: tuple[str, ...],
+    world: World,
 ) -> None:
     """The process: until its parent is gone. world: the first plans are likely to be asked for in it."""
     leave_signals_to_parent()
@@ -323,7 +334,7 @@ def run(
 def warm(planner: PreviewPlanner, package: Package, world: World) -> None:
     """Plan and preview once for nothing: what is compiled on its first call would keep the first user waiting, and so
     would the twin of the `world`."""
-    robot, straight = planner.belief.robot, package.straight
+    robot, straight = planner.robot_model.robot, package.straight
     joints = np.array(robot.ready)
     x, y, z = (float(value) for value in mount_pose(joints[None], robot.mount_offset)[0][0])
     targets = Targets(Target((x, y, z)), Target((x, y, z)), DOWN, 0.0, 0, 0.0)

@@ -27,7 +27,7 @@ from trunkline.ar.session.robot import POSE, READY, TIME, RobotChannel, RobotPro
 from trunkline.ar.session.simulated import Loop, Simulation, TwinPlant, drive
 from trunkline.ar.teleop.following import Follower, Following
 from trunkline.ar.teleop.messages import ExecutorReport
-from trunkline.ar.teleop.trajectory import Limits
+from trunkline.ar.teleop.trajectory import MotionLimits
 from trunkline.compute.processes import end_with_parent, leave_signals_to_parent, parent_pid
 from trunkline.errors import InputError
 from trunkline.kinematics.panda.shipped import JOINTS
@@ -44,7 +44,7 @@ class Beginning:
 
     joints: np.ndarray
     commands: np.ndarray
-    limits: Limits
+    limits: MotionLimits
     package: str
 
 

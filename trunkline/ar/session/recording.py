@@ -1,4 +1,5 @@
-"""A live session's log as the page replays it: a frame `robot` of docs/protocol.md for each pose, its length before it.
+"""A live session's log as the page replays it: a frame `robot` of docs/live-sessions.md for each pose, its length
+before it.
 
     python -m trunkline.ar.session.recording LOG RECORDING
 

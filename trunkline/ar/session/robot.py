@@ -20,7 +20,7 @@ from trunkline.ar.teleop.executor import FOLLOWS, SimulatedRobot
 from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.messages import ExecutorReport
 from trunkline.ar.teleop.plan import Plan
-from trunkline.ar.teleop.trajectory import JOINTS, Limits
+from trunkline.ar.teleop.trajectory import JOINTS, MotionLimits
 
 DEAD_MAN = 0.08  # s without a permit
 STALE = 0.15  # s without a sign of the robot's process
@@ -103,7 +103,9 @@ class RobotState:
 class RobotProcess:
     """An `Executor` whose robot is another process, `run(channel, *setup)`."""
 
-    def __init__(self, run: Callable, setup: tuple, tendons: int, bodies: int, limits: Limits, package: str) -> None:
+    def __init__(
+        self, run: Callable, setup: tuple, tendons: int, bodies: int, limits: MotionLimits, package: str
+    ) -> None:
         context = multiprocessing.get_context("spawn")
         self.channel = RobotChannel(context, tendons, bodies)
         self._limits, self._package, self._serial, self._digest, self._begun = limits, package, 0, "", 0.0

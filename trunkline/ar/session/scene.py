@@ -26,7 +26,7 @@ DIGITS = 5  # after the decimal point of what is drawn, m
 
 
 def scene(model: mujoco.MjModel, bodies: tuple[str, ...], maps: dict[str, np.ndarray], length: float) -> dict:
-    """As docs/protocol.md has it.
+    """As docs/live-sessions.md has it.
 
     Args:
         bodies: names, in the order of the frames' rows. maps: `unity.unpacked.maps_of`. length: of the arm, m.

@@ -23,7 +23,7 @@ from trunkline.ar.session.hardware import Hardware, hardware_of
 from trunkline.ar.session.preview_process import Answer
 from trunkline.ar.session.server import PARTING, Composition, Server
 from trunkline.ar.session.settings import AlignmentSettings, SessionConfig
-from trunkline.ar.teleop.config import Config as Teleop
+from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT, load_folder
 
@@ -151,7 +151,7 @@ async def serve(options: argparse.Namespace, names: list[str], context: ssl.SSLC
         load_folder(Execution, PROJECT / "conf/execution"),
     )  # fmt: skip
     if hardware is not None and hardware.real:
-        log(f"REAL: {hardware.words()}. Nobody has tried this on real ones yet (docs/execution.md).")
+        log(f"REAL: {hardware.words()}. Nobody has tried this on real ones yet (docs/hardware.md).")
         if hardware.real_motors:
             log("The motors wind up their cables now, before the page is there: stand clear. Ctrl-C lets them go.")
     address = Address(options.port, options.host, tuple(names), context)

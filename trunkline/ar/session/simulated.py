@@ -19,14 +19,14 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from trunkline.ar.hybrid.compose import panda_joints
-from trunkline.ar.hybrid.rollouts import Twin
+from trunkline.ar.hybrid.rollouts import ComposedTwin
 from trunkline.ar.hybrid.torques import servo_commands
 from trunkline.ar.session.bodies import BodyPoses
 from trunkline.ar.session.robot import DEAD_MAN, MODES, PERMIT, PERMITTED, STOPS, TELLS, Goal, RobotChannel
 from trunkline.ar.teleop.executor import FOLLOWS, SimulatedRobot
 from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.plan import Plan
-from trunkline.ar.teleop.trajectory import Limits
+from trunkline.ar.teleop.trajectory import MotionLimits
 from trunkline.compute.processes import leave_signals_to_parent, parent_pid
 from trunkline.kinematics.panda.shipped import JOINTS
 from trunkline.model.elements import actuators
@@ -45,11 +45,11 @@ class Simulation:
     """`twin`: at rest where all begins, its motors at `commands` (K,), m, the Panda at `joints` (7,), rad. `bodies`:
     names of those whose poses are told. `mount_offset`: m."""
 
-    twin: Twin
+    twin: ComposedTwin
     joints: np.ndarray
     commands: np.ndarray
     bodies: tuple[str, ...]
-    limits: Limits
+    limits: MotionLimits
     package: str
     mount_offset: float
 

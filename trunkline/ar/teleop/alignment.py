@@ -99,8 +99,8 @@ def align(tip: Vector, mount: Vector, pointing: Vector, wrist: Wrist, last: Alig
         return last
     present = carried_heading(mount, wrist)
     azimuth = math.atan2(away[1], away[0])
-    found = [least_turn(wrapped(azimuth - angle - present), wrist.angle) for angle in settings.half_planes]
-    turns = {half_plane: turn for half_plane, turn in enumerate(found) if turn is not None}
+    turn_options = [least_turn(wrapped(azimuth - angle - present), wrist.angle) for angle in settings.half_planes]
+    turns = {half_plane: turn for half_plane, turn in enumerate(turn_options) if turn is not None}
     if not turns:
         return Aligned(last.heading, last.half_plane, None)
     best = min(turns, key=lambda half_plane: abs(turns[half_plane]))

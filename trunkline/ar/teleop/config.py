@@ -13,7 +13,7 @@ from trunkline.settings import settings
 
 
 @settings
-class Config:
+class TeleoperationConfig:
     """`hanging`, `basket`: how what hangs and what has a handle is grasped. `mount_offset`: m, from the Panda's flange
     to the soft arm's mount."""
 

@@ -14,7 +14,7 @@ from trunkline.ar.teleop.input_validation import clock_fault, fault_of, setting_
 from trunkline.ar.teleop.messages import Input, Intent, Motion, Pose, Request, Targets
 from trunkline.ar.teleop.reach import Reach
 from trunkline.ar.teleop.settings import Teleop
-from trunkline.ar.teleop.state import Pinned, State
+from trunkline.ar.teleop.state import Pinned, TeleoperationState
 from trunkline.ar.teleop.targets import bring, offered, place, tilted, why_not
 from trunkline.ar.teleop.tracked_controller import Hand, below, hear, missed, ray_end
 from trunkline.ar.teleop.transitions import TRANSITIONS, Event, first_event
@@ -35,73 +35,73 @@ class Teleoperation:
     package: str
     mount_offset: float
 
-    def start(self) -> State:
+    def start(self) -> TeleoperationState:
         """Before the first input: the robot holds."""
         hand = Hand(self.settings.rays.start)
-        return State(hand, hand)
+        return TeleoperationState(hand, hand)
 
-    def step(self, state: State, given: Input, dt: float) -> tuple[State, Intent]:
-        """The state after `given`, and what is wanted now.
+    def step(self, state: TeleoperationState, message: Input, dt: float) -> tuple[TeleoperationState, Intent]:
+        """The state after `message`, and what is wanted now.
 
         Args:
             dt: s since the step before, of the caller's clock; stamps are of the client's.
         """
-        state, lost, unheard = self._heard(state, given, dt)
-        alignment = given.alignment
+        state, lost, unheard = self._heard(state, message, dt)
+        alignment = message.alignment
         if unheard and state.mode not in WATCHING:
             lost = lost or unheard
         if lost or alignment is None:
-            found: dict[Event, bool] = {"lost": True, "stop": stopped_by(given)}
-            return self._after(state, given, found, lost, None, dt, (None, None))
+            events: dict[Event, bool] = {"lost": True, "stop": stopped_by(message)}
+            return self._after(state, message, events, lost, None, dt, (None, None))
         if state.alignment != alignment:  # what is parked in the base frame is elsewhere in the room now
             left, right = (replace(hand, target=None) for hand in state.hands)
             state = replace(state, alignment=alignment, left=left, right=right, history=())
-        if state.world != given.world.digest:  # what was judged before was judged in another world
-            state = replace(state, world=given.world.digest, history=())
+        if state.world != message.world.digest:  # what was judged before was judged in another world
+            state = replace(state, world=message.world.digest, history=())
         ends = (ray_end(state.left, alignment), ray_end(state.right, alignment))
         state = self._parked(state, ends, alignment, dt)
-        targets = self._targets(state, given)
+        targets = self._targets(state, message)
         if targets is not None:
             state = self._remembered(state, targets)
-        found, notice = happened(state, given, targets, ends, self.settings)
-        found["confirm"] = found["confirm"] and not unheard
-        state, intent = self._after(state, given, found, notice, targets, dt, ends)
+        events, notice = happened(state, message, targets, ends, self.settings)
+        events["confirm"] = events["confirm"] and not unheard
+        state, intent = self._after(state, message, events, notice, targets, dt, ends)
         return state, replace(intent, notice=unheard or intent.notice)
 
-    def _heard(self, state: State, given: Input, dt: float) -> tuple[State, str, str]:
+    def _heard(self, state: TeleoperationState, message: Input, dt: float) -> tuple[TeleoperationState, str, str]:
         """Both hands after this input; why nothing of it can be trusted; and who is not heard. Either is "" where
         nothing is wrong, and else the robot must hold."""
-        same = given.stamp == state.stamp
+        same = message.stamp == state.stamp
         silent = state.silent + dt if same and math.isfinite(dt) else 0.0
-        fault = clock_fault(state.stamp, given, dt)
-        quiet = "" if fault else silence_fault(state.stamp, given.stamp, silent, self.settings.safety)
+        fault = clock_fault(state.stamp, message, dt)
+        quiet = "" if fault else silence_fault(state.stamp, message.stamp, silent, self.settings.safety)
         if fault or quiet:
             left, right = (missed(hand, math.inf, 0.0) for hand in state.hands)
-            stamp = given.stamp if math.isfinite(given.stamp) else state.stamp  # from which time counts anew
+            stamp = message.stamp if math.isfinite(message.stamp) else state.stamp  # from which time counts anew
             state = replace(state, left=left, right=right, stamp=stamp, silent=silent, history=())
-            return state, fault or setting_fault(given, self.package), quiet
+            return state, fault or setting_fault(message, self.package), quiet
         if same:
             left, right = (replace(hand, pressed=()) for hand in state.hands)
-            return replace(state, left=left, right=right, silent=silent), setting_fault(given, self.package), ""
-        sample = dt if state.stamp is None else given.stamp - state.stamp
+            return replace(state, left=left, right=right, silent=silent), setting_fault(message, self.package), ""
+        sample = dt if state.stamp is None else message.stamp - state.stamp
         hands, unseen = [], []
-        for name, hand, controller in (("left", state.left, given.left), ("right", state.right, given.right)):
+        for name, hand, controller in (("left", state.left, message.left), ("right", state.right, message.right)):
             wrong = fault_of(controller)
             if not wrong:
                 hands.append(hear(hand, controller, sample, self.settings))
                 continue
             hands.append(missed(hand, sample, self.settings.safety.grace))
-            if hands[-1].seen is None:
+            if hands[-1].controller is None:
                 unseen.append(f"{name} controller: {wrong}; holding")
-        sound = not fault_of(given.left) and not fault_of(given.right)
-        if sound and swapped(state.left, state.right, given, self.settings.safety.swap):
+        sound = not fault_of(message.left) and not fault_of(message.right)
+        if sound and swapped(state.left, state.right, message, self.settings.safety.swap):
             hands = [missed(hand, math.inf, 0.0) for hand in hands]
             fault = "controllers have changed places; holding until both grips are let go"
         left, right = hands
-        state = replace(state, left=left, right=right, stamp=given.stamp, silent=0.0)
-        return state, setting_fault(given, self.package) or fault, unseen[0] if unseen else ""
+        state = replace(state, left=left, right=right, stamp=message.stamp, silent=0.0)
+        return state, setting_fault(message, self.package) or fault, unseen[0] if unseen else ""
 
-    def _parked(self, state: State, ends: Ends, alignment: Pose, dt: float) -> State:
+    def _parked(self, state: TeleoperationState, ends: Ends, alignment: Pose, dt: float) -> TeleoperationState:
         """Targets that are held by their grips moved to the ends of their rays; the others stay where they are."""
         hands, pointing, limited = list(state.hands), state.pointing, state.limited
         for index, (hand, end) in enumerate(zip(state.hands, ends, strict=True)):
@@ -110,7 +110,7 @@ class Teleoperation:
                 hands[index] = replace(hand, gripped_at=at)
             elif hand.grips and end is not None and not hand.lost_for:
                 down = below(hand, alignment)
-                if index == self._rigid and "primary" in hand.held and down is not None:
+                if index == self._rigid and "primary" in hand.buttons and down is not None:
                     pointing, limited = tilted(pointing, down, dt, self.settings.orientation)
                 else:
                     hands[index] = replace(hand, target=end)
@@ -121,20 +121,24 @@ class Teleoperation:
         """Which of both hands has the rigid target."""
         return ("left", "right").index(self.settings.rigid_hand)
 
-    def _targets(self, state: State, given: Input) -> Targets | None:
+    def _targets(self, state: TeleoperationState, message: Input) -> Targets | None:
         if state.mode not in AIMING and state.pinned is not None:
-            return offered(state.pinned.request.targets, given.offer)
-        rigid, tip, held = state.hands[self._rigid].target, state.hands[1 - self._rigid].target, given.world.held
-        if rigid is None or (tip is None and held is None):
+            return offered(state.pinned.request.targets, message.offer)
+        rigid, tip, held_object = (
+            state.hands[self._rigid].target,
+            state.hands[1 - self._rigid].target,
+            message.world.held_object,
+        )
+        if rigid is None or (tip is None and held_object is None):
             return None
-        wrist, world, last = wrist_of(given.joints, self.mount_offset), given.world, state.aligned
-        if held is not None:
-            return bring(held, rigid, state.pointing, state.limited, wrist, last.half_plane, world, self.reach)
+        wrist, world, last = wrist_of(message.joints, self.mount_offset), message.world, state.aligned
+        if held_object is not None:
+            return bring(held_object, rigid, state.pointing, state.limited, wrist, last.half_plane, world, self.reach)
         assert tip is not None
-        found = place(rigid, tip, state.pointing, state.limited, wrist, last, world, self.reach, self.settings)
-        return offered(found, given.offer)
+        targets = place(rigid, tip, state.pointing, state.limited, wrist, last, world, self.reach, self.settings)
+        return offered(targets, message.offer)
 
-    def _remembered(self, state: State, targets: Targets) -> State:
+    def _remembered(self, state: TeleoperationState, targets: Targets) -> TeleoperationState:
         """The state with `targets` in its history, which keeps what may be looked back to."""
         now = state.stamp
         assert now is not None
@@ -147,37 +151,37 @@ class Teleoperation:
 
     def _after(
         self,
-        state: State,
-        given: Input,
-        found: dict[Event, bool],
+        state: TeleoperationState,
+        message: Input,
+        events: dict[Event, bool],
         notice: str,
         targets: Targets | None,
         dt: float,
         ends: Ends,
-    ) -> tuple[State, Intent]:
+    ) -> tuple[TeleoperationState, Intent]:
         """The next state by the table, and its intent."""
-        before, event = state.mode, first_event(state.mode, found)
+        before, event = state.mode, first_event(state.mode, events)
         mode = before if event is None else TRANSITIONS[before, event]
         step = dt if math.isfinite(dt) and dt > 0 else 0.0
-        quiet = state.idle and not found.get("lost")
+        quiet = state.idle and not events.get("lost")
         state = replace(
             state,
             mode=mode,
             waited=state.waited + step if mode == before else 0.0,
             sound_for=state.sound_for + step if quiet else 0.0,
             notice=notice or (state.notice if mode == before else ""),
-            running=mode == "execute" and (state.running or given.executor.mode == "running"),
+            running=mode == "execute" and (state.running or message.executor.mode == "running"),
         )
         if event == "ask":
-            state = self._asked(state, given)
+            state = self._asked(state, message)
             assert state.pinned is not None
             targets = state.pinned.request.targets
         elif event == "planned":
-            assert given.plan is not None
-            state = replace(state, digest=given.plan.digest)
+            assert message.plan is not None
+            state = replace(state, digest=message.plan.digest)
         elif event == "follow":
             assert targets is not None
-            state = replace(state, pinned=self._pin(state.serial, targets, given), history=state.history[-1:])
+            state = replace(state, pinned=self._pin(state.serial, targets, message), history=state.history[-1:])
         elif mode == "aim" and (before == "aim" or event == "void"):
             state = self._offers_taken(state, targets)
         if mode not in PLANNED:
@@ -189,21 +193,21 @@ class Teleoperation:
             state = replace(state, following=state.following if why_not(wanted) else wanted)
         return state, self._intent(state, targets, ends)
 
-    def _asked(self, state: State, given: Input) -> State:
+    def _asked(self, state: TeleoperationState, message: Input) -> TeleoperationState:
         """Everything pinned to what the plan is asked for; both hands' targets are those of before the press."""
         wanted = looked_back(state, self.settings)
         assert wanted is not None
         wanted = replace(wanted, better=None)  # of an older plan
         positions = (wanted.rigid.position, wanted.tip.position)
         hands = [replace(state.hands[i], gripped_at=None, target=positions[i != self._rigid]) for i in (0, 1)]
-        pinned = self._pin(state.serial + 1, wanted, given)
+        pinned = self._pin(state.serial + 1, wanted, message)
         return replace(state, left=hands[0], right=hands[1], serial=state.serial + 1, pinned=pinned)
 
-    def _pin(self, serial: int, targets: Targets, given: Input) -> Pinned:
-        assert given.alignment is not None
-        return Pinned(Request(serial, targets, given.world.digest, self.package), given.alignment, given.world)
+    def _pin(self, serial: int, targets: Targets, message: Input) -> Pinned:
+        assert message.alignment is not None
+        return Pinned(Request(serial, targets, message.world.digest, self.package), message.alignment, message.world)
 
-    def _offers_taken(self, state: State, targets: Targets | None) -> State:
+    def _offers_taken(self, state: TeleoperationState, targets: Targets | None) -> TeleoperationState:
         """Targets moved to what was offered, of hands whose primary button was pressed with the grip let go."""
         hands = list(state.hands)
         for index, hand in enumerate(hands):
@@ -214,7 +218,7 @@ class Teleoperation:
                 hands[index] = replace(hand, target=offer or hand.target)
         return replace(state, left=hands[0], right=hands[1])
 
-    def _intent(self, state: State, targets: Targets | None, ends: Ends) -> Intent:
+    def _intent(self, state: TeleoperationState, targets: Targets | None, ends: Ends) -> Intent:
         motion: Motion = "hold"
         if state.mode == "execute" or (state.mode == "follow" and state.following is not None):
             motion = "execute" if state.mode == "execute" else "follow"

@@ -39,13 +39,13 @@ def corrected(chain: Chain, first: Bent, tip: Vector, gravity: Vector) -> Bent |
         better = polish(chain, target, lengths[None], lever=LEVER)
         return _rest(chain, better.commands if better.converged[0] else first.commands[None], pull)
 
-    foreseen, found = np.linalg.norm(first.tip - tip), sent(first.lengths)
-    if found is not None and np.linalg.norm(found.tip - tip) <= foreseen + SURPRISE:
-        return found
+    foreseen, improved = np.linalg.norm(first.tip - tip), sent(first.lengths)
+    if improved is not None and np.linalg.norm(improved.tip - tip) <= foreseen + SURPRISE:
+        return improved
     # cables of lengths that do not belong together may hold another shape than motors with those commands do
-    held = _rest(chain, first.commands[None], pull)
-    again = [one for one in (found, held and sent(held.lengths), held) if one is not None]
-    return min(again, key=lambda one: float(np.linalg.norm(one.tip - tip)), default=None)
+    at_rest = _rest(chain, first.commands[None], pull)
+    again = [bent for bent in (improved, at_rest and sent(at_rest.lengths), at_rest) if bent is not None]
+    return min(again, key=lambda bent: float(np.linalg.norm(bent.tip - tip)), default=None)
 
 
 def _rest(chain: Chain, commands: np.ndarray, pull: np.ndarray) -> Bent | None:

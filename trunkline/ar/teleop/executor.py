@@ -8,7 +8,7 @@ import numpy as np
 from trunkline.ar.teleop.following import Follower, Following
 from trunkline.ar.teleop.messages import ExecutorReport
 from trunkline.ar.teleop.plan import Plan
-from trunkline.ar.teleop.trajectory import JOINTS, Limits
+from trunkline.ar.teleop.trajectory import JOINTS, MotionLimits
 from trunkline.errors import InputError
 from trunkline.kinematics.panda.kinematics import within_limits
 
@@ -50,7 +50,7 @@ class SimulatedRobot:
         self,
         joints: np.ndarray,
         commands: np.ndarray,
-        limits: Limits,
+        limits: MotionLimits,
         package: str,
         move: Callable[[np.ndarray, np.ndarray, float], None] | None = None,
     ) -> None:
@@ -136,9 +136,9 @@ class SimulatedRobot:
         try:
             self.joints, self.commands = follower.tick(self._time)
         except InputError as error:
-            self._fault, given_up = str(error), self._braking
+            self._fault, no_profile = str(error), self._braking
             self.stop()
-            if given_up:  # it finds no way to brake either
+            if no_profile:  # it finds no way to brake either
                 follower.rests = True
         if follower.refused:
             self._fault, self._braking = self._fault or follower.refused, True

@@ -21,7 +21,7 @@ from trunkline.ar.teleop.messages import Targets, World
 from trunkline.ar.teleop.obstacles import refuse
 from trunkline.ar.teleop.plan import Plan
 from trunkline.ar.teleop.planner import Planner
-from trunkline.ar.teleop.trajectory import JOINTS, Limits
+from trunkline.ar.teleop.trajectory import JOINTS, MotionLimits
 from trunkline.errors import InputError
 from trunkline.kinematics.panda.collision import clearance
 
@@ -64,7 +64,7 @@ class Follower:
     """
 
     def __init__(
-        self, limits: Limits, following: Following, joints: np.ndarray, commands: np.ndarray, dt: float
+        self, limits: MotionLimits, following: Following, joints: np.ndarray, commands: np.ndarray, dt: float
     ) -> None:
         here = np.append(joints, commands)
         self._mount_offset, self._dt, self._delay = following.mount_offset, dt, following.delay
@@ -109,18 +109,18 @@ class Follower:
             InputError: Ruckig finds no way; the robot is to be stopped.
         """
         if not self._braking:
-            here, next_one = self._way(now), self._way(now + self._dt)
-            velocity = np.clip((next_one - here) / self._dt, -self._velocity, self._velocity)
-            self._now.target_position, self._now.target_velocity = next_one.tolist(), velocity.tolist()
+            here, ahead = self._way(now), self._way(now + self._dt)
+            velocity = np.clip((ahead - here) / self._dt, -self._velocity, self._velocity)
+            self._now.target_position, self._now.target_velocity = ahead.tolist(), velocity.tolist()
         result = self._update()
         if not self._braking and self._touches():
             self.refused = "self-collision: the robot would touch itself as it follows"
             self.brake()
             result = self._update()
-        found = np.array(self._next.new_position)
+        position = np.array(self._next.new_position)
         self._next.pass_to_input(self._now)
         self.rests = self._braking and result == ruckig.Result.Finished
-        return found[:JOINTS], found[JOINTS:]
+        return position[:JOINTS], position[JOINTS:]
 
     def _update(self) -> ruckig.Result:
         result = self._ruckig.update(self._now, self._next)
@@ -130,10 +130,10 @@ class Follower:
 
     def _touches(self) -> bool:
         """Whether the robot would touch itself where it brakes from the next tick on."""
-        given, way = _to_rest(ruckig.InputParameter(len(self.goal)), self._now), ruckig.Trajectory(len(self.goal))
-        given.current_position, given.current_velocity = self._next.new_position, self._next.new_velocity
-        given.current_acceleration = self._next.new_acceleration
-        if ruckig.Ruckig(len(self.goal)).calculate(given, way) < 0:
+        brake, way = _to_rest(ruckig.InputParameter(len(self.goal)), self._now), ruckig.Trajectory(len(self.goal))
+        brake.current_position, brake.current_velocity = self._next.new_position, self._next.new_velocity
+        brake.current_acceleration = self._next.new_acceleration
+        if ruckig.Ruckig(len(self.goal)).calculate(brake, way) < 0:
             return True
         places = [way.at_time(share * way.duration)[0][:JOINTS] for share in LOOKS]
         return bool(clearance(np.array(places), self._mount_offset).min() <= 0)
@@ -147,11 +147,11 @@ class Follower:
         return np.array([np.interp(at, self._times, axis).mean() for axis in goals.T])
 
 
-def _to_rest(given: ruckig.InputParameter, limits: ruckig.InputParameter) -> ruckig.InputParameter:
-    """`given`, which asks for rest wherever that is, as soon as `limits` allow."""
-    given.control_interface, given.minimum_duration = ruckig.ControlInterface.Velocity, None
-    given.max_velocity, given.max_acceleration, given.max_jerk = (
+def _to_rest(parameters: ruckig.InputParameter, limits: ruckig.InputParameter) -> ruckig.InputParameter:
+    """`parameters`, which asks for rest wherever that is, as soon as `limits` allow."""
+    parameters.control_interface, parameters.minimum_duration = ruckig.ControlInterface.Velocity, None
+    parameters.max_velocity, parameters.max_acceleration, parameters.max_jerk = (
         limits.max_velocity, limits.max_acceleration, limits.max_jerk,
     )  # fmt: skip
-    given.target_velocity = given.target_acceleration = [0.0] * given.degrees_of_freedom
-    return given
+    parameters.target_velocity = parameters.target_acceleration = [0.0] * parameters.degrees_of_freedom
+    return parameters

@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from trunkline.ar.hybrid.grasp_poses import Grip, Placement
+from trunkline.ar.hybrid.grasp_poses import GraspPose, Grip
 from trunkline.ar.hybrid.objects import Shape
 from trunkline.ar.teleop.alignment import base_quaternion
 from trunkline.ar.teleop.messages import Targets, Thing, World
@@ -123,7 +123,7 @@ class Grasping:
             Leg("lift", at(sunk, placement.mount + h.lift * UP), closed, seconds=up / h.carry, gentle=True),
         ]
 
-    def placement(self, targets: Targets, thing: Thing) -> Placement:
+    def placement(self, targets: Targets, thing: Thing) -> GraspPose:
         """Of the user's own targets."""
         centre = np.array(grip_of(thing))
         rotation = rotation_from_wxyz(np.array(base_quaternion(targets.pointing, targets.heading))).as_matrix()
@@ -168,7 +168,8 @@ def _require_ground(thing: Thing, place: Vector, world: World, most: float) -> N
     box = beneath((x, y, z), world)
     gap = np.inf if box is None else z - box.high[2]
     if gap > most:
-        found = "nothing" if box is None else f"{1e3 * gap:.0f} mm"
+        gap_text = "nothing" if box is None else f"{1e3 * gap:.0f} mm"
         raise InputError(
-            f"release: found {found} between {thing.name} and what is beneath it, expected at most {1e3 * most:.0f} mm"
+            f"release: found {gap_text} between {thing.name} and what is beneath it, "
+            f"expected at most {1e3 * most:.0f} mm"
         )

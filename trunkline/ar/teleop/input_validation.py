@@ -22,13 +22,15 @@ def fault_of(controller: Controller) -> str:
     return ""
 
 
-def clock_fault(last: float | None, given: Input, dt: float) -> str:
+def clock_fault(last: float | None, message: Input, dt: float) -> str:
     """Why time cannot be trusted, "" where it can."""
     if not math.isfinite(dt) or dt <= 0:
         return f"step of {dt:g} s: expected a positive time; holding"
-    if not math.isfinite(given.stamp):
+    if not math.isfinite(message.stamp):
         return "stamp is not a number; holding"
-    return f"clock went back by {last - given.stamp:.3g} s; holding" if last is not None and given.stamp < last else ""
+    return (
+        f"clock went back by {last - message.stamp:.3g} s; holding" if last is not None and message.stamp < last else ""
+    )
 
 
 def silence_fault(last: float | None, stamp: float, silent: float, safety: Safety) -> str:
@@ -37,24 +39,24 @@ def silence_fault(last: float | None, stamp: float, silent: float, safety: Safet
     return f"client silent for {gap:.2f} s; holding" if gap > safety.silence else ""
 
 
-def setting_fault(given: Input, package: str) -> str:
+def setting_fault(message: Input, package: str) -> str:
     """Why the robot, its base or the package cannot be trusted."""
-    if given.package != package:
-        return f"package: found digest {given.package[:12] or 'none'}, expected {package[:12]}; holding"
-    if given.alignment is None:
+    if message.package != package:
+        return f"package: found digest {message.package[:12] or 'none'}, expected {package[:12]}; holding"
+    if message.alignment is None:
         return "base is not aligned; holding"
-    if not _sound(given.alignment):
+    if not _sound(message.alignment):
         return "base alignment is not a pose; holding"
-    if not _finite(given.joints):
+    if not _finite(message.joints):
         return "robot's joints are not numbers; holding"
     return ""
 
 
-def swapped(left: Hand, right: Hand, given: Input, within: float) -> bool:
+def swapped(left: Hand, right: Hand, message: Input, within: float) -> bool:
     """Whether each controller appears where the other was: at most `within` m from there, and further from its own."""
-    if left.seen is None or right.seen is None:
+    if left.controller is None or right.controller is None:
         return False
-    a, b, c, d = left.seen.position, right.seen.position, given.left.position, given.right.position
+    a, b, c, d = left.controller.position, right.controller.position, message.left.position, message.right.position
     across, along = max(distance(c, b), distance(d, a)), min(distance(c, a), distance(d, b))
     return across <= within and along > 2 * within
 

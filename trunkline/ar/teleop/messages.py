@@ -97,7 +97,7 @@ class World:
         return next(thing for thing in self.things if thing.name == name)
 
     @property
-    def held(self) -> Thing | None:
+    def held_object(self) -> Thing | None:
         """What the arm holds."""
         return next((thing for thing in self.things if thing.support == "held"), None)
 

@@ -5,8 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-PHASES = ("approach", "curl", "lift", "transfer", "release")
-
 
 @dataclass(frozen=True)
 class Plan:
@@ -36,8 +34,8 @@ class Plan:
 
     def digest(self) -> str:
         """SHA-256 of everything in it, in hexadecimal digits: another bit, another digest."""
-        found = hashlib.sha256()
+        digest = hashlib.sha256()
         for rows in (self.joints, self.commands):
-            found.update(repr(rows.shape).encode() + np.ascontiguousarray(rows, dtype="<f8").tobytes())
-        found.update(repr((self.step, self.phases, self.package, self.world)).encode())
-        return found.hexdigest()
+            digest.update(repr(rows.shape).encode() + np.ascontiguousarray(rows, dtype="<f8").tobytes())
+        digest.update(repr((self.step, self.phases, self.package, self.world)).encode())
+        return digest.hexdigest()

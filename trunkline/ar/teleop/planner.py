@@ -13,7 +13,7 @@ from trunkline.ar.teleop.plan import Plan
 from trunkline.ar.teleop.rigid_ik import RigidIK
 from trunkline.ar.teleop.shaping import Shaper, shaped
 from trunkline.ar.teleop.tendons import Network, bend
-from trunkline.ar.teleop.trajectory import JOINTS, Limits, gentle, point_to_point
+from trunkline.ar.teleop.trajectory import JOINTS, MotionLimits, gentle, point_to_point
 from trunkline.ar.teleop.vectors import DOWN, Vector, add, conjugate, rotate, subtract
 from trunkline.errors import InputError
 from trunkline.model.statics.chain import Chain
@@ -32,7 +32,7 @@ class Planner:
     rigid: RigidIK
     network: Network
     straight: np.ndarray
-    limits: Limits
+    limits: MotionLimits
     mount_offset: float
     tolerance: float = 0.02
     step: float = 0.002
@@ -65,9 +65,9 @@ class Planner:
                 phases.append((leg.phase, sum(map(len, rows)) - 1))
             rows.append(np.concatenate([way[1:], np.tile(end, (round(leg.calm / self.step), 1))]))
         every = np.concatenate(rows)
-        found = Plan(self.step, every[:, :JOINTS], every[:, JOINTS:], tuple(phases), request.package, request.world)
-        refuse(found, world, self.mount_offset, self.chain)
-        return found
+        plan = Plan(self.step, every[:, :JOINTS], every[:, JOINTS:], tuple(phases), request.package, request.world)
+        refuse(plan, world, self.mount_offset, self.chain)
+        return plan
 
     def _legs(
         self, targets: Targets, world: World, joints: np.ndarray, commands: np.ndarray, beside: float

@@ -79,8 +79,8 @@ class MapReach:
         return self._soft.read(tip, gravity)
 
 
-def _require(name: str, given: Vector) -> None:
+def _require(name: str, point: Vector) -> None:
     """Raises InputError where it is no place."""
-    x, y, z = given
+    x, y, z = point
     if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
         raise InputError(f"{name}: found ({x:g}, {y:g}, {z:g}), expected finite numbers")

@@ -18,18 +18,18 @@ LONGEST = 3.0  # s in which a mode must come
 
 
 class Recorder:
-    """Drives a core step by step, `dt` s each, from its start with `given`; each call of `step` may change what the
+    """Drives a core step by step, `dt` s each, from its start with `message`; each call of `step` may change what the
     operator does and what is reported. What the core heard and wanted is in `steps`, with the time given to it, s."""
 
-    def __init__(self, core: Teleoperation, given: Input, dt: float) -> None:
+    def __init__(self, core: Teleoperation, message: Input, dt: float) -> None:
         self.core, self.state, self.dt = core, core.start(), dt
-        self.given = self._begin = given
-        self._stamp = given.stamp
+        self.message = self._begin = message
+        self._stamp = message.stamp
         self.steps: list[tuple[float, Input, Intent]] = []
 
     @property
     def inputs(self) -> list[Input]:
-        return [given for _, given, _ in self.steps]
+        return [message for _, message, _ in self.steps]
 
     @property
     def intents(self) -> list[Intent]:
@@ -37,14 +37,14 @@ class Recorder:
 
     def step(self, seconds: float | None = None, dt: float | None = None, left=None, right=None, **changes) -> Intent:
         """One step: the stamp goes on by `seconds`; `left` and `right` are changes of the controllers."""
-        given = replace(self.given, stamp=self.given.stamp + (self.dt if seconds is None else seconds), **changes)
-        self.given = replace(
-            given, left=replace(given.left, **(left or {})), right=replace(given.right, **(right or {}))
+        message = replace(self.message, stamp=self.message.stamp + (self.dt if seconds is None else seconds), **changes)
+        self.message = replace(
+            message, left=replace(message.left, **(left or {})), right=replace(message.right, **(right or {}))
         )
-        self._stamp = given.stamp if math.isfinite(given.stamp) else self._stamp
-        told = self.dt if dt is None else dt
-        self.state, intent = self.core.step(self.state, self.given, told)
-        self.steps.append((told, self.given, intent))
+        self._stamp = message.stamp if math.isfinite(message.stamp) else self._stamp
+        step_dt = self.dt if dt is None else dt
+        self.state, intent = self.core.step(self.state, self.message, step_dt)
+        self.steps.append((step_dt, self.message, intent))
         return intent
 
     def wait(self, duration: float, **changes) -> Intent:
@@ -96,7 +96,7 @@ class Recorder:
 
     def recover(self) -> Intent:
         """Put all right that went wrong, let everything go, and aim again; its first intent."""
-        self.given = replace(self._begin, stamp=self._stamp)
+        self.message = replace(self._begin, stamp=self._stamp)
         self.step()
         if self.state.mode == "stopped":
             self.step(right={"primary": True})
@@ -104,7 +104,7 @@ class Recorder:
 
     def cause(self, event: Event) -> Intent:
         """Make `event` happen, whatever the mode; the intent once it has."""
-        given, mode = self.given, self.state.mode
+        message, mode = self.message, self.state.mode
         if event == "stop":
             return self.step(left={"secondary": True})
         if event == "fault":
@@ -112,7 +112,7 @@ class Recorder:
         if event == "lost":
             return self.step(alignment=None)
         if event == "void":
-            return self.step(world=replace(given.world, digest="another"))
+            return self.step(world=replace(message.world, digest="another"))
         if event == "released":
             return self.step(left={"grip": False}, right={"grip": False})
         if event == "refused":
@@ -145,11 +145,11 @@ class Recorder:
         return self.step(left={"stick_pressed": True})
 
     def _answer(self) -> PlanReport:
-        return PlanReport(self.state.serial, PLAN, "", self.given.package, self.given.world.digest)
+        return PlanReport(self.state.serial, PLAN, "", self.message.package, self.message.world.digest)
 
 
 def _swap(recorder: Recorder) -> Intent:
-    left, right = recorder.given.left, recorder.given.right
+    left, right = recorder.message.left, recorder.message.right
     return recorder.step(left={"position": right.position}, right={"position": left.position})
 
 

@@ -58,11 +58,11 @@ class RigidIK:
             configuration.integrate_inplace(velocity, RATE)
         else:
             self._refuse(configuration.q, error)
-        found = configuration.q.copy()
-        gap = float(clearance(found[None], self._offset)[0])
+        q = configuration.q.copy()
+        gap = float(clearance(q[None], self._offset)[0])
         if gap <= 0:
             raise InputError(f"self-collision: the robot would touch itself at the target, by {-1e3 * gap:.0f} mm")
-        return found
+        return q
 
     def _refuse(self, q: np.ndarray, error: np.ndarray) -> None:
         at = [i + 1 for i in range(7) if q[i] <= Q_MIN[i] + NEAR or q[i] >= Q_MAX[i] - NEAR]

@@ -14,7 +14,7 @@ Degrees = Annotated[float, Field(ge=0.0, le=180.0)]
 
 
 @dataclass(frozen=True)
-class Rays:
+class RaySettings:
     """Length of the rays, m, and its `rate` at full deflection, m/s; `dead_zone` of the stick, share of its way."""
 
     start: Metres
@@ -87,7 +87,7 @@ class Teleop:
     a thing's centre within which the tip target marks it."""
 
     rigid_hand: Literal["left", "right"]
-    rays: Rays
+    rays: RaySettings
     orientation: Orientation
     bending_plane: BendingPlane
     position_filter: OneEuro

@@ -50,13 +50,13 @@ def mode_shaper(period: float, damping: float, kind: Kind) -> Shaper:
 
 def shaper_of(periods: np.ndarray, dampings: np.ndarray, kind: Kind) -> Shaper:
     """For several modes, (n,) each."""
-    found = Shaper(np.zeros(1), np.ones(1))
+    shaper = Shaper(np.zeros(1), np.ones(1))
     for period, damping in zip(periods, dampings, strict=True):
-        one = mode_shaper(period, damping, kind)
-        times = np.add.outer(found.times, one.times).ravel()
+        mode = mode_shaper(period, damping, kind)
+        times = np.add.outer(shaper.times, mode.times).ravel()
         order = np.argsort(times, kind="stable")
-        found = Shaper(times[order], np.multiply.outer(found.shares, one.shares).ravel()[order])
-    return found
+        shaper = Shaper(times[order], np.multiply.outer(shaper.shares, mode.shares).ravel()[order])
+    return shaper
 
 
 def shaped(rows: np.ndarray, step: float, shaper: Shaper) -> np.ndarray:
@@ -66,12 +66,12 @@ def shaped(rows: np.ndarray, step: float, shaper: Shaper) -> np.ndarray:
     """
     more = int(np.ceil(shaper.delay / step))
     time = step * np.arange(len(rows) + more)
-    own = step * np.arange(len(rows))
-    found = np.zeros((len(time), rows.shape[1]))
+    row_time = step * np.arange(len(rows))
+    result = np.zeros((len(time), rows.shape[1]))
     for at, share in zip(shaper.times, shaper.shares, strict=True):
         for column in range(rows.shape[1]):
-            found[:, column] += share * np.interp(time - at, own, rows[:, column])
-    return found
+            result[:, column] += share * np.interp(time - at, row_time, rows[:, column])
+    return result
 
 
 def residual(shaper: Shaper, period: float, damping: float) -> float:

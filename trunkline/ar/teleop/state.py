@@ -18,7 +18,7 @@ class Pinned:
 
 
 @dataclass(frozen=True)
-class State:
+class TeleoperationState:
     """All that the core remembers from step to step.
 
     `silent`: s without a new stamp. `sound_for`: s for which all was sound and nothing pressed. `waited`: s in this
@@ -64,10 +64,10 @@ class State:
     @property
     def idle(self) -> bool:
         """Whether all grips and triggers are let go."""
-        return not any("grip" in hand.held or "trigger" in hand.held for hand in self.hands)
+        return not any("grip" in hand.buttons or "trigger" in hand.buttons for hand in self.hands)
 
     def before(self, seconds: float) -> Targets | None:
         """The targets of so many `seconds` ago; None where there are none as old."""
         if self.stamp is None:
             return None
-        return next((found for stamp, found in reversed(self.history) if stamp <= self.stamp - seconds), None)
+        return next((targets for stamp, targets in reversed(self.history) if stamp <= self.stamp - seconds), None)

@@ -29,11 +29,11 @@ class SheetReach:
         """
         count = len(points)
         if np.ndim(points) != 4 or (np.shape(downs), np.shape(matrix)) != ((count, 3), (count, count + 4)):
-            shapes = ", ".join(str(np.shape(one)) for one in (points, downs, matrix))
+            shapes = ", ".join(str(np.shape(array)) for array in (points, downs, matrix))
             raise InputError(f"sheets: found points, directions and matrix of {shapes}, expected (D, R, S, 3), (D, 3) "
                              "and (D, D + 4)")  # fmt: skip
         self._points = np.ascontiguousarray(np.reshape(points, (count, -1)), dtype=np.float32)
-        self._downs, self._matrix = (np.ascontiguousarray(one, dtype=np.float64) for one in (downs, matrix))
+        self._downs, self._matrix = (np.ascontiguousarray(array, dtype=np.float64) for array in (downs, matrix))
         self._triangles = sheet_triangles(*np.shape(points)[1:3])
         self._tolerance = tolerance
         self._lowest = float(-self._downs[:, 2].max()) - ROUNDING
@@ -44,8 +44,8 @@ class SheetReach:
         """As `reach.Reach.soft`."""
         if -gravity[2] < self._lowest:
             return Reading("unknown")
-        kept, sheet = self._last
-        if gravity != kept:  # gravity mostly stands still; what is kept is what would be computed again
+        last_gravity, sheet = self._last
+        if gravity != last_gravity:  # gravity mostly stands still; what is kept is what would be computed again
             sheet = self._sheet(gravity)
             self._last = gravity, sheet
         squared, x, y, z = _nearest(sheet, self._triangles, *tip)

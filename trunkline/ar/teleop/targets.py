@@ -44,13 +44,13 @@ def place(
     aligned = align(tip, rigid, pointing, wrist, last, settings.bending_plane)
     turn = base_quaternion(pointing, aligned.heading)
     back = conjugate(turn)
-    found = Reading("unknown")
+    reading = Reading("unknown")
     if thing is None:
-        found = reach.soft(rotate(back, subtract(tip, rigid)), rotate(back, DOWN))
-    offer = None if found.offer is None else add(rigid, rotate(turn, found.offer))
+        reading = reach.soft(rotate(back, subtract(tip, rigid)), rotate(back, DOWN))
+    offer = None if reading.offer is None else add(rigid, rotate(turn, reading.offer))
     return Targets(
         _target(rigid, reach.rigid(rigid, pointing), world),
-        _target(tip, found._replace(offer=offer), world),
+        _target(tip, reading._replace(offer=offer), world),
         pointing,
         aligned.heading,
         aligned.half_plane,
@@ -61,7 +61,7 @@ def place(
 
 
 def bring(
-    held: Thing,
+    thing: Thing,
     rigid: Vector,
     pointing: Vector,
     limited: bool,
@@ -75,7 +75,7 @@ def bring(
     heading = carried_heading(rigid, wrist)
     there = base_quaternion(pointing, heading)
     here = base_quaternion(wrist.pointing, wrist.heading)
-    beside = rotate(conjugate(here), subtract(grip_of(held), wrist.position))
+    beside = rotate(conjugate(here), subtract(grip_of(thing), wrist.position))
     tip = add(rigid, rotate(there, beside))
     return Targets(
         _target(rigid, reach.rigid(rigid, pointing), world),
@@ -85,7 +85,7 @@ def bring(
         half_plane,
         0.0,
         limited,
-        held.name,
+        thing.name,
     )
 
 
@@ -126,8 +126,8 @@ def _turned(a: Vector, b: Vector, angle: float) -> Vector:
     if length < 1e-12:  # opposite: any way is as short
         axis, length = (1.0, 0.0, 0.0), 1.0
     side = cross(scale(axis, 1 / length), a)
-    found = add(scale(a, math.cos(angle)), scale(side, math.sin(angle)))
-    return scale(found, 1 / norm(found))
+    result = add(scale(a, math.cos(angle)), scale(side, math.sin(angle)))
+    return scale(result, 1 / norm(result))
 
 
 def why_not(targets: Targets | None) -> str:

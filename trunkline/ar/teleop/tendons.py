@@ -52,24 +52,24 @@ def bend(network: Network, tip: Vector, gravity: Vector, tolerance: float, chain
     Raises:
         InputError: no bend comes so near, or a network of one tilt is asked about gravity out of its plane.
     """
-    found = _at_tilt(network, tip, gravity) if network.inputs == len(TILT) else _asked(network, tip, gravity)
+    bent = _at_tilt(network, tip, gravity) if network.inputs == len(TILT) else _best_bend(network, tip, gravity)
     if chain is not None:
-        better = corrected(chain, found, tip, gravity)
+        better = corrected(chain, bent, tip, gravity)
         if better is None:
             raise InputError("out of reach: the soft arm finds no rest under the commands for its target")
-        found = better
-    missed = float(np.linalg.norm(found.tip - tip))
+        bent = better
+    missed = float(np.linalg.norm(bent.tip - tip))
     if missed > tolerance:
         raise InputError(f"out of reach: the soft arm's tip comes no nearer to its target than {1e3 * missed:.0f} mm")
-    return found
+    return bent
 
 
-def _asked(network: Network, tip: Vector, told: tuple[float, ...]) -> Bent:
-    """The answer that is foreseen nearest to `tip`, gravity being `told` as the network takes it."""
+def _best_bend(network: Network, tip: Vector, gravity_inputs: tuple[float, ...]) -> Bent:
+    """The answer that is foreseen nearest to `tip`, gravity being `gravity_inputs` as the network takes it."""
     plane = math.atan2(tip[1], tip[0])
     axis = [-math.sin(plane), math.cos(plane), 0.0]
-    poses = np.empty((len(BENDS), len(told) + 7))
-    poses[:, : len(told)], poses[:, -7:-4] = told, tip
+    poses = np.empty((len(BENDS), len(gravity_inputs) + 7))
+    poses[:, : len(gravity_inputs)], poses[:, -7:-4] = gravity_inputs, tip
     poses[:, -4], poses[:, -3:] = np.cos(BENDS / 2), np.outer(np.sin(BENDS / 2), axis)
     answer = network.ask(poses)
     best = int(np.argmin(np.linalg.norm(answer["tip"] - np.array(tip), axis=1)))
@@ -88,8 +88,8 @@ def _at_tilt(network: Network, tip: Vector, gravity: Vector) -> Bent:
             raise InputError(f"gravity: comes {math.degrees(off):.0f}° beside a tendon's plane, which the package does "
                              "not know")  # fmt: skip
     cos, sin = math.cos(turns * SYMMETRY), math.sin(turns * SYMMETRY)
-    found = _asked(network, (cos * tip[0] + sin * tip[1], -sin * tip[0] + cos * tip[1], tip[2]), (angle,))
-    x, y, z = found.tip
+    bent = _best_bend(network, (cos * tip[0] + sin * tip[1], -sin * tip[0] + cos * tip[1], tip[2]), (angle,))
+    x, y, z = bent.tip
     # A tendon that stands where another one did does what that one did.
-    commands, lengths = np.roll(found.commands, turns), np.roll(found.lengths, turns)
+    commands, lengths = np.roll(bent.commands, turns), np.roll(bent.lengths, turns)
     return Bent(commands, lengths, np.array([cos * x - sin * y, sin * x + cos * y, z]))

@@ -52,8 +52,8 @@ class TiltReach:
             (below, down), (above, up) = low.slope(point), high.slope(point)
             return below + share * (above - below), add(scale(down, 1 - share), scale(up, share))
 
-        found = read(signal, self._points[upper - 1], _about_z(tip, -turn))
-        return found if found.offer is None else found._replace(offer=_about_z(found.offer, turn))
+        reading = read(signal, self._points[upper - 1], _about_z(tip, -turn))
+        return reading if reading.offer is None else reading._replace(offer=_about_z(reading.offer, turn))
 
 
 def _about_z(point: Vector, angle: float) -> Vector:

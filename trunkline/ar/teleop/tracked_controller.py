@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 from trunkline.ar.teleop.messages import Controller, Pose, Vector
 from trunkline.ar.teleop.one_euro import Smoothed, smooth
-from trunkline.ar.teleop.settings import Rays, Teleop
+from trunkline.ar.teleop.settings import RaySettings, Teleop
 from trunkline.ar.teleop.vectors import Quaternion, add, multiply, rotate, scale
 
 AHEAD = (0.0, 0.0, -1.0)  # of a controller's pose: along its ray
@@ -16,38 +16,45 @@ BUTTONS = ("trigger", "grip", "stick_pressed", "primary", "secondary")
 class Hand:
     """What a hand was at the step before.
 
-    `seen`: its controller as last heard, tracked and finite. `lost_for`: s since then. `length`: of the ray, m.
+    `controller`: its controller as last heard, tracked and finite. `lost_for`: s since then. `length`: of the ray, m.
     `target`: where it stays, base frame, m; None until a grip has set it. `gripped_at`: end of the ray when the grip
-    was pressed, of a press since a plan was asked for. `pressed`: buttons that went down at this step. `held`: the
+    was pressed, of a press since a plan was asked for. `pressed`: buttons that went down at this step. `buttons`: the
     buttons that are down.
     """
 
     length: float
-    seen: Controller | None = None
+    controller: Controller | None = None
     pose: Smoothed | None = None
     lost_for: float = 0.0
     target: Vector | None = None
     gripped_at: Vector | None = None
-    held: tuple[str, ...] = ()
+    buttons: tuple[str, ...] = ()
     pressed: tuple[str, ...] = ()
 
     @property
     def grips(self) -> bool:
-        return "grip" in self.held
+        return "grip" in self.buttons
 
 
-def hear(hand: Hand, given: Controller, sample: float, settings: Teleop) -> Hand:
-    """The hand after a sound `given`, `sample` s after the one before.
+def hear(hand: Hand, controller: Controller, sample: float, settings: Teleop) -> Hand:
+    """The hand after a sound `controller`, `sample` s after the one before.
 
     Buttons held when a controller appears are not presses: a press is what was seen to go down.
     """
     pose = smooth(
-        hand.pose, given.position, given.quaternion, sample, settings.position_filter, settings.orientation_filter
+        hand.pose,
+        controller.position,
+        controller.quaternion,
+        sample,
+        settings.position_filter,
+        settings.orientation_filter,
     )
-    held = tuple(name for name in BUTTONS if getattr(given, name))
-    pressed = () if hand.seen is None else tuple(name for name in held if name not in hand.held)
-    length = ray_length(hand.length, given.stick[1], sample, settings.rays)
-    return replace(hand, seen=given, pose=pose, lost_for=0.0, length=length, held=held, pressed=pressed)
+    buttons = tuple(name for name in BUTTONS if getattr(controller, name))
+    pressed = () if hand.controller is None else tuple(name for name in buttons if name not in hand.buttons)
+    length = ray_length(hand.length, controller.stick[1], sample, settings.rays)
+    return replace(
+        hand, controller=controller, pose=pose, lost_for=0.0, length=length, buttons=buttons, pressed=pressed
+    )
 
 
 def missed(hand: Hand, dt: float, grace: float) -> Hand:
@@ -55,10 +62,10 @@ def missed(hand: Hand, dt: float, grace: float) -> Hand:
     lost = hand.lost_for + dt
     if lost <= grace:
         return replace(hand, lost_for=lost, pressed=())
-    return replace(hand, lost_for=lost, pressed=(), held=(), seen=None, pose=None, gripped_at=None)
+    return replace(hand, lost_for=lost, pressed=(), buttons=(), controller=None, pose=None, gripped_at=None)
 
 
-def ray_length(length: float, stick: float, dt: float, rays: Rays) -> float:
+def ray_length(length: float, stick: float, dt: float, rays: RaySettings) -> float:
     """The length, m, after `dt` s of the stick's deflection, -1 (in) to 1 (out); it ends at both limits."""
     if abs(stick) <= rays.dead_zone:
         return length

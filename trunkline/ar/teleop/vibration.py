@@ -29,7 +29,7 @@ ALIKE = 0.05  # share by which periods differ that one shaper suits: ZVD leaves 
 HEAVY = 0.2  # damping ratio from which on a swing dies within a period
 
 
-class Swings(NamedTuple):
+class VibrationModes(NamedTuple):
     """Of n swings, the one that moves the tip most first: `periods` (n,), s, damped; `dampings` (n,), ratios; `sizes`
     (n,), m, by which the tip swings after the step of command. `tip` (3,): where it rests in the base frame, m."""
 
@@ -39,9 +39,9 @@ class Swings(NamedTuple):
     tip: np.ndarray
 
 
-def swings(
+def vibration_modes(
     model: mujoco.MjModel, command: np.ndarray, step: np.ndarray | None, gravity: np.ndarray, tip_site: str = "tip"
-) -> Swings:
+) -> VibrationModes:
     """Of the arm at rest under `command` (nu,), m.
 
     Args:
@@ -58,24 +58,24 @@ def swings(
     give_way(model, pose)
     data.qpos[:] = pose
     inputs = data.act if model.na else data.ctrl
-    held = model.actuator_actadr >= 0 if model.na else np.ones(model.nu, dtype=bool)
-    inputs[:] = command[held]
+    with_state = model.actuator_actadr >= 0 if model.na else np.ones(model.nu, dtype=bool)
+    inputs[:] = command[with_state]
     data.ctrl[:] = command
     count = model.nv
 
     def slopes(values: np.ndarray) -> np.ndarray:
         """∂v̇/∂values, (nv, len(values)); `values` is a field of `data`."""
-        found = np.empty((count, len(values)))
+        slope = np.empty((count, len(values)))
         for index, here in enumerate(values.copy()):
             for sign in (1, -1):
                 values[index] = here + sign * STEP
                 mujoco.mj_forward(model, data)
-                found[:, index] = data.qacc if sign == 1 else (found[:, index] - data.qacc) / (2 * STEP)
+                slope[:, index] = data.qacc if sign == 1 else (slope[:, index] - data.qacc) / (2 * STEP)
             values[index] = here
-        return found
+        return slope
 
     a = np.block([[np.zeros((count, count)), np.eye(count)], [slopes(data.qpos), slopes(data.qvel)]])
-    push = slopes(model.opt.gravity) if step is None else (slopes(inputs) @ step[held])[:, None]
+    push = slopes(model.opt.gravity) if step is None else (slopes(inputs) @ step[with_state])[:, None]
     mujoco.mj_forward(model, data)
     site, jacobian = model.site(tip_site).id, np.zeros((3, count))
     mujoco.mj_jacSite(model, data, jacobian, None, site)
@@ -87,20 +87,20 @@ def swings(
     chosen = np.flatnonzero(pace > STILL)
     chosen = chosen[np.argsort(-sizes[chosen], kind="stable")]
     dampings = fall[chosen] / np.hypot(fall[chosen], pace[chosen])
-    return Swings(2 * np.pi / pace[chosen], dampings, sizes[chosen], rest.position[0])
+    return VibrationModes(2 * np.pi / pace[chosen], dampings, sizes[chosen], rest.position[0])
 
 
-def slowest(found: Swings, count: int) -> Swings:
+def slowest(modes: VibrationModes, count: int) -> VibrationModes:
     """The `count` slowest of those that move the tip by at least SHARE of what the largest does, slowest first. Of
     swings that are ALIKE, as those of a straight arm in two directions, one stands for all: a shaper ends them
     together."""
     chosen: list[int] = []
-    for index in np.argsort(-found.periods, kind="stable"):
-        matters = found.sizes[index] >= SHARE * found.sizes.max() and found.dampings[index] < HEAVY
-        if matters and all(found.periods[index] < (1 - ALIKE) * found.periods[other] for other in chosen):
+    for index in np.argsort(-modes.periods, kind="stable"):
+        matters = modes.sizes[index] >= SHARE * modes.sizes.max() and modes.dampings[index] < HEAVY
+        if matters and all(modes.periods[index] < (1 - ALIKE) * modes.periods[other] for other in chosen):
             chosen.append(int(index))
     able = chosen[:count]
-    return Swings(found.periods[able], found.dampings[able], found.sizes[able], found.tip)
+    return VibrationModes(modes.periods[able], modes.dampings[able], modes.sizes[able], modes.tip)
 
 
 def shaper_for(model: mujoco.MjModel, settings: Shaping) -> ShaperOf:
@@ -110,7 +110,7 @@ def shaper_for(model: mujoco.MjModel, settings: Shaping) -> ShaperOf:
         if settings.kind == "none":
             return Shaper(np.zeros(1), np.ones(1))
         step = change if np.abs(change).max() > 0 else None
-        found = slowest(swings(model, command, step, STANDARD_GRAVITY * gravity), settings.modes)
-        return shaper_of(found.periods, found.dampings, settings.kind)
+        modes = slowest(vibration_modes(model, command, step, STANDARD_GRAVITY * gravity), settings.modes)
+        return shaper_of(modes.periods, modes.dampings, settings.kind)
 
     return shaper

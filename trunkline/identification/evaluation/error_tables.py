@@ -20,6 +20,18 @@ LABELS = {
     "noise_floor": "noise floor",
     "prompt": "identified, winches that wind as they are told",
 }
+REFERENCES = ("cad", "null", "null_straight", "null_held", "noise_floor")  # all that a model stands beside
+TABLED = ("identified", "cad", "null", "noise_floor")  # where four columns have to do
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """A cell of a table for people: so many digits that count, a dash for what there is not."""
+    return "–" if value is None or pd.isna(value) else f"{value:.{digits}g}"
+
+
+def pair(position: float | None, tip: float | None) -> str:
+    """Position and tip error as a cell."""
+    return "–" if position is None else f"{number(position)} / {number(tip)}"
 
 
 def trial_table(predictions: dict[str, Prediction]) -> pd.DataFrame:

@@ -138,7 +138,9 @@ def _few(experiments: list[Experiment], count: int) -> list[Experiment]:
 
 def _search(problem: Problem, optimizer: Optimizer, seed: int, label: str) -> Found:
     with progress(optimizer.steps(), label, "iterations") as bar:
-        return search(problem, optimizer, seed, lambda best: bar.update(1, best_loss=best, **problem.effort()))
+        return search(
+            problem, optimizer, seed, lambda best: bar.update(1, best_loss=best, **problem.effort()), bar.expect
+        )
 
 
 def _polish(problem: Problem, rough: Found, polish: Polish, label: str) -> Found:

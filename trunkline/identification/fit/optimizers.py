@@ -22,6 +22,7 @@ class LeastSquares:
     method: Literal["least_squares"] = "least_squares"
 
     def steps(self) -> int:
+        """Iterations of all descents together, about; a search says when there are more or fewer."""
         return self.descents * self.iterations
 
 
@@ -40,6 +41,7 @@ class DifferentialEvolution:
     method: Literal["differential_evolution"] = "differential_evolution"
 
     def steps(self) -> int:
+        """Generations, at most; a search says when there are fewer, and what comes after them."""
         return self.generations
 
 

@@ -19,6 +19,7 @@ CANDIDATES = 12  # drawn beside what differential evolution found, for the other
 ITERATIONS, TOLERANCE = 25, 1e-3  # of least squares after differential evolution
 AGREEING = 1.05  # times the least loss
 Report = Callable[[float], None]  # called with the best loss after each generation or iteration
+Expect = Callable[[int], None]  # called with how many more of those there will be than expected so far, or fewer
 
 
 @dataclass
@@ -49,17 +50,28 @@ class Found:
     starts: int = 0
 
 
-def search(problem: Problem, optimizer: Optimizer, seed: int, report: Report) -> Found:
-    """The minimum within bounds, from the problem's own start or with it among the first candidates."""
+def _not_shown(_: int) -> None:
+    """Where nobody counts."""
+
+
+def search(
+    problem: Problem, optimizer: Optimizer, seed: int, report: Report, expect: Expect = _not_shown
+) -> Found:
+    """The minimum within bounds, from the problem's own start or with it among the first candidates.
+
+    Args:
+        expect: told where there are more or fewer iterations than `optimizer.steps()`.
+    """
     rng = np.random.default_rng(seed)
     if isinstance(optimizer, DifferentialEvolution):
         evolved = _evolve(problem, optimizer, rng, report)
+        expect(len(evolved.convergence.best) - optimizer.steps())
         if not problem.parameters:
             return evolved
         drawn = _latin_hypercube(rng, CANDIDATES, *problem.bounds())
         ranks = np.argsort(problem.losses(drawn, rough=True), kind="stable")
         candidates = np.concatenate([evolved.vector[None], drawn[ranks]])
-        found = _several(problem, _apart(problem, candidates, STARTS), ITERATIONS, TOLERANCE, report)
+        found = _several(problem, _apart(problem, candidates, STARTS), ITERATIONS, TOLERANCE, report, expect)
         return replace(found, convergence=evolved.convergence, converged=evolved.converged and found.agreeing > 1)
     candidates, count = problem.start()[None], 1
     if optimizer.starts:  # else it goes on from what is known
@@ -68,7 +80,8 @@ def search(problem: Problem, optimizer: Optimizer, seed: int, report: Report) ->
         candidates = candidates[np.argsort(problem.losses(candidates, rough=True), kind="stable")]
         count = max(optimizer.descents, STARTS) if problem.parameters else optimizer.descents
     starts = _apart(problem, candidates, count)
-    found = _several(problem, starts, optimizer.iterations, optimizer.tolerance, report)
+    expect(-optimizer.steps())
+    found = _several(problem, starts, optimizer.iterations, optimizer.tolerance, report, expect)
     if count == 1:
         return replace(found, agreeing=0, starts=0)
     return replace(found, converged=found.converged and found.agreeing > 1)
@@ -86,7 +99,12 @@ def _apart(problem: Problem, candidates: np.ndarray, count: int) -> list[np.ndar
 
 
 def _several(
-    problem: Problem, starts: list[np.ndarray], iterations: int, tolerance: float, report: Report
+    problem: Problem,
+    starts: list[np.ndarray],
+    iterations: int,
+    tolerance: float,
+    report: Report,
+    expect: Expect = _not_shown,
 ) -> Found:
     """The best end of least squares from several starts, the best of them first, and how many of them end as well.
 
@@ -94,7 +112,11 @@ def _several(
     agree with it: at least two ends, its own included, as good as the best. What counts is where each start leads once
     it has left the plateaus on its way: on one, a start would end beside the minimum that it might have found.
     """
-    ends = [_ends(problem, start, iterations, tolerance, report, index > 0) for index, start in enumerate(starts)]
+    expect(len(starts) * iterations)
+    ends = []
+    for index, start in enumerate(starts):
+        expect(-iterations)  # `_ends` expects them itself
+        ends.append(_ends(problem, start, iterations, tolerance, report, index > 0, expect))
     losses = [min(end.loss for end in each) for each in ends]
     every = sorted((end for each in ends for end in each), key=lambda end: end.loss)
     agreeing = sum(loss <= AGREEING * every[0].loss for loss in losses)
@@ -103,7 +125,13 @@ def _several(
 
 
 def _ends(
-    problem: Problem, start: np.ndarray, iterations: int, tolerance: float, report: Report, hasty: bool
+    problem: Problem,
+    start: np.ndarray,
+    iterations: int,
+    tolerance: float,
+    report: Report,
+    hasty: bool,
+    expect: Expect = _not_shown,
 ) -> list[Found]:
     """Where least squares ends from `start`, and from where parameters begin to matter that do not matter there.
 
@@ -113,7 +141,16 @@ def _ends(
     Args:
         hasty: leave a plateau at once, not from its own minimum, unless nothing better is found outside.
     """
-    ends = [descend(problem, start, iterations, tolerance, report, hasty)]
+
+    def descent(start: np.ndarray, hasty: bool = False) -> Found:
+        """Its limit of iterations is expected while it lasts, what it took once it has ended."""
+        expect(iterations)
+        reported = []
+        end = descend(problem, start, iterations, tolerance, lambda best: reported.append(report(best)), hasty)
+        expect(len(reported) - iterations)
+        return end
+
+    ends = [descent(start, hasty)]
     if not problem.parameters:
         return ends
     (low, high), found = problem.bounds(), ends[0]
@@ -125,9 +162,9 @@ def _ends(
         matters = np.abs(losses - found.loss) > PLATEAU_LEVEL * found.loss
         if matters.any():
             edge = scan[np.argmin(np.where(matters, losses, np.inf))]
-            ends.append(descend(problem, edge, iterations, tolerance, report))
+            ends.append(descent(edge))
     if hasty and len(plateaus) and min(ends, key=lambda end: end.loss) is found:
-        ends[0] = descend(problem, found.vector, iterations, tolerance, report)
+        ends[0] = descent(found.vector)
     return ends
 
 

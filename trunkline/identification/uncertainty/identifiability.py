@@ -1,9 +1,9 @@
-"""How well each stage's parameters will be told, before any fit: the residuals to first order, around the CAD model.
+"""How identifiable each stage's parameters are, before any fit: the residuals to first order, around the CAD model.
 
 With a model that is off by a share s of each point's distance from the base, the same way throughout a trial, T trials
 count as `NUMBERS` T independent numbers, and the covariance of the estimate is s² (JᵀJ)⁻¹ / (NUMBERS T), J the
 Jacobian of the loss' residuals, whose squares sum to a mean over trials. That is a guess of the size, good for what is
-left open; after a fit, the jackknife of `identification.certainty` says it from what is left of the trials.
+left open; after a fit, the jackknife of `identification.certainty` estimates it from the residuals of the trials.
 """
 
 from dataclasses import dataclass
@@ -23,15 +23,15 @@ from trunkline.recordings.trials.experiments import EXPERIMENTS, is_static
 from trunkline.recordings.trials.splits import IDENTIFY
 from trunkline.recordings.trials.trial import Trial
 
-NUMBERS = 3  # that a trial tells
+NUMBERS = 3  # independent numbers that a trial counts as
 FRAMES = 180  # of a moving trial that are looked at
 TWO_SIDED = 1.96
 ALIKE = 0.95  # correlation of two estimates, from which on trials tell hardly more than one of them
 
 
 @dataclass
-class Told:
-    """How well a parameter will be told.
+class Identifiability:
+    """How identifiable a parameter is.
 
     half_width: of its expected 95 % interval, where it is searched: of its logarithm, or over the scale of a signed
         one; infinite if it shows in no trial. share: that over half of its range; 1 leaves it open.
@@ -52,10 +52,10 @@ class Told:
         return f"{self.name} to within a factor of {np.exp(self.half_width):.2f}"
 
 
-def told_by(
+def expected_identifiability(
     model: mujoco.MjModel, experiments: list[Experiment], fit: Fit, share: float
-) -> tuple[list[Told], list[str]]:
-    """What a stage's trials tell of its parameters, and which two they hardly tell apart, a few words a pair.
+) -> tuple[list[Identifiability], list[str]]:
+    """How identifiable a stage's parameters are from its trials, and which pairs are nearly confounded, in words.
 
     Args:
         model, experiments, fit: as `to_identify_from` gives them.
@@ -69,14 +69,15 @@ def told_by(
     half = TWO_SIDED * share / np.sqrt(NUMBERS * len(experiments)) * np.where(scale > 0, spread * scale, np.inf)
     low, high = problem.bounds()
     names = list(fit.parameters)
-    told = [Told(name, *row) for name, *row in zip(names, half, half / (0.5 * (high - low)), strict=True)]
+    shares = half / (0.5 * (high - low))
+    parameters = [Identifiability(name, *row) for name, *row in zip(names, half, shares, strict=True)]
     alike = inverse / np.maximum(np.outer(spread, spread), 1e-300)
     pairs = [
         f"{names[i]} and {names[j]} {'rise together' if alike[i, j] > 0 else 'trade off'}"
         for i, j in zip(*np.triu_indices(len(names), 1), strict=True)
         if abs(alike[i, j]) > ALIKE
     ]
-    return told, pairs
+    return parameters, pairs
 
 
 def described_lines(model: mujoco.MjModel, experiments: list[Experiment], fit: Fit) -> list[str]:
@@ -86,14 +87,14 @@ def described_lines(model: mujoco.MjModel, experiments: list[Experiment], fit: F
     A released arm swings about its straight shape, and the described one with a guess of damping: that a straight arm
     is nearer to a release does not mean that anything is described wrongly.
     """
-    found = replay(model, experiments, fit.segments)
-    described, plain = (Prediction(one, experiments) for one in (found, straight(experiments, found)))
+    replayed = replay(model, experiments, fit.segments)
+    described, plain = (Prediction(simulated, experiments) for simulated in (replayed, straight(experiments, replayed)))
     off, still = described.overall(), plain.overall()
-    told = f"as described, it is {off['e_position_mm']:.3g} mm off ({off['e_position_pct']:.2g} % of length)"
-    lines = [f"{told}, a straight arm {still['e_position_mm']:.3g} mm"]
+    description = f"as described, it is {off['e_position_mm']:.3g} mm off ({off['e_position_pct']:.2g} % of length)"
+    lines = [f"{description}, a straight arm {still['e_position_mm']:.3g} mm"]
     bent = [e for e in experiments if _stays_bent(e)]
     if bent:
-        mine, its = (one.of(_stays_bent) for one in (described, plain))
+        mine, its = (prediction.of(_stays_bent) for prediction in (described, plain))
         if mine.overall()["e_position_mm"] >= its.overall()["e_position_mm"]:
             lines.append(f"no nearer than a straight arm: look at {_doubtful(model, bent)}")
     return lines
@@ -117,17 +118,17 @@ def to_identify_from(
 ) -> tuple[mujoco.MjModel, list[Experiment], Fit]:
     """As `set_up`, of the trials to identify from alone, which must be there; moving ones by their beginning."""
     config = with_every(config, model)
-    own = [trial for trial in trials if trial.experiment in config.experiments and trial.split == IDENTIFY]
-    model, experiments, fit = set_up(config, own, model)
+    used = [trial for trial in trials if trial.experiment in config.experiments and trial.split == IDENTIFY]
+    model, experiments, fit = set_up(config, used, model)
     return model, [e if is_static(e.kind) else e.shortened(FRAMES) for e in experiments], fit
 
 
-def untold(config: IdentificationSettings, trials: list[Trial]) -> list[str]:
+def unidentifiable(config: IdentificationSettings, trials: list[Trial]) -> list[str]:
     """Why a stage has nothing to identify from, a sentence each."""
-    found = {trial.experiment for trial in trials if trial.split == IDENTIFY}
+    kinds = {trial.experiment for trial in trials if trial.split == IDENTIFY}
     lines = []
     for kind in config.experiments:
-        if kind not in found:
+        if kind not in kinds:
             way_out = EXPERIMENTS[kind].without
             lines.append(f"no {kind} of the split identify" + (f": {way_out}" if way_out else ""))
     return lines

@@ -9,6 +9,7 @@ from mujoco.batch import Batch
 from trunkline.compute.scheduler import rough_by_warp
 from trunkline.compute.threads import thread_count
 from trunkline.model.simulation.capstan import rubbing
+from trunkline.model.simulation.divergence import CountingBatch
 
 CHUNK = 128  # steps a call: few calls, and records of some MB
 LEAST_BY_WARP = 1000  # simulations, about, below which a GPU has too little to do at once
@@ -18,7 +19,7 @@ def batch_of(model: mujoco.MjModel, count: int, rough: bool = False) -> Batch:
     """`count` simulations of a copy of `model`, on as many threads as `thread_count` says; results do not depend on it.
 
     What costs time is off: contacts where nothing can touch, and the search for islands. A simulation that diverges
-    stays so: MuJoCo would start it anew by itself.
+    stays so: MuJoCo would start it anew by itself. It is counted in `warning`, and nothing is printed.
 
     Args:
         rough: whether it may move by 32-bit floats, as candidates that are only ranked may. Then a large one does so on
@@ -37,7 +38,7 @@ def batch_of(model: mujoco.MjModel, count: int, rough: bool = False) -> Batch:
         from trunkline.model.simulation.warp_batch import WarpBatch
 
         return WarpBatch(model, count, thread_count())
-    return Batch(model, count, nthread=thread_count())
+    return CountingBatch(model, count, nthread=thread_count())
 
 
 def by_warp(count: int, rough: bool) -> bool:

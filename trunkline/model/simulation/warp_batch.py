@@ -2,7 +2,7 @@
 
 State and fields of each simulation stay in the rows of a `mujoco.batch.Batch`. A rollout takes them to Warp as 32-bit
 floats and its end back, so constants, `forward` and `step` are as exact as ever, and positions are off from MuJoCo's as
-docs/cluster.md says. `trunkline.model.simulation.motion.batch_of` chooses: nothing else imports this.
+docs/speed.md says. `trunkline.model.simulation.motion.batch_of` chooses: nothing else imports this.
 """
 
 import copy
@@ -12,10 +12,11 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from mujoco.batch import MODEL_FIELDS, Batch
+from mujoco.batch import MODEL_FIELDS
 
 from trunkline.compute.scheduler import BATCHES
 from trunkline.errors import InputError
+from trunkline.model.simulation.divergence import CountingBatch
 
 TAKEN = ("time", "qpos", "qvel", "act", "history", "qacc_warmstart", "ctrl", "plastic")  # to Warp and back
 GIVEN = ("qfrc_applied", "xfrc_applied", "eq_active", "mocap_pos", "mocap_quat")  # to Warp alone
@@ -27,7 +28,7 @@ WELD = 6  # rows of an equality, the most
 INSTALL = "pip install mujoco-warp==4.0.0 warp-lang==1.19.0"
 
 
-class WarpBatch(Batch):
+class WarpBatch(CountingBatch):
     """`count` simulations of `model`, on the GPU, or slowly on the CPU where Warp finds none.
 
     A simulation that diverges in a rollout is warned of, and stays in the state before it; its record counts for

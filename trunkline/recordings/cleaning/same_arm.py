@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from trunkline.errors import InputError
+from trunkline.files import file_digest
 from trunkline.recordings.cleaning.label_swaps import usual_distances
 from trunkline.recordings.cleaning.session_checks import Gathered
 from trunkline.recordings.session.session import Session, read_session
-from trunkline.recordings.session.shared_recordings import file_digest
 
 
 def gather_each(

@@ -1,4 +1,4 @@
-"""What logs hold, and a session.yaml for them: `python -m trunkline.recordings.preparation.inspect LOG…`
+"""What logs hold, and a session.yaml for them: `trunkline inspect LOG…`
 
 Prints of each log its topics with their rates, its bodies with how often they are seen, and the gaps; then a
 session.yaml in which you have to check each trial's experiment, level and split. Writes nothing.
@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 from trunkline.errors import InputError, in_one_line
-from trunkline.program import called
+from trunkline.program import program_name
 from trunkline.recordings.preparation.proposal import propose
 from trunkline.recordings.preparation.survey import describe, survey
 
@@ -17,7 +17,7 @@ from trunkline.recordings.preparation.survey import describe, survey
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.recordings.preparation.inspect"), description=__doc__,
+        prog=program_name("inspect"), description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
     parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help="an MCAP log, or a folder of them")

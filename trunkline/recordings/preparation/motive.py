@@ -1,4 +1,4 @@
-"""OptiTrack Motive's CSV export as MCAP logs: `python -m trunkline.recordings.preparation.motive --session
+"""OptiTrack Motive's CSV export as MCAP logs: `trunkline import-motive --session
 data/raw/NAME CSV…`
 
 Up is +y. Rigid bodies become `mocap4r2_msgs/msg/RigidBodies`, and where an export has none, its markers become
@@ -6,7 +6,6 @@ Up is +y. Rigid bodies become `mocap4r2_msgs/msg/RigidBodies`, and where an expo
 """
 
 import argparse
-import os
 import sys
 from pathlib import Path
 
@@ -14,7 +13,8 @@ import numpy as np
 from mcap_ros2.writer import Writer
 
 from trunkline.errors import in_one_line
-from trunkline.program import called
+from trunkline.files import written_whole
+from trunkline.program import program_name
 from trunkline.recordings.logs.definitions import MARKERS, RIGID_BODIES
 from trunkline.recordings.logs.pose_stream import PoseStream
 from trunkline.recordings.preparation.export import read_export
@@ -28,8 +28,7 @@ def write_log(path: Path, poses: PoseStream) -> None:
     """Write poses as an MCAP log, whole or not at all; an occluded body is missing from its frame's message."""
     assert poses.frames is not None, "an export numbers its frames"
     oriented = poses.quaternions is not None
-    part = path.with_name(f".{path.name}.part")
-    with open(part, "wb") as file, Writer(file) as writer:
+    with written_whole(path) as part, open(part, "wb") as file, Writer(file) as writer:
         name, text = ("RigidBodies", RIGID_BODIES) if oriented else ("Markers", MARKERS)
         schema = writer.register_msgdef(f"mocap4r2_msgs/msg/{name}", text)
         for index, stamp in enumerate(poses.stamps.tolist()):
@@ -41,7 +40,6 @@ def write_log(path: Path, poses: PoseStream) -> None:
                 "rigidbodies" if oriented else "markers": bodies,
             }
             writer.write_message("/rigid_bodies" if oriented else "/markers", schema, message, stamp, stamp)
-    os.replace(part, path)
 
 
 def _body(poses: PoseStream, frame: int, body: int) -> dict:
@@ -55,7 +53,7 @@ def _body(poses: PoseStream, frame: int, body: int) -> dict:
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.recordings.preparation.motive"),
+        prog=program_name("import-motive"),
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -60,7 +60,7 @@ def survey(path: Path) -> Survey:
 
 
 def _of_the_arm(log: Log) -> Log:
-    """A live session's log (docs/live_log.md) without the topics that are not the arm's; any other as it is."""
+    """A live session's log (docs/live-sessions.md) without the topics that are not the arm's; any other as it is."""
     if LIVE not in log.topics:
         return log
     return replace(log, topics={name: topic for name, topic in log.topics.items() if not OTHERS.match(name)})

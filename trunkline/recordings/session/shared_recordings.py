@@ -1,11 +1,11 @@
 """Trials that share data: one file under two names, or windows of one file that overlap."""
 
-import hashlib
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from trunkline.errors import InputError
+from trunkline.files import file_digest
 
 if TYPE_CHECKING:
     from trunkline.recordings.session.session import TrialEntry
@@ -50,9 +50,3 @@ def _contents(folder: Path, files: list[str]) -> dict[str, str]:
     sizes = {file: (folder / file).stat().st_size for file in files}
     alike = [size for size in sizes.values() if size]
     return {file: file_digest(folder / file) if alike.count(size) > 1 else file for file, size in sizes.items()}
-
-
-def file_digest(path: Path) -> str:
-    """Of its bytes, in hexadecimal."""
-    with open(path, "rb") as log:
-        return hashlib.file_digest(log, "sha256").hexdigest()

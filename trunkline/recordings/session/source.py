@@ -15,7 +15,7 @@ from trunkline.recordings.session.session import Session
 
 Stream = TypeVar("Stream")
 STATIC = "tf_static"  # how the topic's name ends
-TWIN = "tf_twin"  # the same, of poses that a model drew and nobody measured (docs/live_log.md)
+TWIN = "tf_twin"  # the same, of poses that a model drew and nobody measured (docs/live-sessions.md)
 COMMAND_WORDS, POSITION_WORDS = ("command", "cmd", "target"), ("state", "position")
 
 

@@ -13,10 +13,10 @@ import mujoco
 import numpy as np
 
 from trunkline.identification.parameters.parameters import PARAMETERS
-from trunkline.report.certificate.arms import Arm, arm_of, arms_with
+from trunkline.report.certificate.arms import StaticArm, arm_of, arms_with
 from trunkline.report.certificate.discrepancy import Discrepancy, discrepancy
 from trunkline.report.certificate.identified import Identified
-from trunkline.report.certificate.poses import Poses
+from trunkline.report.certificate.poses import StaticPoses
 
 COVERAGE = 0.95
 FRICTION, LACKING, NOISE = "friction", "what the model lacks", "cameras"
@@ -24,7 +24,7 @@ LEAST = 1e-7  # m, below which an input moves no tip
 
 
 @dataclass
-class Source:
+class UncertaintySource:
     """A line of the budget, over N poses.
 
     Attributes:
@@ -56,7 +56,7 @@ class Budget:
     """
 
     tips: np.ndarray
-    sources: list[Source]
+    sources: list[UncertaintySource]
     correlated: np.ndarray
     radius: np.ndarray
 
@@ -85,7 +85,7 @@ class Inputs:
 
 
 def held_out(
-    model: mujoco.MjModel, parameters: Identified, noise: float, poses: Poses, residuals: np.ndarray, arms: int,
+    model: mujoco.MjModel, parameters: Identified, noise: float, poses: StaticPoses, residuals: np.ndarray, arms: int,
     rng: np.random.Generator,
 ) -> Discrepancy:
     """What the model lacks, from how far the tips of held-out poses are from the twin's, m (N,), beside what `arms`
@@ -97,8 +97,9 @@ def held_out(
 
 
 def parameter_shifts(
-    model: mujoco.MjModel, parameters: Identified, arm: Arm, poses: Poses, draws: int, rng: np.random.Generator
-) -> np.ndarray:
+    model: mujoco.MjModel, parameters: Identified, arm: StaticArm, poses: StaticPoses, draws: int,
+    rng: np.random.Generator,
+) -> np.ndarray:  # fmt: skip
     """By how far the tip moves with `draws` draws of the parameters, m, NaN where an arm finds no rest. Shape
     (draws, N, 3)."""
     if not parameters.names:
@@ -108,7 +109,7 @@ def parameter_shifts(
     return moved - arm.placed(near)
 
 
-def sensitivities(model: mujoco.MjModel, parameters: Identified, arm: Arm, poses: Poses) -> np.ndarray:
+def sensitivities(model: mujoco.MjModel, parameters: Identified, arm: StaticArm, poses: StaticPoses) -> np.ndarray:
     """By how far the tip moves with a standard uncertainty of each parameter, half the way between a step up and one
     down, m. Shape (P, N, 3)."""
     count = len(parameters.names)
@@ -120,33 +121,34 @@ def sensitivities(model: mujoco.MjModel, parameters: Identified, arm: Arm, poses
     return (moved[:count] - moved[count:]) / 2
 
 
-def budget(inputs: Inputs, poses: Poses, arms: int, each: int, rng: np.random.Generator) -> Budget:
+def budget(inputs: Inputs, poses: StaticPoses, arms: int, each: int, rng: np.random.Generator) -> Budget:
     """Of the tip in `poses`, by so many draws of the parameters, `each` of them with so many of everything else."""
-    arm, known = arm_of(inputs.model), inputs.parameters
+    arm, parameters = arm_of(inputs.model), inputs.parameters
     tips = arm.tips(poses)
     friction, ways = arm.friction(poses), arm.ways(poses)
-    moves = sensitivities(inputs.model, known, arm, poses)
-    offsets = np.tile(parameter_shifts(inputs.model, known, arm, poses, arms, rng), (each, 1, 1))
+    moves = sensitivities(inputs.model, parameters, arm, poses)
+    offsets = np.tile(parameter_shifts(inputs.model, parameters, arm, poses, arms, rng), (each, 1, 1))
     draws = arms * each
     offsets = offsets + rng.uniform(-1, 1, (draws, len(poses), 1)) * friction
     offsets = offsets + inputs.noise * rng.standard_normal(offsets.shape)
     if inputs.lacking:
         offsets = offsets + lacking_draws(inputs.lacking, ways, tips - arm.origin, draws, rng)
-    told = [
-        Source(name, f"t, {degrees:.0f} degrees of freedom", deviation * PARAMETERS[name].scale, _axis_unit(name),
-               degrees, np.linalg.norm(move, axis=1))
-        for name, deviation, degrees, move in zip(known.names, known.deviation, known.degrees, moves, strict=True)
+    sources = [
+        UncertaintySource(name, f"t, {degrees:.0f} degrees of freedom", deviation * PARAMETERS[name].scale,
+                          _axis_unit(name), degrees, np.linalg.norm(move, axis=1))
+        for name, deviation, degrees, move
+        in zip(parameters.names, parameters.deviation, parameters.degrees, moves, strict=True)
     ]  # fmt: skip
-    told.append(Source(FRICTION, "rectangular, between both ends of its band", 1 / np.sqrt(3), "half bands", np.inf,
-                       np.linalg.norm(friction, axis=1) / np.sqrt(3)))  # fmt: skip
+    sources.append(UncertaintySource(FRICTION, "rectangular, between both ends of its band", 1 / np.sqrt(3),
+                                     "half bands", np.inf, np.linalg.norm(friction, axis=1) / np.sqrt(3)))  # fmt: skip
     if inputs.lacking:
         scales = inputs.lacking.rms
-        told.append(Source(LACKING, f"from {inputs.lacking.trials} held-out trials at rest", None, "mm",
+        sources.append(UncertaintySource(LACKING, f"from {inputs.lacking.trials} held-out trials at rest", None, "mm",
                            inputs.lacking.trials, np.sqrt(ways**2 @ scales**2)))  # fmt: skip
     every = np.full(len(poses), np.sqrt(3) * inputs.noise)
-    told.append(Source(NOISE, "normal, of each coordinate", inputs.noise * 1e3, "mm", np.inf, every))
-    both = np.einsum("ink,jnk,ij->n", moves, moves, known.correlation - np.eye(len(known.names)))
-    return Budget(tips, told, both, radius_of(offsets))
+    sources.append(UncertaintySource(NOISE, "normal, of each coordinate", inputs.noise * 1e3, "mm", np.inf, every))
+    both = np.einsum("ink,jnk,ij->n", moves, moves, parameters.correlation - np.eye(len(parameters.names)))
+    return Budget(tips, sources, both, radius_of(offsets))
 
 
 def lacking_draws(

@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from trunkline.errors import InputError
+from trunkline.files import file_digest
 from trunkline.identification.evaluation.evaluation import Prediction, replay
 from trunkline.identification.results.scoring import fingerprint
 from trunkline.identification.simulate.checks import check_trials
@@ -36,7 +37,7 @@ FEWEST = 3  # held-out trials at rest, below which nothing is told of what the m
 
 
 @dataclass
-class Asked:
+class CertificateSettings:
     """See conf/report/config.yaml."""
 
     arm: str
@@ -64,8 +65,8 @@ class Certificate:
 
 
 def certify(
-    asked: Asked, model: mujoco.MjModel, trials: list[Trial], tables: dict[str, dict], metrics: dict[str, dict],
-    bring: Bring | None = None,
+    config: CertificateSettings, model: mujoco.MjModel, trials: list[Trial], tables: dict[str, dict],
+    metrics: dict[str, dict], bring: Bring | None = None,
 ) -> Certificate:  # fmt: skip
     """Of `model`, the last that the stages identified.
 
@@ -80,12 +81,12 @@ def certify(
     """
     check_trials(trials, model)
     check_fitted(tables, trials)
-    rng = np.random.default_rng(asked.seed)
+    rng = np.random.default_rng(config.seed)
     conditions, length = conditions_of(trials), arm_of(model).chain.length
-    inputs = inputs_of(model, trials, tables, metrics["ingest"], asked.arms, rng)
-    poses = draw_poses(arm_of(model).chain, conditions, asked.poses, rng)
-    found = budget(inputs, poses, asked.arms, asked.each, rng)
-    uncertainty = uncertainty_facts(found, conditions, length, asked.arms * asked.each)
+    inputs = inputs_of(model, trials, tables, metrics["ingest"], config.arms, rng)
+    poses = draw_poses(arm_of(model).chain, conditions, config.poses, rng)
+    tip_budget = budget(inputs, poses, config.arms, config.each, rng)
+    uncertainty = uncertainty_facts(tip_budget, conditions, length, config.arms * config.each)
     uncertainty["held_out_trials"] = inputs.lacking.trials if inputs.lacking else 0
     if inputs.lacking:
         uncertainty["lacking_pct"] = dict(zip(("of_what_gravity_moves", "of_what_cables_move"),
@@ -94,22 +95,22 @@ def certify(
         uncertainty["mounted_as_in"] = sessions[0]
     uncertainty["measured"] = None
     if bring:
-        drawn = draw_poses(arm_of(model).chain, conditions, asked.covered, rng)
-        stated = budget(inputs, drawn, asked.arms, asked.each, rng)
+        drawn = draw_poses(arm_of(model).chain, conditions, config.covered, rng)
+        stated = budget(inputs, drawn, config.arms, config.each, rng)
         uncertainty["measured"] = covered(arm_of(model).chain, drawn, stated, bring, rng).metrics()
     rows = error_rows({stage: metrics[stage] for stage in tables}, metrics["score"])
     limits = limits_of(conditions, [trial.load for trial in trials])
     headline = headline_of(list(tables), metrics)
     radius = uncertainty["radius_mm"]["median"]
-    prediction = replayed(model, trials, tables, asked.frames)
+    prediction = replayed(model, trials, tables, config.frames)
     facts = {
-        "arm": {"name": asked.arm, "length_m": length, "segments": len(trials[0].segments), "tendons": model.nu},
+        "arm": {"name": config.arm, "length_m": length, "segments": len(trials[0].segments), "tendons": model.nu},
         "session": {
-            "name": asked.session,
+            "name": config.session,
             "recorded": recorded_of_each(trials, DECIDING),
             "missing": missing_lines(trials),
         },
-        "verdict": verdict(*headline, asked.uses, asked.factor, radius, limits),
+        "verdict": verdict(*headline, config.uses, config.factor, radius, limits),
         "errors": rows,
         "parameters": parameter_facts(tables),
         "uncertainty": uncertainty,
@@ -124,7 +125,7 @@ def certify(
     if uncertainty["measured"]:
         numbers["coverage"] = uncertainty["measured"]
     replays = packed(prediction, model, trials[0].segments)
-    return Certificate(facts, numbers, replays, held_out_shapes(prediction), found)
+    return Certificate(facts, numbers, replays, held_out_shapes(prediction), tip_budget)
 
 
 def inputs_of(
@@ -136,23 +137,24 @@ def inputs_of(
     rested = at_rest(trials)
     tip = replay(model, [], trials[0].segments).tip
     residuals = tip_residuals(model, rested, tip)
-    told = np.isfinite(residuals)
+    usable = np.isfinite(residuals)
     lacking = None
-    if told.sum() >= FEWEST:
-        lacking = held_out(model, parameters, noise, posed(rested, model)[told], residuals[told], arms, rng)
+    if usable.sum() >= FEWEST:
+        lacking = held_out(model, parameters, noise, posed(rested, model)[usable], residuals[usable], arms, rng)
     return Inputs(model, parameters, lacking, noise)
 
 
 def check_fitted(tables: dict[str, dict], trials: list[Trial]) -> None:
     """Refuse a model that was fitted to trials of another session."""
-    known = {trial.name: fingerprint(trial) for trial in trials}
+    digest_of = {trial.name: fingerprint(trial) for trial in trials}
     for stage, table in tables.items():
         for name, digest in table["fitted_to"].items():
-            if known.get(name) != digest:
-                found = f"trial {name} with digest {known[name]}" if name in known else f"no trial {name}"
+            if digest_of.get(name) != digest:
+                here = digest_of.get(name)
+                actual = f"no trial {name}" if here is None else f"trial {name} with digest {here}"
                 raise InputError(
-                    f"artifacts/{stage}/parameters.json: fitted to trial {name} with digest {digest}, found {found} in "
-                    "data/processed/filter, expected the session that the model was fitted to: run `dvc repro`"
+                    f"artifacts/{stage}/parameters.json: fitted to trial {name} with digest {digest}, found {actual} "
+                    "in data/processed/filter, expected the session that the model was fitted to: run `dvc repro`"
                 )
 
 
@@ -162,8 +164,8 @@ def headline_of(stages: list[str], metrics: dict[str, dict]) -> tuple[str, dict,
     for stage in reversed(stages):
         for split, errors in metrics["score"].get(stage, {}).get("identified", {}).items():
             return f"On trials that decided nothing ({split})", errors, metrics["score"][stage]["null"][split]
-    own = metrics[stages[-1]]
-    return f"On trials that no fit has seen ({VALIDATE})", own["identified"][VALIDATE], own["null"][VALIDATE]
+    last = metrics[stages[-1]]
+    return f"On trials that no fit has seen ({VALIDATE})", last["identified"][VALIDATE], last["null"][VALIDATE]
 
 
 def replayed(model: mujoco.MjModel, trials: list[Trial], tables: dict[str, dict], frames: int) -> Prediction:
@@ -183,8 +185,8 @@ def held_out_shapes(prediction: Prediction) -> list[tuple[str, np.ndarray, np.nd
         if experiment.split == VALIDATE:
             away = np.linalg.norm(positions[:, order[-1]] - prediction.replay.straight[order[-1]], axis=-1)
             frame = int(np.nanargmax(away))
-            seen = np.where(experiment.measured[frame][:, None], experiment.positions[frame], np.nan)
-            whole = [np.concatenate([np.zeros((1, 3)), points[order]]) for points in (seen, positions[frame])]
+            measured = np.where(experiment.measured[frame][:, None], experiment.positions[frame], np.nan)
+            whole = [np.concatenate([np.zeros((1, 3)), points[order]]) for points in (measured, positions[frame])]
             rows.append((float(away[frame]), (experiment.name, *whole)))
     return [row for _, row in sorted(rows, key=lambda row: -row[0])]
 
@@ -193,9 +195,9 @@ def data_facts(ingested: dict, filtered: dict) -> dict:
     """What the first two stages say of the logs."""
     keys = ("trials", "refused", "coverage", "dropped_frames", "gaps", "longest_gap_ms", "rate_hz", "position_noise_mm",
             "orientation_noise_deg", "clock_uncertainty_ms", "warnings")  # fmt: skip
-    found = {key: ingested[key] for key in keys if ingested.get(key) is not None}
-    found["repairs"] = ingested["repairs"]["total"]
-    return found | {key: filtered[key] for key in ("gap_share", "filled_share") if key in filtered}
+    facts = {key: ingested[key] for key in keys if ingested.get(key) is not None}
+    facts["repairs"] = ingested["repairs"]["total"]
+    return facts | {key: filtered[key] for key in ("gap_share", "filled_share") if key in filtered}
 
 
 def digest_of_trials(trials: list[Trial]) -> str:
@@ -205,7 +207,7 @@ def digest_of_trials(trials: list[Trial]) -> str:
 
 def digests(files: list[Path]) -> dict[str, str]:
     """SHA-256 of files, by their paths."""
-    return {path.as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+    return {path.as_posix(): file_digest(path) for path in files}
 
 
 def digest_of_code(root: Path, parts: list[str]) -> str:

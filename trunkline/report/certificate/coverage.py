@@ -13,7 +13,7 @@ from scipy.stats import binomtest
 
 from trunkline.model.statics.chain import Chain
 from trunkline.report.certificate.budget import COVERAGE, Budget
-from trunkline.report.certificate.poses import Poses
+from trunkline.report.certificate.poses import StaticPoses
 
 # m of pull (N, K), gravity in the base frame, m/s² (N, 3), and whether from beyond (N,), to tips at rest (N, 3), m
 Bring = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
@@ -34,8 +34,8 @@ class Coverage:
 
 def share_of(inside: np.ndarray) -> dict:
     """The share of `inside` (N,), N at least 1, that is true, and Wilson's interval of 95 %."""
-    found = binomtest(int(inside.sum()), len(inside)).proportion_ci(0.95, "wilson")
-    return {"share": float(np.mean(inside)), "low": found.low, "high": found.high, "poses": len(inside)}
+    interval = binomtest(int(inside.sum()), len(inside)).proportion_ci(0.95, "wilson")
+    return {"share": float(np.mean(inside)), "low": interval.low, "high": interval.high, "poses": len(inside)}
 
 
 def from_beyond(pulled: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -46,7 +46,7 @@ def from_beyond(pulled: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return back
 
 
-def pulls_of(chain: Chain, poses: Poses) -> np.ndarray:
+def pulls_of(chain: Chain, poses: StaticPoses) -> np.ndarray:
     """What each motor draws in beyond the straight arm's path, m, less than 0 where it is slack. Shape (N, K)."""
     return chain.straight_lengths - poses.commands
 
@@ -57,7 +57,7 @@ def is_inside(tips: np.ndarray, stated: Budget) -> np.ndarray:
     return np.isfinite(stated.radius) & (off <= stated.radius)
 
 
-def covered(chain: Chain, poses: Poses, stated: Budget, bring: Bring, rng: np.random.Generator) -> Coverage:
+def covered(chain: Chain, poses: StaticPoses, stated: Budget, bring: Bring, rng: np.random.Generator) -> Coverage:
     """What comes of it when the arm is brought to `poses`, for which `stated` is the budget."""
     pulls = pulls_of(chain, poses)
     pulled = np.max(pulls, axis=1, initial=0.0) > 0

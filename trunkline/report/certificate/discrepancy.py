@@ -52,8 +52,8 @@ def discrepancy(residuals: np.ndarray, ways: np.ndarray, variances: np.ndarray) 
         variances: of the other sources, m². Shape (N,).
     """
     scales = np.geomspace(SMALLEST, LARGEST, STEPS)
-    own = (scales[:, None] * ways[:, 0]) ** 2, (scales[:, None] * ways[:, 1]) ** 2
-    total = own[0][:, None] + own[1][None] + np.maximum(variances, 1e-12)
+    squares = (scales[:, None] * ways[:, 0]) ** 2, (scales[:, None] * ways[:, 1]) ** 2
+    total = squares[0][:, None] + squares[1][None] + np.maximum(variances, 1e-12)
     log = -(np.log(total) + residuals**2 / total).sum(axis=2)
     likelihood = np.exp(log - log.max())  # with that prior, as the scales are evenly spaced in their logarithm
     return Discrepancy(scales, likelihood / likelihood.sum(), len(residuals))

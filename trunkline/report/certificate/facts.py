@@ -19,17 +19,17 @@ def error_rows(stages: dict[str, dict], scored: dict[str, dict]) -> list[dict]:
             `score`, by the same names, with the other one.
     """
     rows = []
-    for stage, own in stages.items():
-        for metrics in (own, scored.get(stage, {})):
+    for stage, deciding in stages.items():
+        for metrics in (deciding, scored.get(stage, {})):
             for split in metrics.get("identified", {}):
                 whole = {name: metrics[name][split] for name in SHOWN if split in metrics.get(name, {})}
                 kinds = [None, *whole["identified"]["by_experiment"]]
                 for kind in kinds if len(kinds) > 2 else kinds[1:]:
-                    found = {name: one if kind is None else one["by_experiment"].get(kind, {})
-                             for name, one in whole.items()}  # fmt: skip
-                    errors = {LABELS[name]: {key: one[key] for key in ERRORS if key in one}
-                              for name, one in found.items() if "e_position_mm" in one}  # fmt: skip
-                    trials = found["identified"]["trials"]
+                    by_model = {name: scores if kind is None else scores["by_experiment"].get(kind, {})
+                             for name, scores in whole.items()}  # fmt: skip
+                    errors = {LABELS[name]: {key: scores[key] for key in ERRORS if key in scores}
+                              for name, scores in by_model.items() if "e_position_mm" in scores}  # fmt: skip
+                    trials = by_model["identified"]["trials"]
                     rows.append({"stage": stage, "split": split, "kind": kind, "trials": trials, "errors": errors})
     return rows
 
@@ -37,36 +37,36 @@ def error_rows(stages: dict[str, dict], scored: dict[str, dict]) -> list[dict]:
 def parameter_facts(tables: dict[str, dict]) -> dict[str, dict]:
     """By stage: values with their intervals, of several sessions also what all but the first have for themselves; what
     trades off, what is told least, and what is open."""
-    found = {}
+    facts = {}
     for stage, table in tables.items():
         rows = {
-            key: {name: _told(name, row) for name, row in table[key].items()}
+            key: {name: _parameter_fact(name, row) for name, row in table[key].items()}
             for key in ("parameters", "per_session")
             if key in table
         }
-        found[stage] = rows | {
+        facts[stage] = rows | {
             "trials": len(table["fitted_to"]),
             "weakest_direction": table["weakest_direction"],
             "hardly_told_apart": strong_pairs(table),
             "correlation": table["correlation"],
             "open": open_lines(table),
         }
-    return found
+    return facts
 
 
-def _told(name: str, row: dict) -> dict:
+def _parameter_fact(name: str, row: dict) -> dict:
     keys = ("value", "unit", "interval_95_given_model", "range", "at_bound", "undetermined")
     return {key: row[key] for key in keys} | {"words": certainty_words(name, row), "told_by": telling(name)}
 
 
-def uncertainty_facts(found: Budget, conditions: Conditions, length: float, draws: int) -> dict:
+def uncertainty_facts(budget: Budget, conditions: Conditions, length: float, draws: int) -> dict:
     """The budget over its poses: of each line the root mean square of its contributions, mm."""
-    known = np.isfinite(found.radius)
-    radius = found.radius[known] * 1e3
+    finite = np.isfinite(budget.radius)
+    radius = budget.radius[finite] * 1e3
     lines = []
-    still = [source.name for source in found.sources if source.contributions.max(initial=0) < LEAST]
-    for source in (source for source in found.sources if source.name not in still):
-        share = _rms(source.contributions[known]) * 1e3
+    still = [source.name for source in budget.sources if source.contributions.max(initial=0) < LEAST]
+    for source in (source for source in budget.sources if source.name not in still):
+        share = _rms(source.contributions[finite]) * 1e3
         spread = source.uncertainty
         lines.append(
             {
@@ -78,12 +78,12 @@ def uncertainty_facts(found: Budget, conditions: Conditions, length: float, draw
                 "contribution_mm": share,
             }
         )
-    combined = _rms(found.combined[known]) * 1e3
-    correlated = float(np.mean(found.correlated[known])) * 1e6
+    combined = _rms(budget.combined[finite]) * 1e3
+    correlated = float(np.mean(budget.correlated[finite])) * 1e6
     return {
         "coverage": COVERAGE,
-        "poses": len(found.radius),
-        "without_rest": int((~known).sum()),
+        "poses": len(budget.radius),
+        "without_rest": int((~finite).sum()),
         "draws": draws,
         "conditions": vars(conditions),
         "radius_mm": {"median": np.median(radius), "p95": np.quantile(radius, 0.95), "max": radius.max()},

@@ -14,8 +14,8 @@ from trunkline.report.certificate.poses import posed
 
 def at_rest(trials: list[Trial]) -> list[Trial]:
     """Of `trials` those held out, at rest, without a load, that were seen."""
-    own = [t for t in trials if t.split == VALIDATE and is_static(t.experiment) and not t.load]
-    return [t for t in own if t.measured[-1].any()]
+    rested = [t for t in trials if t.split == VALIDATE and is_static(t.experiment) and not t.load]
+    return [t for t in rested if t.measured[-1].any()]
 
 
 def tip_residuals(model: mujoco.MjModel, trials: list[Trial], tip: int) -> np.ndarray:
@@ -23,10 +23,11 @@ def tip_residuals(model: mujoco.MjModel, trials: list[Trial], tip: int) -> np.nd
     Shape (N,)."""
     lengths = np.full(len(trials), np.nan)
     for session in sessions_of(trials):
-        own, places = model_in(session, model), [i for i, trial in enumerate(trials) if trial.session == session]
-        found = arm_of(own).rest(posed([trials[i] for i in places], own))
-        for i, qpos, rested in zip(places, found.qpos, found.converged, strict=True):
+        session_model = model_in(session, model)
+        places = [i for i, trial in enumerate(trials) if trial.session == session]
+        equilibria = arm_of(session_model).rest(posed([trials[i] for i in places], session_model))
+        for i, qpos, rested in zip(places, equilibria.qpos, equilibria.converged, strict=True):
             if rested and trials[i].measured[-1, tip]:
-                place = segment_positions(own, trials[i].segments, qpos)[tip]
+                place = segment_positions(session_model, trials[i].segments, qpos)[tip]
                 lengths[i] = np.linalg.norm(place - trials[i].positions[-1, tip])
     return lengths

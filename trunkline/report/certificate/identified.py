@@ -28,8 +28,8 @@ class Identified:
 
     def values(self, z: np.ndarray) -> dict[str, np.ndarray]:
         """By name, from z of shape (D, P), no further out than the range."""
-        kept = np.clip(z, self.low, self.high)
-        return {name: PARAMETERS[name].value(kept[:, i]) for i, name in enumerate(self.names)}
+        clipped = np.clip(z, self.low, self.high)
+        return {name: PARAMETERS[name].value(clipped[:, i]) for i, name in enumerate(self.names)}
 
     def draw(self, count: int, rng: np.random.Generator) -> np.ndarray:
         """Of the multivariate t distribution (JCGM 101, 6.4.9; JCGM 102, 5.3.2), shape (count, P). Its scale matrix is
@@ -38,8 +38,8 @@ class Identified:
         root = vectors * np.sqrt(np.maximum(values, 0))
         normal = rng.standard_normal((count, len(self.names))) @ root.T
         for stage, degrees in dict(zip(self.stages, self.degrees, strict=True)).items():
-            own = [i for i, other in enumerate(self.stages) if other == stage]
-            normal[:, own] *= np.sqrt(degrees / rng.chisquare(degrees, (count, 1)))
+            members = [i for i, other in enumerate(self.stages) if other == stage]
+            normal[:, members] *= np.sqrt(degrees / rng.chisquare(degrees, (count, 1)))
         return self.estimate + normal * self.deviation
 
 
@@ -55,9 +55,9 @@ def identified(tables: dict[str, dict]) -> Identified:
     degrees = np.array([max(len(table["fitted_to"]) - 1, 1) for _, _, table in rows], float)
     z, half, low, high = [], [], [], []
     for name, _, table in rows:
-        found, axis = table["parameters"][name], PARAMETERS[name].coordinate
-        interval, searched = axis(found["interval_95_given_model"]), axis(found["range"])
-        z.append(float(axis(found["value"])))
+        row, axis = table["parameters"][name], PARAMETERS[name].coordinate
+        interval, searched = axis(row["interval_95_given_model"]), axis(row["range"])
+        z.append(float(axis(row["value"])))
         half.append(float(np.max(np.abs(interval - z[-1]))))  # the longer side, as the range may cut the other
         low.append(float(searched[0]))
         high.append(float(searched[1]))

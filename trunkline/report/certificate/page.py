@@ -9,12 +9,12 @@ import json
 from html import escape
 from pathlib import Path
 
-from trunkline.identification.evaluation.error_tables import LABELS
+from trunkline.identification.evaluation.error_tables import LABELS, TABLED, number
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 
 ASSETS = Path(__file__).parent / "page"
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
-BESIDE = [LABELS[name] for name in ("identified", "cad", "null", "noise_floor")]
+BESIDE = [LABELS[name] for name in TABLED]
 SPEEDS = (0.1, 0.25, 0.5, 1, 2)
 
 
@@ -28,7 +28,7 @@ def page(facts: dict, replays: dict, pictures: dict[str, bytes]) -> str:
     parts = [_first(facts), _errors(facts), _replay(pictures), _parameters(facts), _uncertainty(facts, pictures)]
     parts += [_data(facts), _versions(facts), _signature()]
     title = escape(f"Calibration certificate: {facts['arm']['name']}, session {facts['session']['name']}")
-    told = json.dumps(replays, separators=(",", ":")).replace("<", "\\u003c")
+    data = json.dumps(replays, separators=(",", ":")).replace("<", "\\u003c")
     script = (ASSETS / "viewer.js").read_text(encoding="utf-8").replace("</script", "<\\/script")
     style = (ASSETS / "page.css").read_text(encoding="utf-8")
     return (
@@ -37,7 +37,7 @@ def page(facts: dict, replays: dict, pictures: dict[str, bytes]) -> str:
         f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<title>{title}</title>\n'
         f'<link rel="icon" href="data:,">\n<style>\n{style}</style>\n</head>\n<body>\n'
         f"{''.join(parts)}"
-        f'<script type="application/json" id="replays">{told}</script>\n'
+        f'<script type="application/json" id="replays">{data}</script>\n'
         f'<script type="module">\n{script}</script>\n</body>\n</html>\n'
     )
 
@@ -74,7 +74,7 @@ def _errors(facts: dict) -> str:
 
 def _lone(facts: dict, row: dict) -> bool:
     """Whether a kind is all that a stage has in a split."""
-    same = [one for one in facts["errors"] if (one["stage"], one["split"]) == (row["stage"], row["split"])]
+    same = [other for other in facts["errors"] if (other["stage"], other["split"]) == (row["stage"], row["split"])]
     return len(same) == 1
 
 
@@ -82,12 +82,12 @@ def _error_row(row: dict, whole: bool) -> tuple[bool, list[str]]:
     kind = "all kinds" if row["kind"] is None else EXPERIMENTS[row["kind"]].plural
     cells = []
     for label in BESIDE:
-        found = row["errors"].get(label)
-        if not found:
+        errors = row["errors"].get(label)
+        if not errors:
             cells.append("–")
             continue
-        tip = f" / {found['e_tip_mm']:.3g}" if "e_tip_mm" in found else ""
-        cells.append(f"{found['e_position_mm']:.3g}{tip} ({found['e_position_pct']:.2g} %)")
+        tip = f" / {errors['e_tip_mm']:.3g}" if "e_tip_mm" in errors else ""
+        cells.append(f"{errors['e_position_mm']:.3g}{tip} ({errors['e_position_pct']:.2g} %)")
     return whole, [row["stage"], row["split"], f"{row['trials']} {kind}", *cells]
 
 
@@ -119,22 +119,22 @@ simulated.</figcaption></figure>
 
 def _parameters(facts: dict) -> str:
     parts = ["<h2>Parameters</h2>\n"]
-    for stage, told in facts["parameters"].items():
+    for stage, section in facts["parameters"].items():
         rows = []
-        for name, row in (told["parameters"] | told.get("per_session", {})).items():
+        for name, row in (section["parameters"] | section.get("per_session", {})).items():
             low, high = row["interval_95_given_model"]
             state = "on a bound" if row["at_bound"] else "undetermined" if row["undetermined"] else ""
             rows.append((False, [name, f"{row['value']:.4g}", f"{low:.4g} … {high:.4g}", row["unit"] or "–",
                                  f"{row['words']}{f'; {state}' if state else ''}"]))  # fmt: skip
-        caption = f"From {told['trials']} trials; intervals of 95 %, given the model"
+        caption = f"From {section['trials']} trials; intervals of 95 %, given the model"
         table = _table(caption, ["parameter", "value", "interval", "unit", "in words"], rows)
         parts.append(f"<h3>{stage}</h3>\n{table}")
-        sentences = [f"What the trials tell least: {told['weakest_direction']}."]
-        sentences += [f"Hardly told apart: {pair}." for pair in told["hardly_told_apart"]]
-        sentences += [f"{line}." for line in told["open"]] or ["Nothing is on a bound or undetermined."]
+        sentences = [f"What the trials tell least: {section['weakest_direction']}."]
+        sentences += [f"Hardly told apart: {pair}." for pair in section["hardly_told_apart"]]
+        sentences += [f"{line}." for line in section["open"]] or ["Nothing is on a bound or undetermined."]
         parts.append(f"<ul>{''.join(f'<li>{escape(line)}</li>' for line in sentences)}</ul>\n")
-        names = list(told["parameters"])
-        matrix = [(False, [a, *(f"{told['correlation'][a][b]:+.2f}" for b in names)]) for a in names]
+        names = list(section["parameters"])
+        matrix = [(False, [a, *(f"{section['correlation'][a][b]:+.2f}" for b in names)]) for a in names]
         table = _table("Correlations of the estimates", ["", *names], matrix)
         parts.append(f"<details>\n<summary>Correlations, {stage}</summary>\n{table}</details>\n")
     missing = facts["session"]["missing"]
@@ -145,25 +145,25 @@ def _parameters(facts: dict) -> str:
 
 
 def _uncertainty(facts: dict, pictures: dict[str, bytes]) -> str:
-    told = facts["uncertainty"]
-    radius, where = told["radius_mm"], told["conditions"]
+    uncertainty = facts["uncertainty"]
+    radius, where = uncertainty["radius_mm"], uncertainty["conditions"]
     rows = []
-    for line in told["lines"]:
-        spread = "–" if line["standard_uncertainty"] is None else f"{line['standard_uncertainty']:.3g}"
-        slope = "–" if line["sensitivity_mm"] is None else f"{line['sensitivity_mm']:.3g}"
+    for line in uncertainty["lines"]:
+        spread = number(line["standard_uncertainty"])
+        slope = number(line["sensitivity_mm"])
         rows.append((False, [line["source"], line["distribution"], spread, line["unit"] or "–", slope,
                              f"{line['contribution_mm']:.2f}"]))  # fmt: skip
-    rows.append((True, ["combined, with correlations", "", "", "", "", f"{told['combined_mm']:.2f}"]))
+    rows.append((True, ["combined, with correlations", "", "", "", "", f"{uncertainty['combined_mm']:.2f}"]))
     head = ["source", "distribution", "standard uncertainty", "unit", "sensitivity, mm a unit", "contribution, mm"]
-    caption = f"Root mean squares over {told['poses']} poses"
+    caption = f"Root mean squares over {uncertainty['poses']} poses"
     still = ""
-    if told["move_no_tip"]:
-        still = f'<p class="quiet">No tip at rest moves with {escape(", ".join(told["move_no_tip"]))}.</p>\n'
+    if uncertainty["move_no_tip"]:
+        still = f'<p class="quiet">No tip at rest moves with {escape(", ".join(uncertainty["move_no_tip"]))}.</p>\n'
     lacking = "Too few held-out trials at rest tell what the model lacks: it is not in here."
-    if count := told["held_out_trials"]:
+    if count := uncertainty["held_out_trials"]:
         lacking = f"What the model lacks, which no interval holds, is taken from the {count} held-out trials at rest."
     mounted = ""
-    if session := told.get("mounted_as_in"):
+    if session := uncertainty.get("mounted_as_in"):
         mounted = f" It is of the arm as it was mounted in the session {escape(session)}."
     pulled = (
         f"pulls of up to {1e3 * where['pull']:.0f} mm, together {1e3 * where['pulls']:.0f} mm, with the mount tilted "
@@ -172,9 +172,9 @@ def _uncertainty(facts: dict, pictures: dict[str, bytes]) -> str:
     return (
         f"<h2>Uncertainty of the tip</h2>\n<p>At rest the tip is within <strong>{radius['median']:.3g} mm</strong> of "
         f"the twin's in 95 of 100 cases in the median pose, within {radius['p95']:.3g} mm in 95 of 100 poses. That is "
-        f"the expanded uncertainty, from {told['draws']} draws of all sources through the model (JCGM 100, 101, 102). "
-        f"{lacking} It holds for what the session's trials at rest went up to: {pulled}.{mounted}</p>\n"
-        f"<p>{escape(_measured(told))}</p>\n"
+        f"the expanded uncertainty, from {uncertainty['draws']} draws of all sources through the model (JCGM 100, 101, "
+        f"102). {lacking} It holds for what the session's trials at rest went up to: {pulled}.{mounted}</p>\n"
+        f"<p>{escape(_measured(uncertainty))}</p>\n"
         f"{_table(caption, head, rows)}{still}"
         f'<figure><img src="{_png(pictures["uncertainty"])}" alt="Tips at rest over the workspace from two sides, '
         f'coloured by their expanded uncertainty, {radius["median"]:.3g} mm in the median, at most '
@@ -184,9 +184,9 @@ def _uncertainty(facts: dict, pictures: dict[str, bytes]) -> str:
     )
 
 
-def _measured(told: dict) -> str:
+def _measured(uncertainty: dict) -> str:
     """How often the arm's tip was within the radius, beside how often it is to be."""
-    stated, measured = f"{100 * told['coverage']:.0f} %", told["measured"]
+    stated, measured = f"{100 * uncertainty['coverage']:.0f} %", uncertainty["measured"]
     if measured is None:
         return f"Whether {stated} of tips are within it, the arm itself was not asked: not measured."
     parts = {"poses that no trial has": measured} | (
@@ -201,7 +201,7 @@ def _measured(told: dict) -> str:
 
 
 def _data(facts: dict) -> str:
-    told = facts["data"]
+    data = facts["data"]
     words = {
         "trials": "trials", "refused": "trials refused", "repairs": "repairs", "warnings": "warnings",
         "coverage": "share of frames that were seen", "dropped_frames": "frames dropped", "gaps": "gaps",
@@ -210,14 +210,14 @@ def _data(facts: dict) -> str:
         "position_noise_mm": "noise of positions, mm", "orientation_noise_deg": "noise of orientations, °",
         "clock_uncertainty_ms": "uncertainty of the clocks' offset, ms",
     }  # fmt: skip
-    return f"<h2>Data quality</h2>\n{_list({words[key]: f'{told[key]:.4g}' for key in words if key in told})}"
+    return f"<h2>Data quality</h2>\n{_list({words[key]: f'{data[key]:.4g}' for key in words if key in data})}"
 
 
 def _versions(facts: dict) -> str:
     files = {f"SHA-256 of {path}": digest for path, digest in facts["files"].items()}
     made = {"SHA-256 of the code": facts["code"], "digest of the trials": facts["trials"]}
-    told = facts["versions"] | made | files
-    rows = [(False, [name, found]) for name, found in told.items()]
+    digests = facts["versions"] | made | files
+    rows = [(False, [name, digest]) for name, digest in digests.items()]
     table = _table("Versions and digests", ["what", "is"], rows, "code")
     return f"<h2>How it was made</h2>\n<p>To make it again: <code>{escape(facts['command'])}</code></p>\n{table}"
 
@@ -228,7 +228,7 @@ def _signature() -> str:
 
 
 def _list(rows: dict[str, str]) -> str:
-    return f"<dl>{''.join(f'<dt>{escape(name)}</dt><dd>{escape(said)}</dd>' for name, said in rows.items())}</dl>\n"
+    return f"<dl>{''.join(f'<dt>{escape(name)}</dt><dd>{escape(text)}</dd>' for name, text in rows.items())}</dl>\n"
 
 
 def _table(caption: str, head: list[str], rows: list[tuple[bool, list[str]]], last: str = "") -> str:
@@ -252,8 +252,8 @@ def _table(caption: str, head: list[str], rows: list[tuple[bool, list[str]]], la
 
 
 def _cell(text: str, head: str, inside: str) -> str:
-    shown = f"<{inside}>{escape(text)}</{inside}>" if inside else escape(text)
-    return f"<td{_wrapped(head)}>{shown}</td>"
+    content = f"<{inside}>{escape(text)}</{inside}>" if inside else escape(text)
+    return f"<td{_wrapped(head)}>{content}</td>"
 
 
 def _wrapped(head: str) -> str:

@@ -34,7 +34,7 @@ class Conditions:
 
 
 @dataclass
-class Poses:
+class StaticPoses:
     """What N poses at rest are asked for with.
 
     gravity: m/s², base frame. Shape (N, 3). commands: path lengths to which the motors are sent, m. Shape (N, K).
@@ -46,8 +46,8 @@ class Poses:
     def __len__(self) -> int:
         return len(self.gravity)
 
-    def __getitem__(self, rows) -> "Poses":
-        return Poses(self.gravity[rows], self.commands[rows])
+    def __getitem__(self, rows) -> "StaticPoses":
+        return StaticPoses(self.gravity[rows], self.commands[rows])
 
 
 def conditions_of(trials: list[Trial]) -> Conditions:
@@ -67,23 +67,23 @@ def _pulls(trial: Trial) -> np.ndarray:
     return np.maximum(trial.commands, 0) if trial.commands.size else np.zeros((1, 0))
 
 
-def posed(trials: list[Trial], model: mujoco.MjModel) -> Poses:
+def posed(trials: list[Trial], model: mujoco.MjModel) -> StaticPoses:
     """The poses of trials at rest, the last one of each, with gravity as the mount of `model` has it."""
     order = actuators(model)
     commands = [commanded_lengths(trial, model)[-1][order] for trial in trials]
     gravity = np.array([_gravity(trial, model) for trial in trials]).reshape(-1, 3)
-    return Poses(gravity, np.array(commands).reshape(-1, model.nu))
+    return StaticPoses(gravity, np.array(commands).reshape(-1, model.nu))
 
 
 def _gravity(trial: Trial, model: mujoco.MjModel) -> np.ndarray:
     """What pulled at the arm in a trial, base frame of the session whose mount `model` has, m/s². Shape (3,)."""
-    own = model_in(trial.session, model)
-    if own is model:
+    session_model = model_in(trial.session, model)
+    if session_model is model:
         return trial.gravity
-    return base_frame(model)[1] @ base_frame(own)[1].T @ trial.gravity
+    return base_frame(model)[1] @ base_frame(session_model)[1].T @ trial.gravity
 
 
-def draw_poses(chain: Chain, conditions: Conditions, count: int, rng: np.random.Generator) -> Poses:
+def draw_poses(chain: Chain, conditions: Conditions, count: int, rng: np.random.Generator) -> StaticPoses:
     """Poses within `conditions`, everything drawn evenly.
 
     In most of them one or two neighbouring motors pull, the others are slack, and the mount is tilted as far as it was
@@ -104,4 +104,4 @@ def draw_poses(chain: Chain, conditions: Conditions, count: int, rng: np.random.
         row[order[first]] = levels[0]
         if several:
             row[order[(first + 1) % chain.tendons]] = levels[1]
-    return Poses(gravity, chain.straight_lengths - pulls)
+    return StaticPoses(gravity, chain.straight_lengths - pulls)

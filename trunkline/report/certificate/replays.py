@@ -23,8 +23,8 @@ def packed(prediction: Prediction, model: mujoco.MjModel, segments: tuple[str, .
     """
     sites = segment_sites(model, segments)
     order = np.argsort(np.linalg.norm(prediction.replay.straight, axis=1))
-    own = [model.geom_bodyid == body for body in model.site_bodyid[sites[order]]]
-    radii = [model.geom_size[shapes, 0].max(initial=THINNEST) for shapes in own]
+    site_geoms = [model.geom_bodyid == body for body in model.site_bodyid[sites[order]]]
+    radii = [model.geom_size[shapes, 0].max(initial=THINNEST) for shapes in site_geoms]
     rows, parts, offset = [], [], 0
     step = next((e.frame_step for e in prediction.experiments if e.frame_step), 1 / FASTEST)
     every = max(1, round(1 / (FASTEST * step)))

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from trunkline.identification.parameters.parameters import parameter_named
-from trunkline.identification.uncertainty.identifiability import Told
+from trunkline.identification.uncertainty.identifiability import Identifiability
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.report.certificate.poses import Conditions
 
@@ -49,16 +49,16 @@ def verdict(
 def limits_of(conditions: Conditions, loads: list[float]) -> list[str]:
     """What no trial of the session, but for those of the last score, tells anything of. loads: at their tips, kg."""
     heaviest = max(loads, default=0.0)
-    found = [f"loads above {1e3 * heaviest:.3g} g" if heaviest else "loads at the tip"]
+    limits = [f"loads above {1e3 * heaviest:.3g} g" if heaviest else "loads at the tip"]
     if conditions.pull:
-        found.append(f"pulls above {1e3 * conditions.pull:.0f} mm at rest")
+        limits.append(f"pulls above {1e3 * conditions.pull:.0f} mm at rest")
         if conditions.pulled_tilt_deg < FEW_TILTS:
-            found.append("pulls while the mount is tilted")
+            limits.append("pulls while the mount is tilted")
         else:
-            found.append(f"pulls while the mount is tilted by more than {conditions.pulled_tilt_deg:.0f}°")
+            limits.append(f"pulls while the mount is tilted by more than {conditions.pulled_tilt_deg:.0f}°")
     if conditions.tilt_deg < FEW_TILTS:
-        found.append("a tilted mount")
-    return [*found, "whatever touches the arm"]
+        limits.append("a tilted mount")
+    return [*limits, "whatever touches the arm"]
 
 
 def certainty_words(name: str, row: dict) -> str:
@@ -67,7 +67,7 @@ def certainty_words(name: str, row: dict) -> str:
     low, high = axis(row["interval_95_given_model"])
     searched = np.diff(axis(row["range"]))[0]
     half = float(high - low) / 2
-    return Told(name, half, 1.0 if row["undetermined"] else min(2 * half / searched, 0.999)).words()
+    return Identifiability(name, half, 1.0 if row["undetermined"] else min(2 * half / searched, 0.999)).words()
 
 
 def open_lines(table: dict) -> list[str]:
@@ -90,17 +90,18 @@ def _open(row: dict) -> str:
 
 def telling(name: str) -> list[str]:
     """The kinds of experiment that tell a parameter."""
-    return [kind for kind, told in EXPERIMENTS.items() if parameter_named(name).told_by(told)]
+    return [kind for kind, experiment in EXPERIMENTS.items() if parameter_named(name).told_by(experiment)]
 
 
 def strong_pairs(table: dict) -> list[str]:
     """Parameters that a stage's trials hardly tell apart, with the correlation of their estimates."""
     names, pairs = list(table["parameters"]), []
-    for i, one in enumerate(names):
+    for i, name in enumerate(names):
         for other in names[i + 1 :]:
-            found = table["correlation"][one][other]
-            if abs(found) >= STRONG:
-                pairs.append(f"{one} and {other} {'rise together' if found > 0 else 'trade off'} ({found:+.2f})")
+            correlation = table["correlation"][name][other]
+            if abs(correlation) >= STRONG:
+                trend = "rise together" if correlation > 0 else "trade off"
+                pairs.append(f"{name} and {other} {trend} ({correlation:+.2f})")
     return pairs
 
 

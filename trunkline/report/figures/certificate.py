@@ -27,11 +27,11 @@ def uncertainty_figure(tips: np.ndarray, radius: np.ndarray) -> Figure:
 def pose_figure(shapes: list[tuple[str, np.ndarray, np.ndarray]]) -> Figure:
     """Held-out trials at their widest: name, measured and simulated points from the mount on, m, each (S, 3), NaN where
     not seen. Each in the plane in which it bends most."""
-    shown = shapes[:SHAPES]
-    size = max(1.8 * len(shown), LEAST_WIDTH), 3.2
-    figure, axes = plt.subplots(1, max(len(shown), 1), figsize=size, squeeze=False, sharey=True)
+    drawn = shapes[:SHAPES]
+    size = max(1.8 * len(drawn), LEAST_WIDTH), 3.2
+    figure, axes = plt.subplots(1, max(len(drawn), 1), figsize=size, squeeze=False, sharey=True)
     widest = 0.0  # mm, half of every panel: one scale
-    for axis, (name, measured, simulated) in zip(axes[0], shown, strict=False):
+    for axis, (name, measured, simulated) in zip(axes[0], drawn, strict=False):
         side = np.linalg.svd(simulated[:, :2], full_matrices=False)[2][0]
         for points, style, color, label in (
             (measured, "o", VALIDATE, "measured"), (simulated, "-", IDENTIFIED, "simulated"),
@@ -41,9 +41,9 @@ def pose_figure(shapes: list[tuple[str, np.ndarray, np.ndarray]]) -> Figure:
         axis.set(aspect="equal", xlabel="mm")
         axis.xaxis.set_major_locator(MaxNLocator(3))
         axis.set_title(name.replace("/", "\n"), fontsize=8, fontweight="normal")
-    for axis in axes[0, : len(shown)]:
+    for axis in axes[0, : len(drawn)]:
         axis.set_xlim(np.mean(axis.get_xlim()) - widest, np.mean(axis.get_xlim()) + widest)
-    if shown:
+    if drawn:
         axes[0, 0].set_ylabel("z (mm)")
         figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure

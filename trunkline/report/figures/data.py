@@ -31,8 +31,8 @@ def quality_figure(qualities: list[Quality], gathered: Gathered) -> Figure:
     """The quality page: coverage over time, gaps, noise, rates, clock fit, repairs and refusals; panels with something
     to show. Of poses in steps, the time between them says nothing: they are counted."""
     numbered = dict(enumerate(qualities))
-    stepwise = {number: one for number, one in numbered.items() if is_stepwise(one.take.experiment)}
-    timed = {number: one for number, one in numbered.items() if number not in stepwise}
+    stepwise = {number: quality for number, quality in numbered.items() if is_stepwise(quality.take.experiment)}
+    timed = {number: quality for number, quality in numbered.items() if number not in stepwise}
     fits = [fit for q in qualities for fit in (q.findings.by_motion, q.findings.by_log_times) if fit is not None]
     panels = [_gaps, _noise, _stamps] * bool(timed)
     figure = plt.figure(figsize=(14, 13))
@@ -72,7 +72,7 @@ def _stamps(axis: Axes, qualities: dict[int, Quality]) -> None:
     """Jitter of the stamps over frame numbers; where there is none, how many frames are missing."""
     rates, dropped = zip(*[(1 / quality.interval, quality.dropped) for quality in qualities.values()], strict=True)
     frames = [quality.findings.frames for quality in qualities.values()]
-    jitters = [np.nan if found is None else 1e3 * found.jitter for found in frames]
+    jitters = [np.nan if timing is None else 1e3 * timing.jitter for timing in frames]
     uneven = np.nanmax([0, *jitters]) > LEAST_JITTER / 100
     _bars(axis, qualities, jitters if uneven else dropped, LEAST_JITTER if uneven else 1)
     axis.set_title(f"Frame stamps: {np.median(rates):.1f} Hz, {sum(dropped)} frames dropped")
@@ -107,8 +107,8 @@ def _clock(axis: Axes, qualities: list[Quality], agreed: MotorClock) -> None:
             axis.scatter(np.arange(len(fits)), offsets, s=18, facecolor=fill, edgecolor=VALIDATE, label=label)
     axis.legend()
     uncertain = "" if agreed.uncertainty is None else f" ± {1e3 * agreed.uncertainty:.1f}"
-    found = "no trial tells" if agreed.by is None else f"{1e3 * agreed.offset:.1f}{uncertain} ms, by {agreed.by}"
-    title = f"Cameras' clock − motors' clock:\n{found}"
+    offset = "no trial tells" if agreed.by is None else f"{1e3 * agreed.offset:.1f}{uncertain} ms, by {agreed.by}"
+    title = f"Cameras' clock − motors' clock:\n{offset}"
     axis.set(title=title, xlabel="trial", ylabel="offset (ms)", xlim=(-1, len(qualities)))
     axis.xaxis.set_major_locator(MaxNLocator(integer=True))
 
@@ -116,7 +116,7 @@ def _clock(axis: Axes, qualities: list[Quality], agreed: MotorClock) -> None:
 def _words(axis: Axes, qualities: list[Quality], refused: dict[str, str]) -> None:
     axis.axis("off")
     lines = [f"refused {name}: {reason}" for name, reason in refused.items()]
-    lines += by_sentence(qualities, lambda found: [f"check {said}" for said in found.warnings] + found.repairs)
+    lines += by_sentence(qualities, lambda quality: [f"check {line}" for line in quality.warnings] + quality.repairs)
     wrapped = [part for line in lines for part in textwrap.wrap(line, 78)] or ["nothing"]
     more = [f"… and {len(wrapped) - 14} lines more in quality.json"] if len(wrapped) > 14 else []
     axis.set_title("Refused, repaired, and to be checked")

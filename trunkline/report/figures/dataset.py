@@ -18,16 +18,16 @@ def density_figure(densities: list[Density]) -> Figure:
     """Tips in the plane of tilt before and after thinning, and how many share a cell, at up to four gravity angles;
     below, at every gravity angle how uneven they are. Without gravity there is one, in the plane of x and z."""
     several, along = len(densities) > 1, "towards gravity (mm)" if len(densities) > 1 else "x (mm)"
-    shown = [densities[i] for i in np.unique(np.linspace(0, len(densities) - 1, 4).round().astype(int))]
-    figure = plt.figure(figsize=(max(3.1 * len(shown), LEAST_WIDTH), 11.5 if several else 10.0))
-    grid = figure.add_gridspec(3 + several, len(shown))
-    axes = np.array([[figure.add_subplot(grid[row, column]) for column in range(len(shown))] for row in range(3)])
+    drawn = [densities[i] for i in np.unique(np.linspace(0, len(densities) - 1, 4).round().astype(int))]
+    figure = plt.figure(figsize=(max(3.1 * len(drawn), LEAST_WIDTH), 11.5 if several else 10.0))
+    grid = figure.add_gridspec(3 + several, len(drawn))
+    axes = np.array([[figure.add_subplot(grid[row, column]) for column in range(len(drawn))] for row in range(3)])
     if several:
         _add_unevenness(figure.add_subplot(grid[3, :]), densities)
-    points = np.concatenate([_in_plane(d.before, d.down) for d in shown])[:, [0, 2]] * 1e3
+    points = np.concatenate([_in_plane(d.before, d.down) for d in drawn])[:, [0, 2]] * 1e3
     thickness = SLICE if len(densities[0].after) > FEW else 4 * SLICE
     low, high = points.min(axis=0) - 15, points.max(axis=0) + 15
-    for column, density in zip(axes.T, shown, strict=True):
+    for column, density in zip(axes.T, drawn, strict=True):
         for ax, tips, color, label in (
             (column[0], density.before, INITIAL, "before"),
             (column[1], density.after, IDENTIFIED, "after thinning"),
@@ -78,12 +78,12 @@ def deviation_figure(deviation: pd.DataFrame) -> Figure:
     gravity's angle, where there are several, and over tension."""
     values, band = deviation["deviation_mm"], deviation["friction_band_mm"]
     floor = np.maximum(values, LEAST_MM)
-    shown = {"largest tension (N)": deviation["largest_tension"]}
+    panels = {"largest tension (N)": deviation["largest_tension"]}
     if deviation["theta_g"].nunique() > 1:
-        shown = {"gravity angle θ_G (°)": np.degrees(deviation["theta_g"])} | shown
-    size = max(4.5 * len(shown), LEAST_WIDTH + 1), 4.2
-    figure, axes = plt.subplots(1, len(shown), figsize=size, sharey=True, squeeze=False)
-    for ax, (label, x) in zip(axes[0], shown.items(), strict=True):
+        panels = {"gravity angle θ_G (°)": np.degrees(deviation["theta_g"])} | panels
+    size = max(4.5 * len(panels), LEAST_WIDTH + 1), 4.2
+    figure, axes = plt.subplots(1, len(panels), figsize=size, sharey=True, squeeze=False)
+    for ax, (label, x) in zip(axes[0], panels.items(), strict=True):
         ax.scatter(x, floor, s=9, color=IDENTIFIED, linewidths=0, label="FK to MuJoCo at rest, friction off")
         if band.any():
             ax.scatter(x, band, s=9, color=INITIAL, linewidths=0, label="band of dry friction")

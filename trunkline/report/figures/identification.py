@@ -90,8 +90,8 @@ def path_figure(predictions: dict[str, Prediction]) -> Figure:
         measured = experiment.positions[:, tip, number]
         axis.plot(time, measured * 1e3, color=MEASURED, alpha=0.45, lw=2.5, label="measured")
         for model, prediction in predictions.items():
-            found = prediction.replay.positions[0][:, tip, number]
-            axis.plot(time, found * 1e3, color=COLORS[LABELS[model]], lw=1.2, label=LABELS[model])
+            simulated = prediction.replay.positions[0][:, tip, number]
+            axis.plot(time, simulated * 1e3, color=COLORS[LABELS[model]], lw=1.2, label=LABELS[model])
         axis.set_ylabel(f"{name} (mm)")
         low, high = axis.get_ylim()
         spare = max(0.0, NARROWEST - (high - low)) / 2

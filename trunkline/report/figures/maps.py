@@ -96,16 +96,16 @@ def slices_figure(maps: Maps, tips: list[np.ndarray], check: Check) -> Figure:
     rigid.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, fontsize=8, markerscale=1.5)
     rigid.set(title=f"Rigid: {100 * check.rigid.accuracy:.1f} % of labels agree", xlabel="±radius (m)", ylabel="z (m)")
 
-    shown = np.unique(np.linspace(0, len(tips) - 1, SLICES).round().astype(int))
-    colors = plt.get_cmap(SEQUENTIAL)(np.linspace(0, 0.9, len(shown)))
+    drawn = np.unique(np.linspace(0, len(tips) - 1, SLICES).round().astype(int))
+    colors = plt.get_cmap(SEQUENTIAL)(np.linspace(0, 0.9, len(drawn)))
     x, y, z = maps.soft.lattice.axes()
     middle = int(np.abs(y).argmin())
-    for index, color in zip(shown, colors, strict=True):
+    for index, color in zip(drawn, colors, strict=True):
         angle = float(maps.soft.mesh_angles[index])
         soft.contour(x, z, maps.soft.at(angle)[:, middle].T, levels=[0.0], colors=[color], linewidths=1.4)
         near = tips[index][np.abs(tips[index][:, 1]) < maps.soft.lattice.spacing / 2]
-        told = f"{np.degrees(angle):.0f}°" if len(shown) > 1 else "no gravity"
-        soft.scatter(near[:, 0], near[:, 2], s=2, color=color, label=told)
+        label = f"{np.degrees(angle):.0f}°" if len(drawn) > 1 else "no gravity"
+        soft.scatter(near[:, 0], near[:, 2], s=2, color=color, label=label)
     soft.plot(0, 0, "^", color=BASE, markersize=8)
     soft.legend(
         loc="upper center",
@@ -113,7 +113,7 @@ def slices_figure(maps: Maps, tips: list[np.ndarray], check: Check) -> Figure:
         ncols=5,
         fontsize=8,
         markerscale=4,
-        title="lines: maps, dots: tips" + (", at gravity angle" if len(shown) > 1 else ""),
+        title="lines: maps, dots: tips" + (", at gravity angle" if len(drawn) > 1 else ""),
     )
     soft.set(title="Soft: the shell of its tips", xlabel="x (m)", ylabel="z (m)")
 
@@ -123,10 +123,11 @@ def slices_figure(maps: Maps, tips: list[np.ndarray], check: Check) -> Figure:
     hybrid.contour(x, z, rigid_slice, levels=[0.0], colors=[RIGID], linewidths=1.5)
     hybrid.plot([], [], color=RIGID, label="mount (rigid map)")
     hybrid.plot([], [], color=HYBRID, linewidth=6, alpha=0.6, label="soft tip (hybrid map)")
-    for one, style in zip(maps.tilted, ("--", ":", "-."), strict=False):
-        x, y, z = one.lattice.axes()
-        hybrid.contour(x, z, one.field[:, int(np.abs(y).argmin())].T, levels=[0.0], colors=[INITIAL], linestyles=style)
-        hybrid.plot([], [], style, color=INITIAL, label=f"soft tip, tilted by {np.degrees(one.tilt):.0f}°")
+    for tilt, style in zip(maps.tilted, ("--", ":", "-."), strict=False):
+        x, y, z = tilt.lattice.axes()
+        tilted_slice = tilt.field[:, int(np.abs(y).argmin())].T
+        hybrid.contour(x, z, tilted_slice, levels=[0.0], colors=[INITIAL], linestyles=style)
+        hybrid.plot([], [], style, color=INITIAL, label=f"soft tip, tilted by {np.degrees(tilt.tilt):.0f}°")
     arm = panda_line(maps.mount_offset, maps.self_collision)
     hybrid.plot(arm[:, 0], arm[:, 2], color=MEASURED, linewidth=3, label="Panda")
     hybrid.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, fontsize=8)
@@ -168,11 +169,11 @@ def heldout_figure(heldout: pd.DataFrame, beyond: float) -> Figure:
     return figure
 
 
-def _under(maps: Maps, shown: list[int]) -> str:
+def _under(maps: Maps, drawn: list[int]) -> str:
     """Which gravity the soft maps `shown` are for; nothing where there is none."""
     if len(maps.soft.mesh_angles) == 1:
         return ""
-    return ", gravity at " + ", ".join(f"{np.degrees(maps.soft.mesh_angles[i]):.0f}°" for i in shown)
+    return ", gravity at " + ", ".join(f"{np.degrees(maps.soft.mesh_angles[i]):.0f}°" for i in drawn)
 
 
 def _add_gravity(axes, angle: float, length: float, color: str) -> None:
@@ -184,8 +185,8 @@ def _down(angle: float) -> np.ndarray:
     return np.array([np.sin(angle), 0.0, -np.cos(angle)])
 
 
-def _fill_slice(axes, one, color: str) -> None:
-    x, y, z = one.lattice.axes()
-    values = one.field[:, int(np.abs(y).argmin())].T
+def _fill_slice(axes, reach_map, color: str) -> None:
+    x, y, z = reach_map.lattice.axes()
+    values = reach_map.field[:, int(np.abs(y).argmin())].T
     axes.contourf(x, z, values, levels=[values.min() - 1, 0.0], colors=[color], alpha=0.25)
     axes.contour(x, z, values, levels=[0.0], colors=[color], linewidths=1.5)

@@ -65,12 +65,12 @@ def error_map_figure(targets: pd.DataFrame) -> Figure:
     x, y = in_plane_of_tilt(targets[["x", "y"]].to_numpy(), targets[["gx", "gy"]].to_numpy())
     targets = targets.assign(x=x, y=y)
     angles = np.unique(targets["theta_g"])
-    shown = angles[np.unique(np.linspace(0, len(angles) - 1, 4).round().astype(int))]
-    several = len(shown) > 1
-    size = max(3.1 * len(shown), LEAST_WIDTH), 3.6
-    figure, axes = plt.subplots(1, len(shown), figsize=size, squeeze=False, sharey=True)
+    drawn = angles[np.unique(np.linspace(0, len(angles) - 1, 4).round().astype(int))]
+    several = len(drawn) > 1
+    size = max(3.1 * len(drawn), LEAST_WIDTH), 3.6
+    figure, axes = plt.subplots(1, len(drawn), figsize=size, squeeze=False, sharey=True)
     extent = targets[["x", "z"]].agg(["min", "max"]) * 1e3 + np.array([[-20], [20]])
-    for ax, angle in zip(axes[0], shown, strict=True):
+    for ax, angle in zip(axes[0], drawn, strict=True):
         near = (targets["theta_g"] - angle).abs() < BAND
         rows = targets[near & (targets["y"].abs() < SLICE)]
         rows = rows.sort_values("error_mm")

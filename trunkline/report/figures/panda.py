@@ -10,8 +10,8 @@ POSE = (0.45, 0.0, 0.55)  # m, where the drawn Panda holds the mount
 
 def panda_line(mount_offset: float, avoid_collisions: bool) -> np.ndarray:
     """Polyline (P, 3) in m along the links of a Panda that holds the mount at `POSE`, pointing down."""
-    found = solve(np.array([POSE]), seed=1, starts=200, mount_offset=mount_offset, avoid_collisions=avoid_collisions)
-    frames = joint_frames(found.q)
+    solution = solve(np.array([POSE]), seed=1, starts=200, mount_offset=mount_offset, avoid_collisions=avoid_collisions)
+    frames = joint_frames(solution.q)
     shoulder, elbow, wrist, hand = (frames[i].p[:, 0] for i in (0, 3, 5, 6))
     upper_end = frames[2].p[:, 0]
     forearm_start = elbow + DH_A[4] * frames[3].x[:, 0]

@@ -38,7 +38,7 @@ def trial_figure(tables: dict[str, pd.DataFrame]) -> Figure:
             continue
         names = list(dict.fromkeys(table.trial))
         for axis, error in zip(column, ERRORS, strict=True):
-            for model, (color, _, dot, width) in _shown(table).items():
+            for model, (color, _, dot, width) in _styles(table).items():
                 rows = table[table.model == model].set_index("trial").reindex(names)
                 size = _dot_size(dot, width)
                 axis.semilogy(np.arange(len(names)), rows[error], dot, ms=size, color=color, label=model)
@@ -60,9 +60,9 @@ def segment_figure(tables: dict[str, pd.DataFrame]) -> Figure:
     size = max(4.2 * across, LEAST_WIDTH), 4.0 * down + 0.7
     figure, axes = plt.subplots(down, across, figsize=size, squeeze=False, sharey=True)
     for axis, (title, kind, rows) in zip(axes.flat, panels, strict=False):
-        for model, (color, line, dot, width) in _shown(rows).items():
-            own, dots = rows[rows.model == model], {"marker": dot, "ms": 0.7 * _dot_size(dot, width)}
-            axis.semilogy(own.from_base_mm, own.e_position_mm, line, lw=width, color=color, label=model, **dots)
+        for model, (color, line, dot, width) in _styles(rows).items():
+            curve, dots = rows[rows.model == model], {"marker": dot, "ms": 0.7 * _dot_size(dot, width)}
+            axis.semilogy(curve.from_base_mm, curve.e_position_mm, line, lw=width, color=color, label=model, **dots)
         axis.set(title=f"{kind}, {title}", xlabel="distance from the base, straight arm (mm)")
         axis.set_xlim(0, 1.04 * rows.from_base_mm.max())
     if not panels:
@@ -81,9 +81,9 @@ def _dot_size(dot: str, width: float) -> float:
     return 12.0 if dot in "|_" else 4.0 + 1.4 * width
 
 
-def _shown(table: pd.DataFrame) -> dict[str, tuple[str, str, str, float]]:
-    found = set(table.model)
-    return {model: style for model, style in MODELS.items() if model in found}
+def _styles(table: pd.DataFrame) -> dict[str, tuple[str, str, str, float]]:
+    present = set(table.model)
+    return {model: style for model, style in MODELS.items() if model in present}
 
 
 def _legend(figure: Figure, axes: np.ndarray) -> None:

@@ -1,5 +1,4 @@
-"""The pipeline for many arms or sessions, and one table and picture over all of them: `python -m
-trunkline.tools.batch`."""
+"""The pipeline for many arms or sessions, and one table and picture over all of them: `trunkline batch`."""
 
 from trunkline.compute.numerics import hold_arithmetic
 

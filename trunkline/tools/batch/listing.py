@@ -1,4 +1,4 @@
-"""The list of a fleet: arms or sessions, each with what differs from the pipeline that it is like."""
+"""The list of a batch: arms or sessions, each with what differs from the pipeline that it is like."""
 
 from dataclasses import field
 from pathlib import Path
@@ -11,11 +11,11 @@ from trunkline.pipeline.config import validated
 from trunkline.recordings.session.session import SessionName, sessions_in
 from trunkline.settings import read_yaml, settings
 
-NONE = "none"  # as the reference: no drift is told
+NONE = "none"  # as the reference: no drift is computed
 
 
 @settings
-class Arm:
+class ListedArm:
     """name: of its folder and row. session: folder of its logs and session.yaml, or of several such. like: folder whose
     dvc.yaml and params.yaml it takes, by default the project's. params: what differs from those, by stage. folder: in
     place of all of these, where a pipeline has run already; it is read and not run. since: which arm its drift is from.
@@ -30,15 +30,15 @@ class Arm:
 
     def __post_init__(self):
         if (self.session is None) == (self.folder is None):
-            found = "both" if self.session else "neither"
-            raise ValueError(f"session: found {found} of session and folder, expected one of the two for {self.name!r}")
+            which = "both" if self.session else "neither"
+            raise ValueError(f"session: found {which} of session and folder, expected one of the two for {self.name!r}")
 
 
 @settings
 class Listing:
     """reference: the arm that drift is from, unless an arm says another; by default the first. "none" for none."""
 
-    arms: list[Arm]
+    arms: list[ListedArm]
     reference: str | None = None
 
     def __post_init__(self):
@@ -48,12 +48,12 @@ class Listing:
         twice = next((name for name in names if names.count(name) > 1), None)
         if twice is not None:
             raise ValueError(f"arms: found {twice!r} twice, expected each name once")
-        told = [("reference", self.reference), *((f"arms: {arm.name}: since", arm.since) for arm in self.arms)]
-        for key, name in told:
+        references = [("reference", self.reference), *((f"arms: {arm.name}: since", arm.since) for arm in self.arms)]
+        for key, name in references:
             if name not in (None, NONE, *names):
                 raise ValueError(f"{key}: found {name!r}, expected one of {', '.join(names)}{nearest(name, names)}")
 
-    def earlier(self, arm: Arm) -> str | None:
+    def earlier(self, arm: ListedArm) -> str | None:
         """The arm that the drift of another is from, if there is one."""
         name = arm.since or self.reference or self.arms[0].name
         return None if name in (NONE, arm.name) else name

@@ -7,15 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from trunkline.errors import InputError
+from trunkline.identification.evaluation.error_tables import TABLED
 from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.stages import STAGES
 from trunkline.recordings.trials.splits import TEST, VALIDATE
-
-STAGES = ("identify_stiffness", "identify_damping", "identify_control")
-BESIDE = ("identified", "cad", "null", "noise_floor")  # models, and what they stand beside
 
 
 @dataclass(frozen=True)
-class Found:
+class ParameterEstimate:
     """A parameter. low, high: of its 95 % interval, given the model."""
 
     value: float
@@ -30,7 +29,7 @@ class Results:
     it. errors: (position, tip) in mm, by what they are of. All empty where no stage has run."""
 
     name: str
-    parameters: dict[str, Found]
+    parameters: dict[str, ParameterEstimate]
     split: str
     trials: int
     errors: dict[str, tuple[float, float]]
@@ -62,29 +61,29 @@ def read_results(name: str, folder: Path) -> Results:
         table = _read(folder / "artifacts" / stage / "parameters.json")
         for key, row in table.get("parameters", {}).items():
             low, high = row["interval_95_given_model"]
-            parameters[key] = Found(row["value"], low, high, row["unit"])
+            parameters[key] = ParameterEstimate(row["value"], low, high, row["unit"])
     scored = _read(folder / "artifacts/score/metrics.json")
     for stage in STAGES:
-        own, which = scored.get(stage, {}), TEST
-        if not own:  # not scored, or no trial to be scored on
-            own, which = _read(folder / "artifacts" / stage / "metrics.json"), VALIDATE
-        found = {model: own[model][which] for model in BESIDE if which in own.get(model, {})}
-        if "identified" in found and (which == TEST or split != TEST):
-            split, trials = which, found["identified"]["trials"]
-            errors = {model: (row["e_position_mm"], row["e_tip_mm"]) for model, row in found.items()}
+        scores, which = scored.get(stage, {}), TEST
+        if not scores:  # not scored, or no trial to be scored on
+            scores, which = _read(folder / "artifacts" / stage / "metrics.json"), VALIDATE
+        compared = {model: scores[model][which] for model in TABLED if which in scores.get(model, {})}
+        if "identified" in compared and (which == TEST or split != TEST):
+            split, trials = which, compared["identified"]["trials"]
+            errors = {model: (row["e_position_mm"], row["e_tip_mm"]) for model, row in compared.items()}
     return Results(name, parameters, split, trials, errors)
 
 
 def drift(now: Results, before: Results) -> dict[str, Drift]:
     """Of the parameters that both have."""
-    found = {}
+    drifts = {}
     for name in now.parameters.keys() & before.parameters.keys():
         parameter, new, old = PARAMETERS[name], now.parameters[name], before.parameters[name]
         scale = parameter.scale if parameter.signed else 1.0
         change = float(parameter.coordinate(new.value) - parameter.coordinate(old.value)) * scale
-        mine, theirs = (float(np.ptp(parameter.coordinate([one.low, one.high]))) / 2 * scale for one in (new, old))
-        found[name] = Drift(change, float(np.hypot(mine, theirs)))
-    return {name: found[name] for name in now.parameters if name in found}
+        mine, theirs = (float(np.ptp(parameter.coordinate([row.low, row.high]))) / 2 * scale for row in (new, old))
+        drifts[name] = Drift(change, float(np.hypot(mine, theirs)))
+    return {name: drifts[name] for name in now.parameters if name in drifts}
 
 
 def _read(file: Path) -> dict:

@@ -14,15 +14,16 @@ import yaml
 from omegaconf import DictConfig, OmegaConf
 
 from trunkline.errors import InputError, nearest
+from trunkline.files import written_whole
 from trunkline.pipeline.config import PROJECT
 from trunkline.settings import read_yaml
-from trunkline.tools.batch.listing import Arm
+from trunkline.tools.batch.listing import ListedArm
 
 OWN = ("data/", "artifacts/")  # what a pipeline has for itself; all else is read where it is
 LOG = "fleet.log"
 
 
-def prepare(arm: Arm, folder: Path, until: str) -> None:
+def prepare(arm: ListedArm, folder: Path, until: str) -> None:
     """Write what the pipeline of an arm takes into `folder`, up to the stage `until`.
 
     Raises:
@@ -37,10 +38,11 @@ def prepare(arm: Arm, folder: Path, until: str) -> None:
                              f"{nearest(section, [str(key) for key in params])}")  # fmt: skip
     assert arm.session is not None, "arms that were run already are not prepared"
     session = Path(arm.session)
-    own = {"ingest": {"only": None}}, arm.params, {"ingest": {"session": session.name}}  # `only` is of another session
-    merged = OmegaConf.merge(params, *own)
+    # `only` is of another session
+    layers = {"ingest": {"only": None}}, arm.params, {"ingest": {"session": session.name}}
+    merged = OmegaConf.merge(params, *layers)
     assert isinstance(merged, DictConfig)  # as both are
-    kept = {key: value for key, value in _without_null(_plain(merged)).items() if key in stages}
+    used = {key: value for key, value in _without_null(_plain(merged)).items() if key in stages}
     raw = folder / "data/raw"
     raw.mkdir(parents=True, exist_ok=True)
     for link in raw.iterdir():
@@ -48,7 +50,7 @@ def prepare(arm: Arm, folder: Path, until: str) -> None:
             link.unlink()
     (raw / session.name).symlink_to(session)
     _write(folder / "dvc.yaml", {"stages": {name: _from(stage, like, folder) for name, stage in stages.items()}})
-    _write(folder / "params.yaml", kept)
+    _write(folder / "params.yaml", used)
     if not (folder / ".dvc").is_dir():
         _dvc(folder, "init", "--no-scm", "--quiet")
         _dvc(folder, "config", "core.analytics", "false")
@@ -61,9 +63,9 @@ def run(folder: Path) -> str | None:
     if code == 0:
         return None
     lines = (folder / LOG).read_text(encoding="utf-8").splitlines()
-    mistakes = [line for line in lines if line.lower().startswith("error:")]
-    said = mistakes[0].partition(":")[2].strip() if mistakes else f"dvc ended with {code}"
-    return f"{said} ({folder / LOG})"
+    errors = [line for line in lines if line.lower().startswith("error:")]
+    reason = errors[0].partition(":")[2].strip() if errors else f"dvc ended with {code}"
+    return f"{reason} ({folder / LOG})"
 
 
 def needed(stages: dict[str, Any], until: str, where: Path) -> dict[str, Any]:
@@ -77,13 +79,13 @@ def needed(stages: dict[str, Any], until: str, where: Path) -> dict[str, Any]:
         raise InputError(f"--until: found {until!r}, {expected}")
     writes = {place: name for name, stage in stages.items() for key in ("outs", "metrics", "plots")
               for place in map(_place, stage.get(key, []))}  # fmt: skip
-    found, waiting = set(), [until]
+    required, waiting = set(), [until]
     while waiting:
         name = waiting.pop()
-        if name not in found:
-            found.add(name)
+        if name not in required:
+            required.add(name)
             waiting += [writes[dep] for dep in stages[name].get("deps", []) if dep in writes]
-    return {name: stage for name, stage in stages.items() if name in found}
+    return {name: stage for name, stage in stages.items() if name in required}
 
 
 def _without_null(values: dict[str, Any]) -> dict[str, Any]:
@@ -105,10 +107,10 @@ def _from(stage: dict[str, Any], like: Path, folder: Path) -> dict[str, Any]:
         return name if name.startswith(OWN) else os.path.relpath(like / name, folder.resolve())
 
     params = [
-        {moved(str(file)): keys for file, keys in one.items()} if isinstance(one, dict) else one
-        for one in stage.get("params", [])
+        {moved(str(file)): keys for file, keys in entry.items()} if isinstance(entry, dict) else entry
+        for entry in stage.get("params", [])
     ]
-    plots = [{_place(one): {"cache": False}} for one in stage.get("plots", [])]  # no templates here
+    plots = [{_place(plot): {"cache": False}} for plot in stage.get("plots", [])]  # no templates here
     return stage | {"deps": [moved(name) for name in stage.get("deps", [])], "params": params, "plots": plots}
 
 
@@ -134,6 +136,5 @@ def _write(path: Path, content: dict) -> None:
     """YAML, left alone where it is the same: what has not changed runs nothing again."""
     text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=1000)
     if not path.is_file() or path.read_text(encoding="utf-8") != text:
-        part = path.with_suffix(".part")
-        part.write_text(text, encoding="utf-8")
-        part.replace(path)
+        with written_whole(path) as part:
+            part.write_text(text, encoding="utf-8")

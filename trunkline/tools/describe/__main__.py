@@ -1,7 +1,8 @@
-"""What an arm's description gives: `python -m trunkline.tools.describe ARM`
+"""An arm as described: `trunkline describe ARM`
 
 ARM is a description, a YAML of `conf/build_mjcf/arm/`, or a model in MJCF. Prints its units, its tendons with their
-moment arms, its tracked points, and what no log will tell of it; with --session, of that session's logs. Draws it.
+moment arms, its tracked points, and what no log can identify; with --session, what that session's logs cannot. Draws
+the arm.
 """
 
 import argparse
@@ -10,7 +11,7 @@ from pathlib import Path
 
 from trunkline.errors import in_one_line
 from trunkline.model.statics.chain import read_chain
-from trunkline.program import called
+from trunkline.program import program_name
 from trunkline.recordings.session.session import read_session
 from trunkline.report.figures.arm import arm_figure
 from trunkline.report.figures.style import save_figure
@@ -23,7 +24,7 @@ DRAWINGS = Path("artifacts/describe")  # below the current folder; Git ignores p
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.tools.describe"),
+        prog=program_name("describe"),
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -31,16 +32,16 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--session", type=Path, metavar="FOLDER", help="of logs and session.yaml")
     parser.add_argument("--out", type=Path, metavar="PNG",
                         help=f"the drawing; default: {DRAWINGS}/<ARM's name>.png")  # fmt: skip
-    told = parser.parse_args(arguments)
-    model = read_drawing(told.arm, Path("."))
+    args = parser.parse_args(arguments)
+    model = read_drawing(args.arm, Path("."))
     if model.nu:
         read_chain(model)  # what the statics cannot solve is told here
-    session = None if told.session is None else read_session(told.session)
+    session = None if args.session is None else read_session(args.session)
     for lines in (unit_lines(model), tendon_lines(model), marker_lines(model)):
         print("\n".join(lines))
     print("\n".join(f"note: {line}" for line in doubt_lines(model, session)))
-    out = told.out or DRAWINGS / f"{told.arm.stem}.png"
-    if told.out is None:
+    out = args.out or DRAWINGS / f"{args.arm.stem}.png"
+    if args.out is None:
         DRAWINGS.mkdir(parents=True, exist_ok=True)
     save_figure(arm_figure(model), out)
     print(f"drawn in {out}")

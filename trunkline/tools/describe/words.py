@@ -52,13 +52,13 @@ def units_of(model: mujoco.MjModel) -> list[Unit]:
     bodies = np.unique(model.jnt_bodyid[: arm_hinges(model)])
     places = np.vstack([data.xpos[bodies], data.site("tip").xpos])
     lengths = np.linalg.norm(np.diff(places, axis=0), axis=1)
-    found = []
+    units = []
     for body, length in zip(bodies, lengths, strict=True):
         joint, geom = model.body_jntadr[body], model.body_geomadr[body]
         width = 2 * model.geom_size[geom][0] if geom >= 0 else np.nan
         bends = np.degrees(model.jnt_range[joint, 1]) if model.jnt_limited[joint] else np.inf
-        found.append(Unit(1e3 * length, 1e3 * width, 1e3 * model.body_mass[body], model.jnt_stiffness[joint], bends))
-    return found
+        units.append(Unit(1e3 * length, 1e3 * width, 1e3 * model.body_mass[body], model.jnt_stiffness[joint], bends))
+    return units
 
 
 def load_of(model: mujoco.MjModel) -> float:
@@ -104,15 +104,15 @@ def tendon_lines(model: mujoco.MjModel) -> list[str]:
         crossed = arms[arms > 0]
         apart = [1e3 * np.hypot(*place[:2]) for place in (first, last)]
         away = f"{apart[0]:.3g} mm" if np.isclose(*apart, rtol=ALIKE) else f"{apart[0]:.3g} to {apart[1]:.3g} mm"
-        said = [
+        facts = [
             f"at {_angle(model, cable):.1f}°", f"{away} from the axis", f"ends at unit {end}",
             f"{1e3 * model.tendon_length0[cable]:.1f} mm long",
             f"{1e3 * np.radians(1) * crossed.sum():.3g} mm for 1° of each joint that it crosses",
             f"{model.actuator_gainprm[motor, 0]:.4g} N/m up to {-model.actuator_forcerange[motor, 0]:.4g} N",
         ]  # fmt: skip
         if len(preload) and preload[index]:
-            said.append(f"{preload[index] * model.actuator_gainprm[motor, 0]:.3g} N at command 0")
-        lines.append(f"  {model.tendon(cable).name}: {', '.join(said)}")
+            facts.append(f"{preload[index] * model.actuator_gainprm[motor, 0]:.3g} N at command 0")
+        lines.append(f"  {model.tendon(cable).name}: {', '.join(facts)}")
     return lines
 
 
@@ -143,10 +143,10 @@ def doubt_lines(model: mujoco.MjModel, session: Session | None) -> list[str]:
         return lines
     lines += _unknown(model, session)
     kinds, weightless = {trial.experiment for trial in session.trials}, session.frame.gravity == "none"
-    own = [name for name, parameter in PARAMETERS.items() if parameter.belongs_to(model)]
-    untold = [name for name in own if not any(PARAMETERS[name].told_by(EXPERIMENTS[kind]) for kind in kinds)]
-    if untold:
-        lines.append(f"no trial of the session ({', '.join(sorted(kinds))}) tells {', '.join(untold)}")
+    names = [name for name, parameter in PARAMETERS.items() if parameter.belongs_to(model)]
+    unidentifiable = [name for name in names if not any(PARAMETERS[name].told_by(EXPERIMENTS[kind]) for kind in kinds)]
+    if unidentifiable:
+        lines.append(f"no trial of the session ({', '.join(sorted(kinds))}) tells {', '.join(unidentifiable)}")
     if weightless and model.nu and all(EXPERIMENTS[kind].static for kind in kinds):
         lines.append("without gravity and motion, stiffness and kp show in their ratio alone: identify one of them")
     if len(session.segments or {}) == 1:
@@ -161,21 +161,22 @@ def doubt_lines(model: mujoco.MjModel, session: Session | None) -> list[str]:
 def _unknown(model: mujoco.MjModel, session: Session) -> list[str]:
     """Names that a session gives to what this arm has not, a line a key."""
     sites = [model.site(index).name for index in range(model.nsite)]
-    known = {
+    available = {
         "segments": [name.removesuffix("_center") for name in sites
                      if name.endswith("_center") and name != "base_center"],
         "tendons": [model.tendon(cable).name for cable in cables(model)],
     }
-    known["motors"] = known["tendons"]
-    given = {
+    available["motors"] = available["tendons"]
+    declared = {
         "segments": (session.segments or {}).values(),
         "tendons": (session.tendons or {}).values(),
         "motors": session.coupling()[0],
     }
     lines = []
-    for key, names in given.items():
-        if unknown := [name for name in names if name not in known[key]]:
-            lines.append(f"session.yaml: {key}: found {unknown[0]!r}, the arm has {', '.join(known[key]) or 'none'}")
+    for key, names in declared.items():
+        if unknown := [name for name in names if name not in available[key]]:
+            has = ", ".join(available[key]) or "none"
+            lines.append(f"session.yaml: {key}: found {unknown[0]!r}, the arm has {has}")
     return lines
 
 

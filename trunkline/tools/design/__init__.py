@@ -1,4 +1,4 @@
-"""What to record next, by what it is expected to tell: `python -m trunkline.tools.design`."""
+"""What to record next, by its expected information: `trunkline suggest`."""
 
 from trunkline.compute.numerics import hold_arithmetic
 

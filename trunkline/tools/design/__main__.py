@@ -1,11 +1,11 @@
-"""What to record next, without a fit: `python -m trunkline.tools.design SESSION`
+"""What to record next, without a fit: `trunkline suggest SESSION`
 
 Ranks trials that a lab could record (tilts, releases, pulls, curls, motions, loads at the tip) by how much each is
-expected to shrink what you care about, by the Fisher information that it has on the twin: --for intervals (of the
+expected to shrink what you care about, by its Fisher information on the twin: --for intervals (of the
 parameters, the widest count most), tip (its uncertainty at rest over the workspace) or grasp (that of a wound up arm;
-it stands in for the probability to hold a thing, which is not computed). Each suggestion knows those before it. Says
-what each costs in minutes, how to record it, its entry of session.yaml, and the commands to run afterwards. Writes
-nothing. Method and limits: docs/suggest.md.
+it stands in for the probability to hold an object, which is not computed). Each suggestion takes those before it as
+recorded. Prints what each costs in minutes, how to record it, its entry of session.yaml, and the commands to run
+afterwards. Writes nothing. Method and limits: docs/lab-tools.md.
 """
 
 import argparse
@@ -18,10 +18,11 @@ from trunkline.errors import InputError, in_one_line, nearest
 from trunkline.identification.fit.settings import IdentificationSettings
 from trunkline.identification.fit.setup import check_parameters
 from trunkline.identification.parameters.per_session import make_room, names_apart, other_sessions
+from trunkline.identification.stages import STAGES
 from trunkline.model.arm.kinds import described_arm
 from trunkline.pipeline.config import load_folder, own_or_project, settings_of
 from trunkline.pipeline.inputs import read_spec
-from trunkline.program import called
+from trunkline.program import program_name
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.recordings.trials.splits import IDENTIFY
 from trunkline.recordings.trials.trial import Trial
@@ -40,7 +41,7 @@ from trunkline.tools.design.words import (
     why_words,
     widest_words,
 )
-from trunkline.tools.evaluate.model import STAGES, read_arm
+from trunkline.tools.evaluate.model import read_arm
 from trunkline.tools.evaluate.session import trials_of
 
 DESCRIBED = "as described in params.yaml, as no stage has identified one yet: suggestions are only as good as it is"
@@ -50,7 +51,7 @@ Stages = list[StageInformation]
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.tools.design"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog=program_name("suggest"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("session", type=Path, metavar="SESSION",
                         help="folder of logs and session.yaml, or of filtered trials")  # fmt: skip
@@ -64,35 +65,35 @@ def main(arguments: list[str] | None = None) -> int:
                         help="by which the fitted model will be off, of a point's distance from the base")  # fmt: skip
     parser.add_argument("--settings", type=Path, metavar="FOLDER", default=Path("."),
                         help="whose params.yaml describes arm and stages; default: the current folder")  # fmt: skip
-    told = parser.parse_args(arguments)
-    _check(told)
-    grid = load_folder(Recordable, own_or_project(told.settings, "conf") / "suggest")
-    spec, source = twin(told.model, told.settings)
-    trials = trials_of(told.session, told.settings, "suggest")
-    model = with_room(spec, trials, told.settings)
+    args = parser.parse_args(arguments)
+    _check(args)
+    grid = load_folder(Recordable, own_or_project(args.settings, "conf") / "suggest")
+    spec, source = twin(args.model, args.settings)
+    trials = trials_of(args.session, args.settings, "suggest")
+    model = with_room(spec, trials, args.settings)
     print(f"twin: {source}", flush=True)
-    stages, offered = told_of(model, trials, grid, told.settings, told.only, told.error / 100)
-    weights = weights_for(told.goal, stages, model, grid)
-    found = suggest(stages, weights, offered, told.count, told.per_minute)
-    if not found:
-        raise InputError(f"{told.session}: found no trial that would tell more, expected one of {len(offered)}")
-    print("\n".join(_report(told, stages, weights, offered, found, trials)))
+    stages, offered = information_of_stages(model, trials, grid, args.settings, args.only, args.error / 100)
+    weights = weights_for(args.goal, stages, model, grid)
+    suggestions = suggest(stages, weights, offered, args.count, args.per_minute)
+    if not suggestions:
+        raise InputError(f"{args.session}: found no trial that would tell more, expected one of {len(offered)}")
+    print("\n".join(_report(args, stages, weights, offered, suggestions, trials)))
     return 0
 
 
-def _check(told: argparse.Namespace) -> None:
+def _check(args: argparse.Namespace) -> None:
     """Refuse options that mean nothing, before any work."""
-    if told.goal not in GOALS:
-        expected = f"{', '.join(GOALS)}{nearest(told.goal, list(GOALS))}"
-        raise InputError(f"--for: found {told.goal!r}, expected one of {expected}")
+    if args.goal not in GOALS:
+        expected = f"{', '.join(GOALS)}{nearest(args.goal, list(GOALS))}"
+        raise InputError(f"--for: found {args.goal!r}, expected one of {expected}")
     kinds = list(EXPERIMENTS)
-    for kind in told.only:
+    for kind in args.only:
         if kind not in kinds:
             raise InputError(f"--only: found {kind!r}, expected some of {', '.join(kinds)}{nearest(kind, kinds)}")
-    if not 1 <= told.count <= 100:
-        raise InputError(f"--count: found {told.count}, expected 1 to 100 trials")
-    if not 0 < told.error <= 100:
-        raise InputError(f"--error: found {told.error:g}, expected more than 0 and up to 100 %")
+    if not 1 <= args.count <= 100:
+        raise InputError(f"--count: found {args.count}, expected 1 to 100 trials")
+    if not 0 < args.error <= 100:
+        raise InputError(f"--error: found {args.error:g}, expected more than 0 and up to 100 %")
 
 
 def twin(path: Path | None, root: Path) -> tuple[mujoco.MjSpec, str]:
@@ -117,15 +118,15 @@ def with_room(spec: mujoco.MjSpec, trials: list[Trial], root: Path) -> mujoco.Mj
 
 def _settings(root: Path) -> dict[str, IdentificationSettings]:
     """Of the stages in params.yaml."""
-    given = read_yaml(root / "params.yaml")
-    return {stage: settings_of(stage, root) for stage in STAGES if stage in given}
+    params = read_yaml(root / "params.yaml")
+    return {stage: settings_of(stage, root) for stage in STAGES if stage in params}
 
 
-def told_of(
+def information_of_stages(
     model: mujoco.MjModel, trials: list[Trial], grid: Recordable, root: Path, only: list[str], share: float
 ) -> tuple[Stages, list[Candidate]]:
-    """What every stage in params.yaml knows and would learn, and the candidates that are offered: of the kinds `only`,
-    if there are any, and none that goes as a trial of the session did."""
+    """The information that every stage in params.yaml has and would gain, and the candidates on offer: of the kinds
+    `only`, if there are any, and none that repeats a trial of the session."""
     settings, stages = _settings(root), []
     read = {kind for config in settings.values() for kind in config.experiments}
     kinds = tuple(kind for kind in EXPERIMENTS if kind in read and (not only or kind in only))
@@ -137,34 +138,35 @@ def told_of(
         check_parameters(stage, config, model)
         stages.append(stage_information(stage, config, model, trials, every, grid, share))
     repeated = set().union(*(stage.repeated for stage in stages))
-    return stages, [one for one in every if one.name not in repeated]
+    return stages, [candidate for candidate in every if candidate.name not in repeated]
 
 
 def _report(
-    told: argparse.Namespace, stages: Stages, weights: list, offered: list[Candidate], found: list[Suggestion],
+    args: argparse.Namespace, stages: Stages, weights: list, offered: list[Candidate], suggestions: list[Suggestion],
     trials: list[Trial],
 ) -> list[str]:  # fmt: skip
-    goal: Goal = told.goal
-    now, own = expected_loss(stages, weights, []), sum(trial.split == IDENTIFY for trial in trials)
-    usable = [one for one in offered if any(one.name in stage.added for stage in stages)]
-    last, filtered = found[-1], not (told.session / "session.yaml").is_file()
-    session = "data/raw/<session>" if filtered else told.session
-    minutes, unit = sum(one.candidate.minutes for one in found), "minute" if told.per_minute else "trial"
+    goal: Goal = args.goal
+    now, count = expected_loss(stages, weights, []), sum(trial.split == IDENTIFY for trial in trials)
+    usable = [candidate for candidate in offered if any(candidate.name in stage.added for stage in stages)]
+    last, filtered = suggestions[-1], not (args.session / "session.yaml").is_file()
+    session = "data/raw/<session>" if filtered else args.session
+    minutes = sum(suggestion.candidate.minutes for suggestion in suggestions)
+    unit = "minute" if args.per_minute else "trial"
     lines = [
         f"goal: {TITLES[goal]}",
-        f"now, with {own} trials to identify from and a fitted model that is off by {told.error:g} %: "
+        f"now, with {count} trials to identify from and a fitted model that is off by {args.error:g} %: "
         f"{loss_words(goal, now)}; widest: {widest_words(stages, [])}",
         "", f"suggested, of {len(usable)} that could be recorded, by gain a {unit}, each knowing those before it:",
-        *(f"  {line}" for line in table_lines(goal, found)),
+        *(f"  {line}" for line in table_lines(goal, suggestions)),
         f"after all, {minutes:g} minutes: {loss_words(goal, last.after)}; widest: {widest_words(stages, last.chosen)}",
-        "", "why:", *(f"  {n}  {why_words(stages, weights, one)}" for n, one in enumerate(found, 1)),
-        "", "how:", *(f"  {n}  {one.candidate.how}" for n, one in enumerate(found, 1)),
+        "", "why:", *(f"  {n}  {why_words(stages, weights, row)}" for n, row in enumerate(suggestions, 1)),
+        "", "how:", *(f"  {n}  {row.candidate.how}" for n, row in enumerate(suggestions, 1)),
         "", "if only one is recorded, the best of each kind:",
         *(f"  {line}" for line in kind_lines(goal, now, after_each(stages, weights, usable, []), usable)),
         "", f"once their logs lie in {session}, add to `trials` in its session.yaml:",
-        *entry_lines([one.candidate for one in found], {trial.name for trial in trials}),
-        "", "then:", f"  python -m trunkline.tools.preflight {session}", "  dvc repro",
-        f"  python -m trunkline.tools.design {session}",
+        *entry_lines([suggestion.candidate for suggestion in suggestions], {trial.name for trial in trials}),
+        "", "then:", f"  trunkline check {session}", "  dvc repro",
+        f"  trunkline suggest {session}",
     ]  # fmt: skip
     return lines
 

@@ -47,18 +47,18 @@ def candidates(grid: Recordable, model: mujoco.MjModel, kinds: tuple[str, ...], 
     """
     masses = [round(share * float(model.body_subtreemass[model.jnt_bodyid[0]]), 3) for share in grid.loads]
     loads = [0.0, *dict.fromkeys(mass for mass in masses if mass > 0)]
-    slack, found = np.full(model.nu, -SLACK), []
+    slack, offered = np.full(model.nu, -SLACK), []
     if "static_tilt" in kinds:
-        found += [_tilt(0.0, 0.0, load, grid, slack) for load in loads]
+        offered += [_tilt(0.0, 0.0, load, grid, slack) for load in loads]
         sides = _sides(grid.tilt_sides)
-        found += [_tilt(*told, grid, slack) for told in product(grid.tilts_deg, sides, loads)]
+        offered += [_tilt(*values, grid, slack) for values in product(grid.tilts_deg, sides, loads)]
     if "release" in kinds:
         sides = _sides(grid.release_sides)
-        held = product(grid.release_turns_deg, sides, loads)
-        found += [_release(*told, grid, np.tile(slack, (frames, 1))) for told in held]
+        bends = product(grid.release_turns_deg, sides, loads)
+        offered += [_release(*values, grid, np.tile(slack, (frames, 1))) for values in bends]
     if model.nu:
-        found += _motored(grid, model, kinds, frames)
-    return found
+        offered += _motored(grid, model, kinds, frames)
+    return offered
 
 
 def _sides(count: int) -> list[float]:
@@ -93,17 +93,17 @@ def _motored(grid: Recordable, model: mujoco.MjModel, kinds: tuple[str, ...], fr
     length = float(np.linalg.norm(chain.offset, axis=1).sum() + np.linalg.norm(chain.tip))
     groups = [(motor,) for motor in order]
     groups += [(a, b) for a, b in zip(order, np.roll(order, -1), strict=True)] if model.nu > 2 else []
-    time, found = np.arange(frames) / grid.frame_rate, []
+    time, offered = np.arange(frames) / grid.frame_rate, []
     for kind, shares in (("static_pull", grid.pulls), ("curl", grid.curls)):
         profile = np.interp(time, CURL_ENDS, [0, 1, 1, 0]) if kind == "curl" else np.ones(1)
         for group, share in product(groups if kind in kinds else [], shares):
             level = round(1e3 * share * length)
             pulls = np.full((len(profile), model.nu), -SLACK)
             pulls[:, list(group)] = profile[:, None] * level / 1e3
-            found.append(_pull(kind, [names[motor] for motor in group], level, pulls, grid))
+            offered.append(_pull(kind, [names[motor] for motor in group], level, pulls, grid))
     if "motion" in kinds:
-        found += [_motion(index, grid, model, length, time) for index in range(len(grid.motions))]
-    return found
+        offered += [_motion(index, grid, model, length, time) for index in range(len(grid.motions))]
+    return offered
 
 
 def _pull(kind: str, tendons: list[str], level: int, pulls: np.ndarray, grid: Recordable) -> Candidate:

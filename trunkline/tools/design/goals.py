@@ -12,7 +12,7 @@ import numpy as np
 
 from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.report.certificate.arms import arm_of, arms_with
-from trunkline.report.certificate.poses import Conditions, Poses, draw_poses
+from trunkline.report.certificate.poses import Conditions, StaticPoses, draw_poses
 from trunkline.tools.design.information import StageInformation
 from trunkline.tools.design.settings import Recordable
 
@@ -28,20 +28,20 @@ def weights_for(
 ) -> list[np.ndarray]:
     """W of each stage, 0 for a parameter that a later stage finds anew. Each (P, P)."""
     last = {name: stage.stage for stage in stages for name in stage.names}
-    own = [np.array([last[name] == stage.stage for name in stage.names], float) for stage in stages]
+    latest = [np.array([last[name] == stage.stage for name in stage.names], float) for stage in stages]
     if goal == "intervals":
-        return [np.diag(counts) / len(last) for counts in own]
+        return [np.diag(counts) / len(last) for counts in latest]
     poses = workspace(model, grid)
     if goal == "grasp":
         poses = poses[_most_wound(model, poses)]
     weights = []
-    for stage, counts in zip(stages, own, strict=True):
+    for stage, counts in zip(stages, latest, strict=True):
         moves = tip_moves(model, stage.names, poses) * (stage.half * counts)[:, None, None]
         weights.append(np.einsum("ink,jnk->ij", moves, moves) / len(poses))
     return weights
 
 
-def workspace(model: mujoco.MjModel, grid: Recordable) -> Poses:
+def workspace(model: mujoco.MjModel, grid: Recordable) -> StaticPoses:
     """Poses at rest over all that the candidates go up to."""
     arm = arm_of(model)
     length = float(np.linalg.norm(arm.chain.offset, axis=1).sum() + np.linalg.norm(arm.chain.tip))
@@ -51,7 +51,7 @@ def workspace(model: mujoco.MjModel, grid: Recordable) -> Poses:
     return draw_poses(arm.chain, conditions, POSES, np.random.default_rng(SEED))
 
 
-def tip_moves(model: mujoco.MjModel, names: list[str], poses: Poses) -> np.ndarray:
+def tip_moves(model: mujoco.MjModel, names: list[str], poses: StaticPoses) -> np.ndarray:
     """∂tip/∂z by differences to both sides, m, 0 where an arm finds no rest. Shape (P, N, 3)."""
     count = len(names)
     axes = [parameter_named(name) for name in names]
@@ -64,12 +64,12 @@ def tip_moves(model: mujoco.MjModel, names: list[str], poses: Poses) -> np.ndarr
         return np.zeros((count, len(poses), 3))
     near = arm_of(model).rest(poses).qpos
     tips = np.array([arm.tips(poses, near) for arm in arms_with(model, values)])
-    found = np.nan_to_num((tips[:count] - tips[count:]) / (2 * STEP))
-    found[missing] = 0  # what the arm lacks moves nothing
-    return found
+    slopes = np.nan_to_num((tips[:count] - tips[count:]) / (2 * STEP))
+    slopes[missing] = 0  # what the arm lacks moves nothing
+    return slopes
 
 
-def _most_wound(model: mujoco.MjModel, poses: Poses) -> np.ndarray:
+def _most_wound(model: mujoco.MjModel, poses: StaticPoses) -> np.ndarray:
     """Numbers of the poses whose joints are bent the most in all."""
     arm = arm_of(model)
     angles = np.abs(arm.rest(poses).qpos).sum(axis=1)

@@ -31,8 +31,8 @@ class Suggestion:
 
 def expected_loss(stages: list[StageInformation], weights: list[np.ndarray], chosen: list[str]) -> float:
     """Φ once `chosen` are recorded."""
-    found = (np.trace(w @ stage.covariance(chosen)) for stage, w in zip(stages, weights, strict=True))
-    return float(sum(found))
+    losses = (np.trace(w @ stage.covariance(chosen)) for stage, w in zip(stages, weights, strict=True))
+    return float(sum(losses))
 
 
 def after_each(
@@ -41,9 +41,9 @@ def after_each(
     """Φ once `chosen` and one of the candidates `offered` are recorded. Shape (C,)."""
     total = np.zeros(len(offered))
     for stage, weight in zip(stages, weights, strict=True):
-        known = np.linalg.inv(stage.covariance(chosen))
-        nothing = np.zeros_like(known)
-        matrices = known + np.stack([stage.added.get(one.name, nothing) for one in offered])
+        information = np.linalg.inv(stage.covariance(chosen))
+        nothing = np.zeros_like(information)
+        matrices = information + np.stack([stage.added.get(candidate.name, nothing) for candidate in offered])
         total += np.einsum("ij,cji->c", weight, np.linalg.inv(matrices))
     return total
 
@@ -57,18 +57,18 @@ def suggest(
     Args:
         per_minute: whether the best is what gains the most a minute, not a trial.
     """
-    found: list[Suggestion] = []
+    suggestions: list[Suggestion] = []
     chosen: list[str] = []
     before = expected_loss(stages, weights, chosen)
-    left = [one for one in offered if any(one.name in stage.added for stage in stages)]
-    while left and len(found) < count:
+    left = [candidate for candidate in offered if any(candidate.name in stage.added for stage in stages)]
+    while left and len(suggestions) < count:
         after = after_each(stages, weights, left, chosen)
-        minutes = np.array([one.minutes for one in left]) if per_minute else 1.0
+        minutes = np.array([candidate.minutes for candidate in left]) if per_minute else 1.0
         best = int(np.argmax((np.sqrt(before) - np.sqrt(after)) / minutes))
         if after[best] >= before * (1 - 1e-9):
             break
-        one = left.pop(best)
-        chosen = [*chosen, one.name]
-        found.append(Suggestion(one, before, float(after[best]), chosen))
+        candidate = left.pop(best)
+        chosen = [*chosen, candidate.name]
+        suggestions.append(Suggestion(candidate, before, float(after[best]), chosen))
         before = float(after[best])
-    return found
+    return suggestions

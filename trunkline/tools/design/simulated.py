@@ -25,42 +25,45 @@ def simulated(
     Args:
         fit: what will be identified from them; the twin is where its search would begin.
     """
-    planned = [_experiment(one, model, len(fit.segments), frame_rate) for one in chosen]
+    planned = [_experiment(candidate, model, len(fit.segments), frame_rate) for candidate in chosen]
     starts = _starts([e for e in planned if not is_static(e.kind)], model, fit)
     planned = [replace(e, start=starts.get(e.name, e.start)) for e in planned]
     done = []
     for static in (True, False):
-        own = [(one, e) for one, e in zip(chosen, planned, strict=True) if is_static(e.kind) == static]
-        if not own:
+        group = [(candidate, e) for candidate, e in zip(chosen, planned, strict=True) if is_static(e.kind) == static]
+        if not group:
             continue
-        for (one, experiment), positions in zip(own, _positions([e for _, e in own], model, fit), strict=True):
+        tracks = _positions([e for _, e in group], model, fit)
+        for (candidate, experiment), positions in zip(group, tracks, strict=True):
             if np.isfinite(positions).all():
-                done.append((one, replace(experiment, positions=positions)))
+                done.append((candidate, replace(experiment, positions=positions)))
     return done
 
 
-def _experiment(one: Candidate, model: mujoco.MjModel, segments: int, frame_rate: float) -> Experiment:
+def _experiment(candidate: Candidate, model: mujoco.MjModel, segments: int, frame_rate: float) -> Experiment:
     """Without what is measured."""
-    static, hinges = is_static(one.kind), arm_hinges(model)
-    start = _held(one, model) if one.turn else np.full(hinges, np.nan if static else 0.0)
+    static, hinges = is_static(candidate.kind), arm_hinges(model)
+    start = _bent(candidate, model) if candidate.turn else np.full(hinges, np.nan if static else 0.0)
     straight = model.tendon_length0[model.actuator_trnid[:, 0]]
     step = 0.0 if static else 1 / frame_rate
     return Experiment(
-        name=one.name, kind=one.kind, split=IDENTIFY, gravity=one.gravity, start=start, velocity=np.zeros(hinges),
-        lead=step, controls=straight - one.pulls, positions=np.zeros((len(one.pulls), segments, 3)),
-        measured=np.ones((len(one.pulls), segments), bool), frame_step=step,
-        fit=PoseFit(start, np.zeros(segments), 0, True), load=one.load,
+        name=candidate.name, kind=candidate.kind, split=IDENTIFY, gravity=candidate.gravity, start=start,
+        velocity=np.zeros(hinges), lead=step, controls=straight - candidate.pulls,
+        positions=np.zeros((len(candidate.pulls), segments, 3)),
+        measured=np.ones((len(candidate.pulls), segments), bool), frame_step=step,
+        fit=PoseFit(start, np.zeros(segments), 0, True), load=candidate.load,
     )  # fmt: skip
 
 
-def _held(one: Candidate, model: mujoco.MjModel) -> np.ndarray:
+def _bent(candidate: Candidate, model: mujoco.MjModel) -> np.ndarray:
     """Joint angles, rad, of an arm that is bent by `turn` towards `side`, every unit by the same. Shape (n,)."""
     hinges = arm_hinges(model)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    axis = np.array([np.sin(one.side), -np.cos(one.side), 0.0])  # about it, what hangs down swings towards the side
+    # about this axis a hanging arm swings towards the side
+    axis = np.array([np.sin(candidate.side), -np.cos(candidate.side), 0.0])
     units = len(np.unique(model.jnt_bodyid[:hinges]))
-    angles = one.turn / units * (data.xaxis[:hinges] @ axis)
+    angles = candidate.turn / units * (data.xaxis[:hinges] @ axis)
     limited, span = model.jnt_limited[:hinges].astype(bool), MOST_OF_RANGE * model.jnt_range[:hinges]
     return np.where(limited, np.clip(angles, span[:, 0], span[:, 1]), angles)
 
@@ -75,8 +78,8 @@ def _starts(moving: list[Experiment], model: mujoco.MjModel, fit: Fit) -> dict[s
         for e in different.values()
     ]  # fmt: skip
     rests = dict(zip(different, _twin(hanging, model, fit).rests, strict=True)) if hanging else {}
-    found = {e.name: rests[_before(e)][0] for e in driven}
-    return {name: rest for name, rest in found.items() if np.isfinite(rest).all()}
+    starts = {e.name: rests[_before(e)][0] for e in driven}
+    return {name: rest for name, rest in starts.items() if np.isfinite(rest).all()}
 
 
 def _before(experiment: Experiment) -> bytes:
@@ -86,7 +89,7 @@ def _before(experiment: Experiment) -> bytes:
 
 def _positions(experiments: list[Experiment], model: mujoco.MjModel, fit: Fit) -> list[np.ndarray]:
     """Of the segments, m, NaN where the twin finds no rest or leaves the physics. Each (T, S, 3)."""
-    return [one[0] for one in _twin(experiments, model, fit).positions]
+    return [tracks[0] for tracks in _twin(experiments, model, fit).positions]
 
 
 def _twin(experiments: list[Experiment], model: mujoco.MjModel, fit: Fit) -> Simulated:

@@ -4,7 +4,7 @@ import numpy as np
 import yaml
 
 from trunkline.identification.parameters.parameters import parameter_named
-from trunkline.identification.uncertainty.identifiability import TWO_SIDED, Told
+from trunkline.identification.uncertainty.identifiability import TWO_SIDED, Identifiability
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.recordings.trials.splits import IDENTIFY
 from trunkline.tools.design.candidates import Candidate
@@ -31,17 +31,17 @@ def loss_words(goal: Goal, loss: float) -> str:
 
 def widest_words(stages: list[StageInformation], chosen: list[str]) -> str:
     """The widest interval over its range, as the last stage that identifies a parameter leaves it."""
-    last = {one.name: (one, stage.stage) for stage in stages for one in stage.told(chosen)}
-    told, stage = max(last.values(), key=lambda pair: pair[0].share)
-    return f"{told.words()} ({stage})"
+    last = {estimate.name: (estimate, stage.stage) for stage in stages for estimate in stage.identifiability(chosen)}
+    widest, stage = max(last.values(), key=lambda pair: pair[0].share)
+    return f"{widest.words()} ({stage})"
 
 
-def table_lines(goal: Goal, found: list[Suggestion]) -> list[str]:
+def table_lines(goal: Goal, suggestions: list[Suggestion]) -> list[str]:
     """A line a suggestion, in their order: what it leaves, by how much it shrinks that, and what it costs."""
     rows = [["", "trial", "expected after it", "gain", "minutes", "gain a minute"]]
-    for number, one in enumerate(found, 1):
-        told = [one.candidate.name, loss_words(goal, one.after), *_numbers(one.gain, one.candidate)]
-        rows.append([f"{number}", *told])
+    for number, suggestion in enumerate(suggestions, 1):
+        candidate, left = suggestion.candidate, loss_words(goal, suggestion.after)
+        rows.append([f"{number}", candidate.name, left, *_numbers(suggestion.gain, candidate)])
     return aligned(rows)
 
 
@@ -63,48 +63,48 @@ def kind_lines(goal: Goal, before: float, after: np.ndarray, offered: list[Candi
     return aligned(rows)
 
 
-def why_words(stages: list[StageInformation], weights: list[np.ndarray], one: Suggestion) -> str:
+def why_words(stages: list[StageInformation], weights: list[np.ndarray], suggestion: Suggestion) -> str:
     """The parameters by which a suggestion shrinks the loss the most, once those before it are recorded."""
-    shares: list[tuple[float, Told, Told]] = []
+    shares: list[tuple[float, Identifiability, Identifiability]] = []
     for stage, weight in zip(stages, weights, strict=True):
-        old, new = stage.told(one.chosen[:-1]), stage.told(one.chosen)
+        old, new = stage.identifiability(suggestion.chosen[:-1]), stage.identifiability(suggestion.chosen)
         for before, now, counts in zip(old, new, np.diag(weight), strict=True):
             shares.append((float(counts) * (before.share**2 - now.share**2), before, now))
     shares.sort(key=lambda row: -row[0])
     total = sum(max(share, 0.0) for share, *_ in shares)
-    said = [_change(before, now) for share, before, now in shares[:NAMED] if share > LEAST * total]
-    return "; ".join(said) if said else "tells a little of everything"
+    changes = [_change(before, now) for share, before, now in shares[:NAMED] if share > LEAST * total]
+    return "; ".join(changes) if changes else "tells a little of everything"
 
 
-def _change(before: Told, now: Told) -> str:
+def _change(before: Identifiability, now: Identifiability) -> str:
     return f"{before.name} {_width(before)} now, then {_width(now)}"
 
 
-def _width(told: Told) -> str:
+def _width(estimate: Identifiability) -> str:
     """Of an interval: a number in its unit, a factor, or percent where that is as good."""
-    parameter = parameter_named(told.name)
-    if told.share >= 1:
+    parameter = parameter_named(estimate.name)
+    if estimate.share >= 1:
         return "undetermined"
     if parameter.signed:
-        return f"± {told.half_width * parameter.scale:.2g} {parameter.unit}".rstrip()
-    if told.half_width < PERCENT:
-        return f"± {100 * told.half_width:.2g} %"
-    return f"within a factor of {np.exp(told.half_width):.2f}"
+        return f"± {estimate.half_width * parameter.scale:.2g} {parameter.unit}".rstrip()
+    if estimate.half_width < PERCENT:
+        return f"± {100 * estimate.half_width:.2g} %"
+    return f"within a factor of {np.exp(estimate.half_width):.2f}"
 
 
-def entry_lines(found: list[Candidate], taken: set[str]) -> list[str]:
+def entry_lines(chosen: list[Candidate], taken: set[str]) -> list[str]:
     """Entries of `trials` in session.yaml, a line each, with names that are not `taken` yet."""
     lines, taken = [], set(taken)
-    for one in found:
-        name = one.name
+    for candidate in chosen:
+        name = candidate.name
         while name in taken:
             name = f"{name}_again"
         taken.add(name)
-        entry: dict[str, str | float] = {"file": f"{name}.mcap", "experiment": one.kind}
-        if one.level is not None:
-            entry["level"] = int(one.level) if one.level == int(one.level) else one.level
-        if one.load:
-            entry["load"] = one.load
+        entry: dict[str, str | float] = {"file": f"{name}.mcap", "experiment": candidate.kind}
+        if candidate.level is not None:
+            entry["level"] = int(candidate.level) if candidate.level == int(candidate.level) else candidate.level
+        if candidate.load:
+            entry["load"] = candidate.load
         text = yaml.safe_dump(entry | {"split": IDENTIFY}, default_flow_style=True, sort_keys=False, width=1000)
         lines.append(f"  - {text.strip()}")
     return lines
@@ -120,5 +120,5 @@ def aligned(rows: list[list[str]]) -> list[str]:
     ]  # fmt: skip
 
 
-def _numbers(gain: float, one: Candidate) -> list[str]:
-    return [f"{100 * gain:.1f} %", f"{one.minutes:g}", f"{100 * gain / one.minutes:.1f} %"]
+def _numbers(gain: float, candidate: Candidate) -> list[str]:
+    return [f"{100 * gain:.1f} %", f"{candidate.minutes:g}", f"{100 * gain / candidate.minutes:.1f} %"]

@@ -1,4 +1,4 @@
-"""A model against a session, without a fit: `python -m trunkline.tools.evaluate`."""
+"""A model against a session, without a fit: `trunkline evaluate`."""
 
 from trunkline.compute.numerics import hold_arithmetic
 

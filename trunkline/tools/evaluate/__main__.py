@@ -1,4 +1,4 @@
-"""How far a model is from a session, without a fit: `python -m trunkline.tools.evaluate MODEL SESSION`
+"""How far a model is from a session, without a fit: `trunkline evaluate MODEL SESSION`
 
 Prints the errors of every trial and their means, beside what knows nothing of forces (the mean rest shape, the straight
 arm, the start held) and beside the noise floor. All in mm; of what stands beside, position / tip error. Writes
@@ -6,7 +6,6 @@ metrics.json, trials.csv, segments.csv and two pictures. With --reference, how t
 """
 
 import argparse
-import hashlib
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -14,11 +13,12 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from trunkline.errors import InputError, in_one_line
+from trunkline.files import file_digest
 from trunkline.identification.evaluation.error_tables import segment_table, trial_table
 from trunkline.identification.results.scoring import evaluate
 from trunkline.identification.simulate.checks import check_trials
-from trunkline.pipeline.stage import output_folder, write_json
-from trunkline.program import called
+from trunkline.pipeline.stage import output_folder, write_metrics
+from trunkline.program import program_name
 from trunkline.recordings.trials.trial import sessions_of
 from trunkline.tools.evaluate.model import read_arm, written_beside
 from trunkline.tools.evaluate.report import change_lines, kind_lines, read_reference, trial_lines
@@ -28,7 +28,7 @@ from trunkline.tools.evaluate.session import trials_of
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.tools.evaluate"),
+        prog=program_name("evaluate"),
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -44,21 +44,21 @@ def main(arguments: list[str] | None = None) -> int:
         "--settings", type=Path, metavar="FOLDER", default=Path("."),
         help="whose params.yaml says how to filter logs; default: the current folder",
     )  # fmt: skip
-    told = parser.parse_args(arguments)
+    args = parser.parse_args(arguments)
     with threadpool_limits(1, user_api="blas"):  # as the stages: sums depend on how many cores there are
-        return _run(told)
+        return _run(args)
 
 
-def _run(told: argparse.Namespace) -> int:
-    out = told.out or Path("evaluation") / told.session.resolve().name
+def _run(args: argparse.Namespace) -> int:
+    out = args.out or Path("evaluation") / args.session.resolve().name
     if out.exists() and not (out / "metrics.json").is_file() and any(out.iterdir()):
         raise InputError(f"--out: {out}: found other files in it, expected a new folder or an earlier evaluation")
-    reference = None if told.reference is None else read_reference(told.reference)
-    if told.reference is not None and out.resolve() in (told.reference.resolve(), told.reference.resolve().parent):
+    reference = None if args.reference is None else read_reference(args.reference)
+    if args.reference is not None and out.resolve() in (args.reference.resolve(), args.reference.resolve().parent):
         raise InputError(f"--out: {out}: found the reference there, expected another folder: it would be written over")
-    models = {"model": read_arm(told.model)} | ({} if told.cad is None else {"cad": read_arm(told.cad)})
-    written = written_beside(told.model, told.settings)
-    trials = trials_of(told.session, told.settings, "evaluate")
+    models = {"model": read_arm(args.model)} | ({} if args.cad is None else {"cad": read_arm(args.cad)})
+    written = written_beside(args.model, args.settings)
+    trials = trials_of(args.session, args.settings, "evaluate")
     if len(sessions_of(trials)) == 1 and (session := written.session_of(trials)):
         print(f"evaluate: the session {session} of those that the model was fitted to")
         trials = [replace(trial, session=session, name=f"{session}/{trial.name}") for trial in trials]
@@ -72,7 +72,7 @@ def _run(told: argparse.Namespace) -> int:
     metrics, predictions = evaluate(models, trials, written.frames, written.command_delay)
     fitted = {trial.name for trial in trials if written.saw(trial)}
     metrics["evaluated"] = {
-        "model": hashlib.sha256(told.model.read_bytes()).hexdigest()[:16],
+        "model": file_digest(args.model)[:16],
         "frames": written.frames,
         "command_delay": written.command_delay,
         "fitted_to": sorted(fitted),
@@ -80,13 +80,13 @@ def _run(told: argparse.Namespace) -> int:
     table = trial_table(predictions)
     print("\nErrors in mm; of what stands beside the model, position / tip error")
     print("\n".join(["", *trial_lines(table, fitted), "", *kind_lines(metrics)]))
-    for session, own in metrics.get("by_session", {}).items():
-        print("\n".join(["", f"session {session}", *kind_lines(own)]))
+    for session, session_metrics in metrics.get("by_session", {}).items():
+        print("\n".join(["", f"session {session}", *kind_lines(session_metrics)]))
     if fitted:
         print(f"\n* the model was fitted to these {len(fitted)} of {len(trials)} trials")
     if reference is not None:
         print("\n".join(["", *change_lines(reference, metrics)]))
-    _write(out, metrics, table, segment_table(predictions, segments), told.session.resolve().name)
+    _write(out, metrics, table, segment_table(predictions, segments), args.session.resolve().name)
     print(f"\nevaluate: written to {out}")
     return 0
 
@@ -96,7 +96,7 @@ def _write(out: Path, metrics: dict, trials, segments, title: str) -> None:
     from trunkline.report.figures.style import save_figure
 
     with output_folder(out) as folder:
-        write_json(folder / "metrics.json", metrics)
+        write_metrics(folder, metrics)
         trials.to_csv(folder / "trials.csv", index=False, float_format="%.6g")
         segments.to_csv(folder / "segments.csv", index=False, float_format="%.6g")
         save_figure(trial_figure({title: trials}), folder / "errors.png")

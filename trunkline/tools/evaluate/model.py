@@ -12,12 +12,12 @@ from trunkline.errors import InputError
 from trunkline.identification.parameters.parameters import APART, PARAMETERS
 from trunkline.identification.parameters.per_session import names_in
 from trunkline.identification.results.scoring import fingerprint
+from trunkline.identification.stages import STAGES
 from trunkline.pipeline.config import settings_of
 from trunkline.pipeline.inputs import read_spec
 from trunkline.recordings.trials.trial import Trial, sessions_of
 
 TABLE = "parameters.json"
-STAGES = ("identify_stiffness", "identify_damping", "identify_control")  # in their order: each goes on from the last
 MOST_TURN = np.radians(30)  # of the mount in the tracked base, as it may be identified; more is another frame
 
 
@@ -41,16 +41,16 @@ class Written:
         Empty where it saw none, or was fitted to one session."""
         for trial in trials:
             digest = fingerprint(trial)
-            for name, seen in self.fitted_to.items():
-                if seen == digest and name != trial.name and name.endswith(f"/{trial.name}"):
+            for name, fitted in self.fitted_to.items():
+                if fitted == digest and name != trial.name and name.endswith(f"/{trial.name}"):
                     return name.removesuffix(f"/{trial.name}")
         return ""
 
     def namesakes(self, model: mujoco.MjModel, trials: list[Trial]) -> list[str]:
         """Sessions of `trials` of whose names `model` has numbers, though it was fitted to none of their trials."""
         named = {name.partition(APART)[2] for name in names_in(model, PARAMETERS)}
-        seen = {trial.session for trial in trials if self.saw(trial)}
-        return [session for session in sessions_of(trials) if self.fitted_to and session in named - seen]
+        fitted_sessions = {trial.session for trial in trials if self.saw(trial)}
+        return [session for session in sessions_of(trials) if self.fitted_to and session in named - fitted_sessions]
 
 
 def written_beside(path: Path, root: Path) -> Written:
@@ -94,7 +94,7 @@ def read_arm(path: Path) -> mujoco.MjModel:
     mount = data.site("base_center")
     turn = float(Rotation.from_matrix(mount.xmat.reshape(3, 3)).magnitude())
     if not np.allclose(mount.xpos, 0, atol=1e-9) or turn > MOST_TURN:
-        found = f"found it at {np.round(mount.xpos, 4).tolist()} m and turned by {np.degrees(turn):.1f}°"
+        actual = f"found it at {np.round(mount.xpos, 4).tolist()} m and turned by {np.degrees(turn):.1f}°"
         expected = f"expected it in the world's origin and turned by {np.degrees(MOST_TURN):.0f}° at most"
-        raise InputError(f"{path}: site 'base_center': {found}, {expected}")
+        raise InputError(f"{path}: site 'base_center': {actual}, {expected}")
     return model

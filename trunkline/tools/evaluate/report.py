@@ -6,9 +6,8 @@ from pathlib import Path
 import pandas as pd
 
 from trunkline.errors import InputError
-from trunkline.identification.evaluation.error_tables import LABELS
+from trunkline.identification.evaluation.error_tables import LABELS, REFERENCES, number, pair
 
-BESIDE = ("cad", "null", "null_straight", "null_held", "noise_floor")
 ERRORS = ("e_internal_mm", "e_position_mm", "e_tip_mm")
 
 
@@ -17,23 +16,23 @@ def trial_lines(trials: pd.DataFrame, fitted: set[str]) -> list[str]:
     models = {name for name, label in LABELS.items() if label in set(trials.model)}
     rows = [["trial", "experiment", "split", *_heads(models)]]
     for trial in dict.fromkeys(trials.trial):
-        own = trials[trials.trial == trial].set_index("model")
-        errors = {name: own.loc[LABELS[name]].to_dict() for name in models if LABELS[name] in own.index}
-        told = errors["model"]
+        of_trial = trials[trials.trial == trial].set_index("model")
+        errors = {name: of_trial.loc[LABELS[name]].to_dict() for name in models if LABELS[name] in of_trial.index}
+        scores = errors["model"]
         label = f"{trial} *" if trial in fitted else trial
-        rows.append([label, told["experiment"], told["split"], *_cells(errors, models)])
+        rows.append([label, scores["experiment"], scores["split"], *_cells(errors, models)])
     return _aligned(rows, 3)
 
 
 def kind_lines(metrics: dict) -> list[str]:
     """A line a kind: means over its trials, and how well the arm repeats itself."""
-    models = {name for name in ("model", *BESIDE) if name in metrics}
+    models = {name for name in ("model", *REFERENCES) if name in metrics}
     repeats = metrics["repeatability_mm"]
     rows = [["mean of", "trials", *_heads(models), "repeatability"]]
     for kind, table in metrics["model"]["by_experiment"].items():
         errors = {name: metrics[name]["by_experiment"].get(kind, {}) for name in models}
-        found = repeats.get(kind, {})
-        scatter = _pair(found.get("mean_mm"), found.get("tip_mm"))
+        repeat = repeats.get(kind, {})
+        scatter = pair(repeat.get("mean_mm"), repeat.get("tip_mm"))
         rows.append([kind, str(table["trials"]), *_cells(errors, models), scatter])
     return _aligned(rows, 1)
 
@@ -51,7 +50,7 @@ def read_reference(path: Path) -> dict:
     except FileNotFoundError:
         raise InputError(f"--reference: {file}: no such file, expected metrics.json of another evaluation") from None
     except (ValueError, KeyError, TypeError) as error:
-        expected = "expected what `python -m trunkline.tools.evaluate` writes"
+        expected = "expected what `trunkline evaluate` writes"
         raise InputError(f"--reference: {file}: {error!r}, {expected}") from error
     return metrics
 
@@ -67,37 +66,30 @@ def change_lines(before: dict, now: dict) -> list[str]:
              (new.keys() - old.keys(), "session")) for kind in sorted(kinds)]  # fmt: skip
     lines += [f"not compared: {', '.join(alone)}"] if alone else []
     for key, words in (("model", "another model"), ("frames", "other numbers of frames"), ("command_delay", "a delay")):
-        one, other = (metrics["evaluated"].get(key) for metrics in (before, now))
-        if one != other:
-            lines.append(f"the reference is of {words} ({one}, here {other}): not all of the change is the arm's")
+        old_value, new_value = (metrics["evaluated"].get(key) for metrics in (before, now))
+        if old_value != new_value:
+            both = f"({old_value}, here {new_value})"
+            lines.append(f"the reference is of {words} {both}: not all of the change is the arm's")
     return lines
 
 
 def _heads(models: set[str]) -> list[str]:
-    return ["E_internal", "position", "tip", "tip %", *(LABELS[name] for name in BESIDE if name in models)]
+    return ["E_internal", "position", "tip", "tip %", *(LABELS[name] for name in REFERENCES if name in models)]
 
 
 def _cells(errors: dict[str, dict], models: set[str]) -> list[str]:
-    found = errors["model"]
+    scores = errors["model"]
     pairs = [
-        _pair(row.get("e_position_mm"), row.get("e_tip_mm"))
-        for row in (errors.get(name, {}) for name in BESIDE if name in models)
+        pair(row.get("e_position_mm"), row.get("e_tip_mm"))
+        for row in (errors.get(name, {}) for name in REFERENCES if name in models)
     ]
-    return [*(_number(found.get(error)) for error in (*ERRORS, "e_tip_pct")), *pairs]
+    return [*(number(scores.get(error)) for error in (*ERRORS, "e_tip_pct")), *pairs]
 
 
 def _change(old: float | None, new: float | None) -> str:
     if old is None or new is None:
         return "–"
-    return f"{_number(old)} → {_number(new)} mm ({round(100 * (new / old - 1)):+d} %)"
-
-
-def _pair(position: float | None, tip: float | None) -> str:
-    return "–" if position is None else f"{_number(position)} / {_number(tip)}"
-
-
-def _number(value: float | None) -> str:
-    return "–" if value is None or pd.isna(value) else f"{value:.3g}"
+    return f"{number(old)} → {number(new)} mm ({round(100 * (new / old - 1)):+d} %)"
 
 
 def _aligned(rows: list[list[str]], words: int) -> list[str]:

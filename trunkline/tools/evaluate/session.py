@@ -49,26 +49,26 @@ def read_trials_of(folder: Path, root: Path, caller: str) -> tuple[list[Trial], 
     segments = trials[0].segments
     other = next((trial for trial in trials if trial.segments != segments), None)
     if other is not None:
-        found = f"found {len(other.segments)} segments, expected the {len(segments)} of {trials[0].name}"
-        raise InputError(f"{folder}: trial {other.name}: {found}")
+        mismatch = f"found {len(other.segments)} segments, expected the {len(segments)} of {trials[0].name}"
+        raise InputError(f"{folder}: trial {other.name}: {mismatch}")
     return trials, []
 
 
 def _from_logs(folder: Path, root: Path, caller: str) -> tuple[list[Trial], list[Take]]:
     ingest, settings = settings_of("ingest", root), settings_of("filter", root)
     take = partial(_gathered, ingest=ingest, caller=caller)
-    found = gather_each(session_folders(folder), take, ingest.plausible.distance)
-    gathered = together(list(found.values()))
+    quality = gather_each(session_folders(folder), take, ingest.plausible.distance)
+    gathered = together(list(quality.values()))
     for name, reason in gathered.refused.items():
         print(f"{caller}: left out {name}: {reason}", file=sys.stderr)
-    qualities = [judge(take, found) for take, found in zip(gathered.takes, gathered.findings, strict=True)]
-    for line in by_sentence(qualities, lambda found: found.repairs):
+    qualities = [judge(take, findings) for take, findings in zip(gathered.takes, gathered.findings, strict=True)]
+    for line in by_sentence(qualities, lambda quality: quality.repairs):
         print(f"{caller}: repaired: {line}", file=sys.stderr)
-    for line in by_sentence(qualities, lambda found: found.warnings):
+    for line in by_sentence(qualities, lambda quality: quality.warnings):
         print(f"{caller}: warning: {line}", file=sys.stderr)
     trials = []
-    for take, found in zip(gathered.takes, gathered.findings, strict=True):
-        take.repairs = len(found.repairs)
+    for take, quality in zip(gathered.takes, gathered.findings, strict=True):
+        take.repairs = len(quality.repairs)
         trials.append(filter_take(take, settings)[0])
     return trials, gathered.takes
 

@@ -1,4 +1,4 @@
-"""Whether an arm has changed since its model was identified: `python -m trunkline.tools.monitor`."""
+"""Whether an arm has changed since its model was identified: `trunkline monitor`."""
 
 from trunkline.compute.numerics import hold_arithmetic
 

@@ -1,4 +1,4 @@
-"""Whether an arm has changed since its model was identified: `python -m trunkline.tools.monitor MODEL FOLDER`
+"""Whether an arm has changed since its model was identified: `trunkline monitor MODEL FOLDER`
 
 Into FOLDER a lab drops sessions (folders with logs and session.yaml), or logs of one. Each trial is scored against the
 model without a fit; a control chart says when the arm has changed and which parameter would explain it. Writes
@@ -14,16 +14,16 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from trunkline.errors import in_one_line
-from trunkline.program import called
-from trunkline.tools.monitor.monitor import LEARN, Watch
+from trunkline.program import program_name
+from trunkline.tools.monitor.monitor import LEARN, DriftMonitor
 
 UNCHANGED, CHANGED, UNUSABLE = 0, 1, 2
-ENDED = 10  # so that it is told from what `in_one_line` returns after a mistake
+ENDED = 10  # apart from what `in_one_line` returns after a mistake
 
 
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.tools.monitor"),
+        prog=program_name("monitor"),
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -37,27 +37,27 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, metavar="FOLDER", help="where to write; default: watch/<folder>")
     parser.add_argument("--settings", type=Path, metavar="FOLDER", default=Path("."),
                         help="whose params.yaml says how to filter logs; default: the current folder")  # fmt: skip
-    told = parser.parse_args(arguments)
-    ended = _run(told)
+    args = parser.parse_args(arguments)
+    ended = _run(args)
     return ended - ENDED if ended >= ENDED else UNUSABLE
 
 
 @in_one_line
-def _run(told: argparse.Namespace) -> int:
-    out = told.out or Path("watch") / told.folder.resolve().name
-    with threadpool_limits(1, user_api="blas"), Watch.begun(told.model, told.folder, told.reference, out,
-                                                            told.settings) as watch:  # fmt: skip
+def _run(args: argparse.Namespace) -> int:
+    out = args.out or Path("watch") / args.folder.resolve().name
+    with threadpool_limits(1, user_api="blas"), DriftMonitor.begun(args.model, args.folder, args.reference, out,
+                                                            args.settings) as monitor:  # fmt: skip
         try:
             while True:
-                unusable = watch.look()
-                if told.once:
-                    print(f"watch: {watch.summary()}")
+                unusable = monitor.look()
+                if args.once:
+                    print(f"monitor: {monitor.summary()}")
                     break
-                time.sleep(told.every)
+                time.sleep(args.every)
         except KeyboardInterrupt:
             unusable = 0
-            print("watch: interrupted; what was scored is kept")
-        changed = watch.chart.changed() is not None
+            print("monitor: interrupted; what was scored is kept")
+        changed = monitor.chart.changed() is not None
         return ENDED + (CHANGED if changed else UNUSABLE if unusable else UNCHANGED)
 
 

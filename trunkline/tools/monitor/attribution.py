@@ -1,4 +1,4 @@
-"""Which parameter's change explains best what the trials of an alarm show, by how much, and what cannot be told apart.
+"""Attribute an alarm to the change of one parameter: which explains it best, by how much, and which cannot be excluded.
 
 A change Δ of parameter p alone moves the estimate d_q of every parameter q by (JᵀJ)_qp / (JᵀJ)_qq Δ: what is charted
 for one parameter shows on the charts of those that move the arm alike. So Δ is fitted to all estimates of all trials
@@ -16,7 +16,7 @@ from scipy.special import chdtri, stdtrit
 from trunkline.tools.monitor.baseline import Baseline
 from trunkline.tools.monitor.chart import Charted
 
-APART = 3.84  # of χ², the 95th percentile for one degree of freedom: less does not tell two parameters apart
+APART = 3.84  # of χ², the 95th percentile for one degree of freedom: less does not separate two parameters
 CHANCE = 1e-3  # of more than what is left, below which one parameter does not explain it all
 
 
@@ -34,8 +34,8 @@ class Change:
 
 
 @dataclass(frozen=True)
-class Explanation:
-    """best: the change that explains most. alike: others that cannot be told apart from it, best first.
+class Attribution:
+    """best: the change that explains most. alike: others that the trials cannot separate from it, best first.
 
     whole: whether what is left is chance.
     """
@@ -45,10 +45,11 @@ class Explanation:
     whole: bool
 
 
-def explain(trials: list[Charted], baseline: Baseline, parameters: list[int]) -> Explanation:
-    """What explains `trials` best, of a change in one of `parameters`."""
-    correlation = {kind: _correlation(kind, baseline) for kind in {one.score.kind for one in trials if one.departures}}
-    rows = [(i, p) for i, one in enumerate(trials) for p in sorted(one.departures)]
+def attribute_change(trials: list[Charted], baseline: Baseline, parameters: list[int]) -> Attribution:
+    """The change of one of `parameters` that explains `trials` best."""
+    kinds = {trial.score.kind for trial in trials if trial.departures}
+    correlation = {kind: _correlation(kind, baseline) for kind in kinds}
+    rows = [(i, p) for i, trial in enumerate(trials) for p in sorted(trial.departures)]
     off = np.array([trials[i].departures[p].change for i, p in rows])
     covariance = np.zeros((len(rows), len(rows)))
     for a, (i, p) in enumerate(rows):
@@ -56,7 +57,7 @@ def explain(trials: list[Charted], baseline: Baseline, parameters: list[int]) ->
             if trials[i].score.kind == trials[j].score.kind:
                 covariance[a, b] = correlation[trials[i].score.kind][p, q] * _shared(trials[i], p, trials[j], q, i == j)
     inverse = np.linalg.pinv(covariance, hermitian=True)
-    degrees = min(one.departures[p].group.degrees for one in trials for p in one.departures)
+    degrees = min(trial.departures[p].group.degrees for trial in trials for p in trial.departures)
     changes = []
     for p in parameters:
         response = np.array([_response(trials[i], q, p) for i, q in rows])
@@ -69,19 +70,19 @@ def explain(trials: list[Charted], baseline: Baseline, parameters: list[int]) ->
     left, free = float(off @ inverse @ off) - changes[0].gain, max(len(rows) - 1, 1)
     wider = np.sqrt(max(left / free, 1.0))
     best, *others = (replace(change, half_width=float(wider * change.half_width)) for change in changes)
-    alike = [one for one in others if best.gain - one.gain < APART * wider**2]
-    return Explanation(best, alike, left <= float(chdtri(free, CHANCE)))
+    alike = [change for change in others if best.gain - change.gain < APART * wider**2]
+    return Attribution(best, alike, left <= float(chdtri(free, CHANCE)))
 
 
-def _shared(one: Charted, p: int, other: Charted, q: int, same: bool) -> float:
+def _shared(trial: Charted, p: int, other: Charted, q: int, same: bool) -> float:
     """Covariance of two estimates if parameters were wholly correlated: of the same trial, and of the same group."""
-    first, second = one.departures[p].group, other.departures[q].group
-    found = 0.0
+    first, second = trial.departures[p].group, other.departures[q].group
+    covariance = 0.0
     if same:
-        found += first.spread * second.spread / np.sqrt(one.score.information[p] * other.score.information[q])
+        covariance += first.spread * second.spread / np.sqrt(trial.score.information[p] * other.score.information[q])
     if first.key == second.key:
-        found += first.shared(one.score.level) @ second.shared(other.score.level)
-    return float(found)
+        covariance += first.shared(trial.score.level) @ second.shared(other.score.level)
+    return float(covariance)
 
 
 def _response(trial: Charted, q: int, p: int) -> float:
@@ -91,25 +92,25 @@ def _response(trial: Charted, q: int, p: int) -> float:
 
 def _correlation(kind: str, baseline: Baseline) -> np.ndarray:
     """Of the estimates of an unchanged arm's trials of a kind, shrunk towards none. Shape (P, P)."""
-    known = enumerate(baseline.reference)
-    own = [score for number, score in known if score.kind == kind and number not in baseline.odd]
+    numbered = enumerate(baseline.reference)
+    scores = [score for number, score in numbered if score.kind == kind and number not in baseline.outliers]
     count = len(baseline.reference[0].slope)
-    values = np.full((len(own), count), np.nan)
-    for i, score in enumerate(own):
+    values = np.full((len(scores), count), np.nan)
+    for i, score in enumerate(scores):
         for p, departure in baseline.departures(score).items():
             values[i, p] = departure.change / departure.deviation
-    found = np.eye(count)
-    told = np.flatnonzero(np.isfinite(values).sum(axis=0) > 3)
-    complete = values[:, told][np.isfinite(values[:, told]).all(axis=1)]
-    if len(told) < 2 or len(complete) < 4:
-        return found
+    result = np.eye(count)
+    estimated = np.flatnonzero(np.isfinite(values).sum(axis=0) > 3)
+    complete = values[:, estimated][np.isfinite(values[:, estimated]).all(axis=1)]
+    if len(estimated) < 2 or len(complete) < 4:
+        return result
     number = len(complete)
     scaled = (complete - complete.mean(axis=0)) / np.maximum(complete.std(axis=0, ddof=1), 1e-300)
     products = np.einsum("np,nq->npq", scaled, scaled)
     middle = products.mean(axis=0)
     correlation = number / (number - 1) * middle
     scatter = number / (number - 1) ** 3 * np.square(products - middle).sum(axis=0)
-    apart = ~np.eye(len(told), dtype=bool)
+    apart = ~np.eye(len(estimated), dtype=bool)
     shrunk = np.clip(scatter[apart].sum() / max(np.square(correlation[apart]).sum(), 1e-300), 0, 1)
-    found[np.ix_(told, told)] = np.where(apart, (1 - shrunk) * correlation, 1.0)
-    return found
+    result[np.ix_(estimated, estimated)] = np.where(apart, (1 - shrunk) * correlation, 1.0)
+    return result

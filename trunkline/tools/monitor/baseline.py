@@ -7,9 +7,9 @@ to three powers, each further one where an F test has it needed (`CHANCE`), and 
 powers. A new trial is then off by (d - m) / (s √(1/I + xᵀCx)), with s² C the
 covariance of β, which has Student's distribution with ν degrees of freedom (the variance of a prediction).
 
-Reference trials that are unlike the others of their kind (`odd.py`) are left out. Where two or more were done as the
-new one was (kind, level, load), m is their mean, and s is pooled within such conditions. Fewer than `LEAST` degrees of
-freedom chart nothing.
+Reference trials that are unlike the others of their kind (`outliers.py`) are left out. Where two or more were done
+as the new one was (kind, level, load), m is their mean, and s is pooled within such conditions. Fewer than `LEAST`
+degrees of freedom chart nothing.
 """
 
 from collections import Counter, defaultdict
@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.special import fdtrc, ndtri, stdtr
 
-from trunkline.tools.monitor.outliers import odd
+from trunkline.tools.monitor.outliers import find_outliers
 from trunkline.tools.monitor.scores import Score
 
 LEAST = 4  # degrees of freedom of a spread
@@ -49,8 +49,8 @@ class Group:
 
     def shared(self, level: float | None) -> np.ndarray:
         """By how much m is off there for each of POWERS independent standard normal errors, (POWERS,)."""
-        found = self.error.T @ self._powers(level)
-        return np.pad(found, (0, POWERS - len(found)))
+        factors = self.error.T @ self._powers(level)
+        return np.pad(factors, (0, POWERS - len(factors)))
 
     def deviation(self, score: Score, p: int) -> float:
         """Standard deviation of a new estimate's difference from m."""
@@ -79,11 +79,11 @@ class Departure:
 class Baseline:
     """Of `reference` scores, all of the same P parameters.
 
-    odd: numbers of those that were left out as unlike the others, with the numbers of those parameters.
+    outliers: numbers of those that were left out as unlike the others, with the numbers of those parameters.
     """
 
     reference: list[Score]
-    odd: dict[int, list[int]] = field(default_factory=lambda: defaultdict(list))
+    outliers: dict[int, list[int]] = field(default_factory=lambda: defaultdict(list))
     _kinds: dict[tuple[str, int], tuple[float, Group | None, dict[tuple, Group]]] = field(default_factory=dict)
 
     def __post_init__(self):
@@ -91,12 +91,12 @@ class Baseline:
         place = {id(score): number for number, score in enumerate(self.reference)}
         for score in self.reference:
             by_kind[score.kind].append(score)
-        for kind, own in by_kind.items():
-            for p in range(len(own[0].slope)):
-                least, kept, left_out = _telling(own, p)
-                self._kinds[kind, p] = _groups(kind, kept, p, least)
+        for kind, scores in by_kind.items():
+            for p in range(len(scores[0].slope)):
+                least, telling, left_out = _telling(scores, p)
+                self._kinds[kind, p] = _groups(kind, telling, p, least)
                 for score in left_out:
-                    self.odd[place[id(score)]].append(p)
+                    self.outliers[place[id(score)]].append(p)
 
     def departure(self, score: Score, p: int) -> Departure | None:
         """Of parameter `p`; None where the trial does not tell it, or too few reference trials do."""
@@ -110,21 +110,21 @@ class Baseline:
 
     def departures(self, score: Score) -> dict[int, Departure]:
         """By the number of the parameter, of those that the trial tells."""
-        found = {p: self.departure(score, p) for p in range(len(score.slope))}
-        return {p: one for p, one in found.items() if one is not None}
+        departures = {p: self.departure(score, p) for p in range(len(score.slope))}
+        return {p: departure for p, departure in departures.items() if departure is not None}
 
     def typical(self, p: int) -> list[tuple[Departure, Score]]:
         """Of each reference trial that tells parameter `p`: how one like it is judged."""
-        kept = [score for number, score in enumerate(self.reference) if p not in self.odd.get(number, ())]
-        found = [(self.departure(score, p), score) for score in kept]
-        return [(one, score) for one, score in found if one is not None]
+        regular = [score for number, score in enumerate(self.reference) if p not in self.outliers.get(number, ())]
+        pairs = [(self.departure(score, p), score) for score in regular]
+        return [(departure, score) for departure, score in pairs if departure is not None]
 
 
-def _telling(own: list[Score], p: int) -> tuple[float, list[Score], list[Score]]:
+def _telling(scores: list[Score], p: int) -> tuple[float, list[Score], list[Score]]:
     """Of one kind's trials: the least information that counts, those that tell parameter `p`, and, out of these, those
     that are unlike the others."""
-    least = TELLING * float(np.median([score.information[p] for score in own]))
-    telling = [score for score in own if score.information[p] > least]
+    least = TELLING * float(np.median([score.information[p] for score in scores]))
+    telling = [score for score in scores if score.information[p] > least]
     if len(telling) <= LEAST:
         return least, telling, []
     left_out = []
@@ -132,7 +132,8 @@ def _telling(own: list[Score], p: int) -> tuple[float, list[Score], list[Score]]
         alike = [score for score in telling if score.load == load]
         weights, values = _columns(alike, p)
         design = np.concatenate([_designs(alike)[-1], _repeated(alike)], axis=1)
-        left_out += [score for score, is_odd in zip(alike, odd(values, weights, design, LEAST), strict=True) if is_odd]
+        outliers = find_outliers(values, weights, design, LEAST)
+        left_out += [score for score, is_outlier in zip(alike, outliers, strict=True) if is_outlier]
     return least, [score for score in telling if score not in left_out], left_out
 
 
@@ -140,7 +141,7 @@ def _repeated(scores: list[Score]) -> np.ndarray:
     """A column for each condition that there is twice or more: such trials are compared with each other. (n, c)."""
     counts = Counter(score.condition for score in scores)
     conditions = [condition for condition, count in counts.items() if count > 1]
-    return np.array([[float(score.condition == one) for one in conditions] for score in scores])
+    return np.array([[float(score.condition == condition) for condition in conditions] for score in scores])
 
 
 def _groups(kind: str, telling: list[Score], p: int, least: float) -> tuple[float, Group | None, dict[tuple, Group]]:

@@ -1,12 +1,12 @@
-"""The control chart: an exponentially weighted mean of what each trial says of a parameter, and when it is too far off.
+"""The control chart: an exponentially weighted mean of each trial's estimate of a parameter, and its alarm limit.
 
 EWMA of standardised values (Roberts 1959; Lucas, Saccucci, Technometrics 32, 1990), A ← (1 - λ) A + λ w z. A trial
-that tells the parameter less well than the best kind of reference trials does weighs less, w = its best deviation over
-its own, so that pulls do not drown a telling release. The chart shows Q = A / √Var(A), Var ← (1 - λ)² Var + λ² w². It
-begins as after a long run of unchanged trials.
+that determines the parameter less well than the best kind of reference trials weighs less, w = the best deviation over
+its own, so that pulls do not drown an informative release. The chart shows Q = A / √Var(A),
+Var ← (1 - λ)² Var + λ² w². It begins as after a long run of unchanged trials.
 
-One odd trial, such as one in which somebody touched the arm, moves Q by `ALONE` of the limit at most (as the robust
-CUSUM of Lucas, Crosier 1982 limits one value): two of them, one after the other, raise the alarm.
+A single outlier, such as a trial in which somebody touched the arm, moves Q by `ALONE` of the limit at most (as the
+robust CUSUM of Lucas, Crosier 1982 limits one value): two of them, one after the other, raise the alarm.
 
 The limit is not typed. In simulated charts of an unchanged arm, with as many reference trials, drawn anew each time, it
 gives one false alarm in `1 / rate` trials over all parameters (each has the same share). What few reference trials
@@ -31,7 +31,7 @@ LONG_RUN = FORGETTING / (2 - FORGETTING)  # Var(A) after a long run of trials wi
 
 
 @dataclass
-class Line:
+class ParameterChart:
     """The chart of one parameter. best: the deviation of those reference trials that tell it best. beyond: whether
     the last trial took it beyond the limit."""
 
@@ -70,24 +70,24 @@ class Chart:
     """Charts of all parameters that the reference tells. restart: whether they begin anew after an alarm."""
 
     baseline: Baseline
-    lines: dict[int, Line]
+    lines: dict[int, ParameterChart]
     restart: bool = False
     trials: list[Charted] = field(default_factory=list)
 
     def add(self, score: Score) -> Charted:
-        found = {p: one for p, one in self.baseline.departures(score).items() if p in self.lines}
-        for p, departure in found.items():
+        departures = {p: departure for p, departure in self.baseline.departures(score).items() if p in self.lines}
+        for p, departure in departures.items():
             self.lines[p].add(departure)
-        alarms = [p for p in found if self.lines[p].beyond]
-        charted = Charted(score, found, {p: self.lines[p].level for p in found}, alarms)
+        alarms = [p for p in departures if self.lines[p].beyond]
+        charted = Charted(score, departures, {p: self.lines[p].level for p in departures}, alarms)
         self.trials.append(charted)
         if alarms and self.restart:
-            self.lines = {p: Line(line.limit, line.best) for p, line in self.lines.items()}
+            self.lines = {p: ParameterChart(line.limit, line.best) for p, line in self.lines.items()}
         return charted
 
     def changed(self) -> int | None:
         """The number of the first trial with an alarm."""
-        return next((i for i, one in enumerate(self.trials) if one.alarms), None)
+        return next((i for i, trial in enumerate(self.trials) if trial.alarms), None)
 
     def suspects(self) -> list[Charted]:
         """The trials up to the first alarm since the chart that is furthest beyond was last near its middle."""
@@ -103,25 +103,25 @@ class Chart:
 
 def chart_of(baseline: Baseline, parameters: int, rate: float = FALSE_ALARMS, restart: bool = False) -> Chart:
     """Empty charts of those of P `parameters` that the reference tells. rate: of false alarms, a trial."""
-    typical = {p: found for p in range(parameters) if (found := baseline.typical(p))}
+    typical = {p: pairs for p in range(parameters) if (pairs := baseline.typical(p))}
     lines = {}
-    for p, found in typical.items():
-        best = min(one.deviation for one, _ in found)
-        lines[p] = Line(limit_of(baseline, p, rate / len(typical)), best)
+    for p, pairs in typical.items():
+        best = min(departure.deviation for departure, _ in pairs)
+        lines[p] = ParameterChart(limit_of(baseline, p, rate / len(typical)), best)
     return Chart(baseline, lines, restart)
 
 
 def limit_of(baseline: Baseline, p: int, rate: float) -> float:
     """The limit of |Q| that trials of an unchanged arm, of the reference's mixture, pass at this rate."""
     rng, typical = np.random.default_rng([SEED, p]), baseline.typical(p)
-    deviations = np.array([one.deviation for one, _ in typical])
+    deviations = np.array([departure.deviation for departure, _ in typical])
     weights = deviations.min() / deviations
-    groups = list({one.group.key: one.group for one, _ in typical}.values())
+    groups = list({departure.group.key: departure.group for departure, _ in typical}.values())
     place = {group.key: i for i, group in enumerate(groups)}
-    of = np.array([place[one.group.key] for one, _ in typical])
+    of = np.array([place[departure.group.key] for departure, _ in typical])
     degrees = np.array([group.degrees for group in groups])
     # what a reference of these sizes gets wrong, in each run: the mean, and the spread over the true one
-    shared = np.array([one.group.shared(score.level) / one.deviation for one, score in typical])
+    shared = np.array([departure.group.shared(score.level) / departure.deviation for departure, score in typical])
     # the spread is pooled over the conditions of a kind, so its error is theirs together
     pools = {(key[0], len(key) > 1): i for i, key in enumerate(place)}
     pooled = np.array([pools[key[0], len(key) > 1] for key in place])
@@ -129,8 +129,8 @@ def limit_of(baseline: Baseline, p: int, rate: float) -> float:
     spreads = np.sqrt(spreads[:, pooled])
     drawn = rng.integers(len(typical), size=(LENGTH, RUNS))
     row = np.arange(RUNS)
-    own = rng.normal(size=(LENGTH, RUNS)) * np.sqrt(1 - np.square(shared).sum(axis=1))[drawn]
-    x = (own - np.einsum("trp,trp->tr", shared[drawn], means[row, of[drawn]])) / spreads[row, of[drawn]]
+    noise = rng.normal(size=(LENGTH, RUNS)) * np.sqrt(1 - np.square(shared).sum(axis=1))[drawn]
+    x = (noise - np.einsum("trp,trp->tr", shared[drawn], means[row, of[drawn]])) / spreads[row, of[drawn]]
     z = -np.sign(x) * ndtri(stdtr(degrees[of[drawn]], -np.abs(x)))
     low, high = 1.0, WIDEST
     while high - low > 0.01:

@@ -1,11 +1,10 @@
-"""What a watch has seen, kept beside its chart as lines of JSON, so that it goes on where it was stopped.
+"""The history of a drift monitor: lines of JSON beside its chart, so that it goes on where it was stopped.
 
-The file is replaced whole after every trial: one that is killed leaves no half a line. The first line says of which
-model and parameters it is; another model is refused, as its scores are about another arm.
+The file is replaced whole after every trial, so a killed process leaves no half a line. The first line names the model
+and the parameters; another model is refused, as its scores are about another arm.
 """
 
 import fcntl
-import hashlib
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,11 +14,12 @@ from pathlib import Path
 import numpy as np
 
 from trunkline.errors import InputError
+from trunkline.files import file_digest, written_whole
 from trunkline.tools.monitor.scores import Score
 
 
 @dataclass
-class Ledger:
+class History:
     """made_of: what all scores are of. rows: a row a trial that was scored, refused or is awaited, in their order."""
 
     path: Path
@@ -27,8 +27,8 @@ class Ledger:
     rows: list[dict] = field(default_factory=list)
 
     @classmethod
-    def opened(cls, path: Path, made_of: dict, kept: bool = False) -> "Ledger":
-        """What `path` holds, or an empty one. kept: whether one of something else is replaced instead of refused.
+    def opened(cls, path: Path, made_of: dict, replace: bool = False) -> "History":
+        """The history at `path`, or an empty one. replace: whether that of another model is replaced, not refused.
 
         Raises:
             InputError: it is of another model, or of something else.
@@ -40,32 +40,31 @@ class Ledger:
         except ValueError as error:
             raise InputError(f"{path}: {error}, expected lines of JSON that this command wrote") from error
         if head != made_of:
-            if kept:
+            if replace:
                 return cls(path, made_of)
             differs = ", ".join(key for key in made_of if head.get(key) != made_of[key])
             raise InputError(f"{path}: found scores of other {differs}, expected the same; begin anew with --out")
         return cls(path, made_of, rows)
 
     def add(self, **row) -> None:
-        """Keep a row, in place of an earlier one of the same trial."""
+        """Add a row, in place of an earlier one of the same trial."""
         key = (row["session"], row["trial"])
-        self.rows = [one for one in self.rows if (one["session"], one["trial"]) != key] + [row]
+        self.rows = [other for other in self.rows if (other["session"], other["trial"]) != key] + [row]
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        part = self.path.with_suffix(".part")
-        part.write_text("".join(json.dumps(one) + "\n" for one in (self.made_of, *self.rows)), encoding="utf-8")
-        part.replace(self.path)
+        with written_whole(self.path) as part:
+            part.write_text("".join(json.dumps(line) + "\n" for line in (self.made_of, *self.rows)), encoding="utf-8")
 
     def of(self, session: str, trial: str) -> dict | None:
         """The row of a trial."""
-        return next((one for one in self.rows if (one["session"], one["trial"]) == (session, trial)), None)
+        return next((row for row in self.rows if (row["session"], row["trial"]) == (session, trial)), None)
 
     def scores(self) -> list[tuple[dict, Score]]:
         """Rows of trials that were scored, with their scores, in the order in which they came."""
         return [(row, read_score(row)) for row in self.rows if "slope" in row]
 
 
-def told(score: Score) -> dict:
-    """A score as JSON has it."""
+def score_row(score: Score) -> dict:
+    """A score as a row of JSON."""
     row = {"kind": score.kind, "level": score.level, "load": score.load}
     return row | {"slope": score.slope.tolist(), "curvature": score.curvature.tolist()}
 
@@ -77,13 +76,12 @@ def read_score(row: dict) -> Score:
 
 def digest(path: Path) -> str:
     """Of a file's bytes."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()[:16]
+    return file_digest(path)[:16]
 
 
 @contextmanager
 def alone(folder: Path) -> Iterator[None]:
-    """Refuse a second watch of the same state, such as of a cron job that comes before the last one is done.
+    """Refuse a second monitor of the same state, such as of a cron job that comes before the last one is done.
 
     Raises:
         InputError: there is one.
@@ -93,5 +91,5 @@ def alone(folder: Path) -> Iterator[None]:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
-            raise InputError(f"{folder}: found another watch at work there, expected one at a time") from error
+            raise InputError(f"{folder}: found another monitor at work there, expected one at a time") from error
         yield

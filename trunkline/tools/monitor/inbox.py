@@ -1,4 +1,4 @@
-"""What a watched folder holds: sessions, and which of their logs are whole.
+"""The sessions in a monitored folder, and which of their logs are complete.
 
 A folder is looked at again and again, not subscribed to: the kernel's notices (inotify, and the libraries over it) do
 not tell of what another machine writes to a network drive, where labs keep their logs, and a look costs a few stats.
@@ -21,7 +21,7 @@ PATIENCE = 600.0  # s
 
 
 @dataclass(frozen=True)
-class State:
+class LogState:
     """Of a file: what changes when it does. whole: whether it ends as a log should."""
 
     size: int
@@ -33,16 +33,16 @@ class State:
         return f"{self.size}-{self.modified}"
 
 
-def state_of(log: Path) -> State | None:
+def state_of(log: Path) -> LogState | None:
     """None where there is no such file."""
     try:
-        found = log.stat()
+        status = log.stat()
         with log.open("rb") as file:
-            file.seek(max(found.st_size - len(MAGIC), 0))
+            file.seek(max(status.st_size - len(MAGIC), 0))
             end = file.read()
     except OSError:  # gone, or not yet to be read
         return None
-    return State(found.st_size, found.st_mtime_ns, found.st_size > 2 * len(MAGIC) and end == MAGIC)
+    return LogState(status.st_size, status.st_mtime_ns, status.st_size > 2 * len(MAGIC) and end == MAGIC)
 
 
 def sessions_of(folder: Path) -> list[Path]:
@@ -53,8 +53,8 @@ def sessions_of(folder: Path) -> list[Path]:
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder, expected one into which sessions are dropped")
-    found = sorted(file.parent for file in folder.glob("[!.]*/session.yaml"))
-    return [folder, *found] if (folder / "session.yaml").is_file() else found
+    folders = sorted(file.parent for file in folder.glob("[!.]*/session.yaml"))
+    return [folder, *folders] if (folder / "session.yaml").is_file() else folders
 
 
 def without_session(folder: Path) -> list[Path]:
@@ -72,7 +72,7 @@ def planned(session: Path) -> list[dict]:
     path = session / "session.yaml"
     content = OmegaConf.to_container(read_yaml(path), resolve=False)
     trials = content.get("trials") if isinstance(content, dict) else None
-    if not isinstance(trials, list) or not all(isinstance(one, dict) and "file" in one for one in trials):
+    if not isinstance(trials, list) or not all(isinstance(trial, dict) and "file" in trial for trial in trials):
         raise InputError(f"{path}: trials: found {trials!r:.40}, expected a list of trials, each with its file")
     return trials
 

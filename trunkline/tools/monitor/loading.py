@@ -20,14 +20,14 @@ from trunkline.settings import read_yaml
 
 
 @dataclass
-class Intake:
+class LoadedTrials:
     """trials: by name. refused: why a trial cannot be used, by name."""
 
     trials: dict[str, Trial] = field(default_factory=dict)
     refused: dict[str, str] = field(default_factory=dict)
 
 
-def take(session: Path, files: set[str], root: Path) -> Intake:
+def load_logs(session: Path, files: set[str], root: Path) -> LoadedTrials:
     """The trials of those of a session's logs that are there; what a motors' clock or a vertical is, all of them say.
 
     Args:
@@ -39,18 +39,19 @@ def take(session: Path, files: set[str], root: Path) -> Intake:
     with _so_far(session, files) as (folder, read):
         ingest, settings = settings_of("ingest", root), settings_of("filter", root)
         taken = list(take_in(folder, read, ingest.limits))
-        found = Intake(refused={trial.name: str(one) for trial, one, _ in taken if isinstance(one, InputError)})
-        if len(found.refused) < len(taken):
+        unreadable = {trial.name: str(result) for trial, result, _ in taken if isinstance(result, InputError)}
+        loaded = LoadedTrials(refused=unreadable)
+        if len(loaded.refused) < len(taken):
             gathered = gather(taken, read, ingest.plausible, "leave_out", f"{session}")
-            found.refused |= gathered.refused
-            for one, findings in zip(gathered.takes, gathered.findings, strict=True):
-                one.repairs = len(findings.repairs)
+            loaded.refused |= gathered.refused
+            for raw, findings in zip(gathered.takes, gathered.findings, strict=True):
+                raw.repairs = len(findings.repairs)
                 try:
-                    found.trials[one.name] = filter_take(one, settings)[0]
+                    loaded.trials[raw.name] = filter_take(raw, settings)[0]
                 except InputError as error:
-                    found.refused[one.name] = str(error)
-        found.refused = {name: said.replace(f"{folder}", f"{session}") for name, said in found.refused.items()}
-        return found
+                    loaded.refused[raw.name] = str(error)
+        loaded.refused = {name: reason.replace(f"{folder}", f"{session}") for name, reason in loaded.refused.items()}
+        return loaded
 
 
 @contextmanager

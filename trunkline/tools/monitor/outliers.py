@@ -1,22 +1,22 @@
 """Reference trials that are unlike the others of their kind, such as one in which somebody touched the arm.
 
-One of them widens the spread, and hides a change for good. They are found by the generalised extreme studentised
+A single outlier widens the spread, and hides a change for good. They are found by the generalised extreme studentised
 deviate (Rosner, Technometrics 25, 1983), here from a curve: of n values the furthest from a fit to them, in standard
-deviations, is taken out, then the furthest of those that are left, and so on; as many are odd as the last of them that
-is further than it would be by chance. Taken one after the other, two that hide each other are found.
+deviations, is taken out, then the furthest of those that are left, and so on; outliers are all up to the last of them
+that is further than it would be by chance. Taken one after the other, two that hide each other are found.
 """
 
 import numpy as np
 from scipy.stats import t as student
 
-CHANCE = 1e-5  # that any of n normal trials is called odd; the longer tails of real ones are not to be cut off
+CHANCE = 1e-5  # that any of n normal trials is called an outlier; the longer tails of real ones are not to be cut off
 RANK = 1e-9  # of the largest singular value, below which a column is one of the others
 MOST = 0.25  # share of n that may be
 
 
-def odd(values: np.ndarray, information: np.ndarray, design: np.ndarray, least: int) -> np.ndarray:
+def find_outliers(values: np.ndarray, information: np.ndarray, design: np.ndarray, least: int) -> np.ndarray:
     """Which of the estimates `values` (n,), of variance s² / `information` (n,) around what is linear in the columns of
-    `design` (n, k), are odd; shape (n,), bool. The others keep so many degrees of freedom, at `least`."""
+    `design` (n, k), are outliers; shape (n,), bool. The others keep so many degrees of freedom, at `least`."""
     count, root = len(values), np.sqrt(information)
     left, furthest, last = np.ones(count, dtype=bool), [], 0
     for taken in range(int(MOST * count)):

@@ -1,4 +1,4 @@
-"""What one trial says of each watched parameter, to first order and without a fit.
+"""The score of one trial for each monitored parameter, to first order and without a fit.
 
 The residuals r of a trial against the model and their derivatives J by the parameters give the score Jᵀr. By how much
 one parameter alone would have to change is d = -Jᵀr / JᵀJ, one step of Gauss and Newton from the model (a one-step
@@ -30,7 +30,7 @@ AROUND = 3.0  # times a value, and rad of a signed one, within which differences
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """slope: Jᵀr, shape (P,). curvature: JᵀJ, (P, P). Both 0 for what trials of this kind do not tell.
+    """slope: Jᵀr, shape (P,). curvature: JᵀJ, (P, P). Both 0 for parameters that this kind of trial does not identify.
 
     condition: trials of which are done alike: kind, level and load.
     """
@@ -54,7 +54,7 @@ class Score:
     @property
     def estimates(self) -> np.ndarray:
         """d, the change of each parameter alone, where it is searched (of ln(value), or of a signed value over its
-        scale); NaN where the trial does not tell it. Shape (P,)."""
+        scale); NaN where the trial does not identify it. Shape (P,)."""
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.where(self.information > 0, -self.slope / self.information, np.nan)
 
@@ -72,18 +72,18 @@ class Scorer:
     def score(self, trial: Trial) -> Score:
         """Raises InputError where the trial is not of this arm, or the model does not survive it."""
         kind = EXPERIMENTS[trial.experiment]
-        told = [i for i, name in enumerate(self.parameters) if PARAMETERS[name].told_by(kind)]
+        determined = [i for i, name in enumerate(self.parameters) if PARAMETERS[name].told_by(kind)]
         experiment = prepare(trial, self.model, self.frames, self.command_delay)
         slope, curvature = np.zeros(len(self.parameters)), np.zeros((len(self.parameters),) * 2)
-        if told:
-            bounds = {self.parameters[i]: _around(self.parameters[i], self.model) for i in told}
+        if determined:
+            bounds = {self.parameters[i]: _around(self.parameters[i], self.model) for i in determined}
             problem = Problem(self.model, [experiment], trial.segments, bounds, self.loss.kind, self.loss)
             linear = linearise(problem, problem.start())
             if problem.diverged:
                 raise InputError(f"trial {trial.name}: the model does not survive it, expected one that stays together")
             jacobian = linear.jacobians[0]
-            slope[told] = jacobian.T @ linear.residuals[0]
-            curvature[np.ix_(told, told)] = jacobian.T @ jacobian
+            slope[determined] = jacobian.T @ linear.residuals[0]
+            curvature[np.ix_(determined, determined)] = jacobian.T @ jacobian
         return Score(trial.name, trial.experiment, trial.level, trial.load, slope, curvature)
 
 

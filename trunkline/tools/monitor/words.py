@@ -1,4 +1,4 @@
-"""A watch in words: a line a trial, what has changed, and the chart as a table."""
+"""The monitor in words: a line a trial, what has changed, and the chart as a table."""
 
 from collections import Counter
 
@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from trunkline.identification.parameters.parameters import PARAMETERS
-from trunkline.tools.monitor.attribution import Change, Explanation
+from trunkline.tools.monitor.attribution import Attribution, Change
 from trunkline.tools.monitor.baseline import LEAST, Baseline
 from trunkline.tools.monitor.chart import Chart, Charted
 
@@ -32,7 +32,7 @@ def _short(value: float) -> str:
 
 
 def shown_in(name: str) -> tuple[str, float]:
-    """The unit in which changes of a parameter are said, and how many of it a step of 1 is where it is searched (for
+    """The unit in which changes of a parameter are printed, and how many of it a step of 1 is where it is searched (for
     ln(value), in which a step is a share, to first order)."""
     parameter = PARAMETERS[name]
     if not parameter.signed:
@@ -41,36 +41,36 @@ def shown_in(name: str) -> tuple[str, float]:
 
 
 def trial_line(where: str, charted: Charted, chart: Chart, names: tuple[str, ...]) -> str:
-    """What a new trial says: the parameter whose chart is nearest to its limit, or beyond."""
+    """A line for a new trial: the parameter whose chart is nearest to its limit, or beyond."""
     if not charted.levels:
         kind = charted.score.kind
         count = sum(score.kind == kind for score in chart.baseline.reference)
         return f"{where}: says nothing: found {count} reference trials of {kind}, it takes {LEAST + 1} or more"
     most = max(charted.levels, key=lambda p: abs(charted.levels[p]) / chart.lines[p].limit)
-    own, name = charted.departures[most], names[most]
+    departure, name = charted.departures[most], names[most]
     state = "beyond limits: chart of" if charted.alarms else "within limits, nearest: chart of"
     level = f"{name} at {charted.levels[most]:+.1f} of ± {chart.lines[most].limit:.1f}"
-    alone = amount(name, own.change, TWO_SIDED * own.deviation).removeprefix(f"{name} ")
+    alone = amount(name, departure.change, TWO_SIDED * departure.deviation).removeprefix(f"{name} ")
     return f"{where}: {state} {level}, this trial alone {alone}"
 
 
-def change_lines(chart: Chart, found: Explanation, names: tuple[str, ...], wheres: list[str]) -> list[str]:
+def change_lines(chart: Chart, attribution: Attribution, names: tuple[str, ...], wheres: list[str]) -> list[str]:
     """That the arm has changed, and which parameter would explain it. wheres: of the chart's trials."""
     at, since = chart.changed(), chart.suspects()
     assert at is not None, "asked for where there was an alarm"
     first = wheres[at - len(since) + 1]
     trials = f"{len(since)} trial{'s' if len(since) > 1 else ''}"
     lines = [f"the arm has changed: seen at {wheres[at]}, by {trials} since {first}"]
-    lines.append(f"explained best by {_told(found.best, names)}")
-    if found.alike:
-        others = "; ".join(_told(change, names) for change in found.alike)
+    lines.append(f"explained best by {_amount_of(attribution.best, names)}")
+    if attribution.alike:
+        others = "; ".join(_amount_of(change, names) for change in attribution.alike)
         lines.append(f"these trials cannot tell it apart from {others}")
-    if not found.whole:
+    if not attribution.whole:
         lines.append("no single parameter explains all of it: what is left is more than chance")
     return lines
 
 
-def _told(change: Change, names: tuple[str, ...]) -> str:
+def _amount_of(change: Change, names: tuple[str, ...]) -> str:
     return amount(names[change.parameter], change.size, change.half_width)
 
 
@@ -83,27 +83,27 @@ def reference_lines(baseline: Baseline, chart: Chart, names: tuple[str, ...]) ->
     lines = ["reference: " + ", ".join(f"{trials[kind]} {kind} under {conditions[kind]} conditions" for kind in kinds)]
     if repeated := [kind for kind in kinds if trials[kind] >= REPEATED * conditions[kind]]:
         lines.append(f"  few conditions of {', '.join(repeated)}, as where a session is planned for identification: "
-                     "trials under others may raise more false alarms (docs/watch.md)")  # fmt: skip
+                     "trials under others may raise more false alarms (docs/lab-tools.md)")  # fmt: skip
     for kind in kinds:
-        told = []
+        widths = []
         for p in chart.lines:
-            own = [one for score in baseline.reference if score.kind == kind
-                   and (one := baseline.departure(score, p)) is not None]  # fmt: skip
-            if own:
+            departures = [departure for score in baseline.reference if score.kind == kind
+                   and (departure := baseline.departure(score, p)) is not None]  # fmt: skip
+            if departures:
                 unit, scale = shown_in(names[p])
-                width = TWO_SIDED * scale * float(np.median([one.deviation for one in own]))
+                width = TWO_SIDED * scale * float(np.median([departure.deviation for departure in departures]))
                 if unit != "%" or width < HARDLY:
-                    told.append(f"{names[p]} {_short(width)} {unit}".rstrip())
-        lines.append(f"  one {kind} tells to ±: {', '.join(told) or f'nothing, it takes {LEAST + 1} or more'}")
-    lines += [f"  {line}" for line in odd_lines(baseline, names)]
+                    widths.append(f"{names[p]} {_short(width)} {unit}".rstrip())
+        lines.append(f"  one {kind} tells to ±: {', '.join(widths) or f'nothing, it takes {LEAST + 1} or more'}")
+    lines += [f"  {line}" for line in outlier_lines(baseline, names)]
     idle = [name for p, name in enumerate(names) if p not in chart.lines]
     return lines + ([f"  not charted, as the reference does not tell them: {', '.join(idle)}"] if idle else [])
 
 
-def odd_lines(baseline: Baseline, names: tuple[str, ...]) -> list[str]:
+def outlier_lines(baseline: Baseline, names: tuple[str, ...]) -> list[str]:
     """Which reference trials were left out, and of what."""
     lines = []
-    for number, unlike in baseline.odd.items():
+    for number, unlike in baseline.outliers.items():
         trial, charts = baseline.reference[number].name, ", ".join(names[p] for p in unlike)
         lines.append(f"{trial} is unlike the others of its kind, and left out of the charts of {charts}")
     return lines
@@ -112,15 +112,15 @@ def odd_lines(baseline: Baseline, names: tuple[str, ...]) -> list[str]:
 def chart_table(chart: Chart, names: tuple[str, ...], wheres: list[str]) -> pd.DataFrame:
     """A row a trial and parameter. change, deviation: in `unit`."""
     rows = []
-    for number, (one, where) in enumerate(zip(chart.trials, wheres, strict=True), 1):
-        for p, departure in one.departures.items():
+    for number, (trial, where) in enumerate(zip(chart.trials, wheres, strict=True), 1):
+        for p, departure in trial.departures.items():
             unit, scale = shown_in(names[p])
             rows.append(
                 {
-                    "number": number, "trial": where, "kind": one.score.kind, "parameter": names[p],
+                    "number": number, "trial": where, "kind": trial.score.kind, "parameter": names[p],
                     "change": departure.change * scale, "deviation": departure.deviation * scale, "unit": unit,
-                    "z": departure.z, "chart": one.levels[p], "limit": chart.lines[p].limit,
-                    "beyond": p in one.alarms,
+                    "z": departure.z, "chart": trial.levels[p], "limit": chart.lines[p].limit,
+                    "beyond": p in trial.alarms,
                 }
             )  # fmt: skip
     columns = ["number", "trial", "kind", "parameter", "change", "deviation", "unit", "z", "chart", "limit", "beyond"]

@@ -1,4 +1,4 @@
-"""What a session will and will not tell, before hours of fits: `python -m trunkline.tools.preflight`."""
+"""What a session can identify, before hours of fits: `trunkline check`."""
 
 from trunkline.compute.numerics import hold_arithmetic
 

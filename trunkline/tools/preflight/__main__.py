@@ -1,8 +1,8 @@
-"""What a session will and will not tell, in seconds: `python -m trunkline.tools.preflight SESSION`
+"""What a session can identify, in seconds: `trunkline check SESSION`
 
-Reads the logs as the stages do, says what was recorded and what is missing, and how well each parameter in params.yaml
-will be told if the fitted model is off by half a percent of each point's distance from the base. Fits and writes
-nothing.
+Loads the logs as the stages do, lists what was recorded and what is missing, and predicts how well each parameter in
+params.yaml can be identified if the fitted model is off by half a percent of each point's distance from the base. Fits
+and writes nothing.
 """
 
 import argparse
@@ -13,23 +13,27 @@ from trunkline.errors import in_one_line
 from trunkline.identification.fit.setup import check_parameters
 from trunkline.identification.parameters.per_session import make_room, names_apart, other_sessions, untold_apart
 from trunkline.identification.simulate.checks import check_trials
-from trunkline.identification.uncertainty.identifiability import described_lines, to_identify_from, told_by, untold
+from trunkline.identification.stages import STAGES
+from trunkline.identification.uncertainty.identifiability import (
+    described_lines,
+    expected_identifiability,
+    to_identify_from,
+    unidentifiable,
+)
 from trunkline.model.arm.kinds import described_arm
 from trunkline.pipeline.config import own_or_project, settings_of
-from trunkline.program import called
+from trunkline.program import program_name
 from trunkline.recordings.trials.inventory import missing_lines, recorded_of_each
 from trunkline.recordings.trials.splits import DECIDING, IDENTIFY
 from trunkline.settings import read_yaml
 from trunkline.tools.evaluate.session import read_trials_of
 from trunkline.tools.preflight.up_axis import other_ups, up_lines
 
-STAGES = ("identify_stiffness", "identify_damping", "identify_control")
-
 
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.tools.preflight"),
+        prog=program_name("check"),
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -39,15 +43,15 @@ def main(arguments: list[str] | None = None) -> int:
                         help="by which the fitted model will be off, of a point's distance from the base")  # fmt: skip
     parser.add_argument("--settings", type=Path, metavar="FOLDER", default=Path("."),
                         help="whose params.yaml describes arm and stages; default: the current folder")  # fmt: skip
-    told = parser.parse_args(arguments)
-    description = settings_of("build_mjcf", told.settings)
-    spec = described_arm(description, own_or_project(told.settings, "conf")).spec
+    args = parser.parse_args(arguments)
+    description = settings_of("build_mjcf", args.settings)
+    spec = described_arm(description, own_or_project(args.settings, "conf")).spec
     model = spec.compile()
-    given = read_yaml(told.settings / "params.yaml")
-    configs = {stage: settings_of(stage, told.settings) for stage in STAGES if stage in given}
-    if arm := (given.get("build_mjcf") or {}).get("arm"):
-        print(f"arm: {arm}, as {told.settings / 'params.yaml'} has it", flush=True)
-    trials, takes = read_trials_of(told.session, told.settings, "check")
+    params = read_yaml(args.settings / "params.yaml")
+    configs = {stage: settings_of(stage, args.settings) for stage in STAGES if stage in params}
+    if arm := (params.get("build_mjcf") or {}).get("arm"):
+        print(f"arm: {arm}, as {args.settings / 'params.yaml'} has it", flush=True)
+    trials, takes = read_trials_of(args.session, args.settings, "check")
     check_trials([trial for trial in trials if trial.split in DECIDING], model)
     print("\n".join(["recorded:", *(f"  {line}" for line in recorded_of_each(trials))]))
     if missing := missing_lines(trials):
@@ -58,7 +62,7 @@ def main(arguments: list[str] | None = None) -> int:
         names = names_apart(list(config.parameters), config.per_session, other_sessions(trials))
         make_room(spec, names)
         model = spec.compile()
-        lacking = untold(config, trials) or untold_apart(names, trials, config.experiments)
+        lacking = unidentifiable(config, trials) or untold_apart(names, trials, config.experiments)
         chosen = [t for t in trials if t.experiment in config.experiments and t.split == IDENTIFY]
         print(f"{stage}, from {len(chosen)} trials:", flush=True)
         for line in lacking:
@@ -68,9 +72,9 @@ def main(arguments: list[str] | None = None) -> int:
         arm, experiments, fit = to_identify_from(config, model, trials)
         lines = described_lines(arm, experiments, fit) + up_lines(arm, experiments, fit.segments, ups)
         print("\n".join(f"  {line}" for line in lines), flush=True)
-        found, pairs = told_by(arm, experiments, fit, told.error / 100)
-        for one in sorted(found, key=lambda one: -one.share):
-            print(f"  {one.words()}")
+        parameters, pairs = expected_identifiability(arm, experiments, fit, args.error / 100)
+        for parameter in sorted(parameters, key=lambda parameter: -parameter.share):
+            print(f"  {parameter.words()}")
         for pair in pairs:
             print(f"  hardly told apart: {pair}")
     print("All of it is of the arm as described: where a fit ends elsewhere, some of it changes several-fold.")

@@ -22,13 +22,13 @@ def other_ups(takes: list[Take]) -> dict[str, np.ndarray]:
     gravity, or whose base is upright by its very declaration, and none of several sessions, which each have an `up`."""
     if len({take.session for take in takes}) > 1:
         return {}
-    found = {}
+    gravities = {}
     for take in takes:
         base = average_base(take.base_positions, take.base_quaternions)
         declared = not np.ptp(take.base_quaternions, axis=0).any() and np.allclose(base.rotation.apply(Z), take.up)
         if take.up.any() and not declared:
-            found[take.name] = np.array([gravity_from_up(base, axis) for axis in AXES])
-    return found
+            gravities[take.name] = np.array([gravity_from_up(base, axis) for axis in AXES])
+    return gravities
 
 
 def up_lines(
@@ -45,11 +45,11 @@ def up_lines(
     if not tried:
         return []
 
-    def error(found: Prediction) -> float:
-        return found.overall()["e_position_mm"]
+    def error(prediction: Prediction) -> float:
+        return prediction.overall()["e_position_mm"]
 
     declared = replay(model, tried, segments)
-    off, still = (error(Prediction(one, tried)) for one in (declared, straight(tried, declared)))
+    off, still = (error(Prediction(replayed, tried)) for replayed in (declared, straight(tried, declared)))
     errors = []
     for number in range(len(AXES)):
         turned = [replace(experiment, gravity=ups[experiment.name][number]) for experiment in tried]
@@ -58,5 +58,5 @@ def up_lines(
     if errors[best] > min(off, still) / BETTER:
         return []
     axis = ", ".join(f"{value + 0.0:g}" for value in AXES[best])
-    found = f"{errors[best]:.3g} mm off in place of {off:.3g} mm, over {len(tried)} of the trials"
-    return [f"`frame.up` in session.yaml: [{axis}] would fit better: {found}"]
+    fit = f"{errors[best]:.3g} mm off in place of {off:.3g} mm, over {len(tried)} of the trials"
+    return [f"`frame.up` in session.yaml: [{axis}] would fit better: {fit}"]

@@ -1,2 +1,1 @@
-"""What identification left open of an arm, or what differs between arms, for simulators that learn: domain
-randomisation."""
+"""Domain randomization: parameters drawn from what identification left open, or from the spread between arms."""

@@ -8,13 +8,13 @@ import numpy as np
 from trunkline.errors import InputError
 from trunkline.identification.parameters.parameters import PARAMETERS
 from trunkline.tools.randomize.fields import OWN
-from trunkline.tools.randomize.randomisation import MOST, Randomisation
+from trunkline.tools.randomize.randomization import MOST, Randomization
 
 FORMAT = "trunkline randomisation 1"
 LOGNORMAL, NORMAL = "lognormal", "normal"
 
 
-def to_table(drawn: Randomisation, fields: dict[str, dict[str, int]], model: dict[str, str]) -> dict:
+def to_table(drawn: Randomization, fields: dict[str, dict[str, int]], model: dict[str, str]) -> dict:
     """Args: fields: as `changed_fields` gives them. model: what says which model it is for."""
     parameters, (low, high) = {}, drawn.interval
     for i, name in enumerate(drawn.names):
@@ -31,9 +31,9 @@ def to_table(drawn: Randomisation, fields: dict[str, dict[str, int]], model: dic
         }
     groups = {}
     for group in dict.fromkeys(drawn.groups):
-        own = [i for i, other in enumerate(drawn.groups) if other == group]
-        covariance = drawn.covariance[np.ix_(own, own)].tolist()
-        groups[group] = {"parameters": [drawn.names[i] for i in own], "covariance": covariance}
+        members = [i for i, other in enumerate(drawn.groups) if other == group]
+        covariance = drawn.covariance[np.ix_(members, members)].tolist()
+        groups[group] = {"parameters": [drawn.names[i] for i in members], "covariance": covariance}
     meaning = {
         "sd": "of ln(value) where lognormal, of the value where normal; unit: the value's",
         "covariance": "of the same, before limits cut; groups are independent of each other",
@@ -43,7 +43,7 @@ def to_table(drawn: Randomisation, fields: dict[str, dict[str, int]], model: dic
             "groups": groups}  # fmt: skip
 
 
-def read_randomisation(path: Path) -> tuple[Randomisation, dict[str, str]]:
+def read_randomization(path: Path) -> tuple[Randomization, dict[str, str]]:
     """The distribution, and what says which model it is for.
 
     Raises:
@@ -53,21 +53,21 @@ def read_randomisation(path: Path) -> tuple[Randomisation, dict[str, str]]:
         table = json.loads(path.read_text(encoding="utf-8"))
         if table["format"] != FORMAT:
             raise InputError(f"{path}: format: found {table['format']!r}, expected {FORMAT!r}")
-        given = table["parameters"]
+        rows = table["parameters"]
         names = [name for group in table["groups"].values() for name in group["parameters"]]
-        centre = np.array([float(given[name]["centre"]) for name in names])
-        limits = np.array([given[name]["limits"] for name in names], float).reshape(-1, 2)
+        centre = np.array([float(rows[name]["centre"]) for name in names])
+        limits = np.array([rows[name]["limits"] for name in names], float).reshape(-1, 2)
         covariance, first = np.zeros((len(names), len(names))), 0
         for group in table["groups"].values():
-            own = slice(first, first + len(group["parameters"]))
-            covariance[own, own], first = group["covariance"], own.stop
-        groups = [given[name]["group"] for name in names]
+            block = slice(first, first + len(group["parameters"]))
+            covariance[block, block], first = group["covariance"], block.stop
+        groups = [rows[name]["group"] for name in names]
         if unknown := [name for name in names if name not in PARAMETERS]:
             raise InputError(f"{path}: parameters: found {unknown[0]!r}, expected one that can be identified")
-        return Randomisation(names, groups, centre, covariance, limits[:, 0], limits[:, 1], table["arms"]), table[
+        return Randomization(names, groups, centre, covariance, limits[:, 0], limits[:, 1], table["arms"]), table[
             "model"
         ]
     except OSError as error:
         raise InputError(f"{path}: {(error.strerror or str(error)).lower()}, expected a randomisation.json") from error
     except (ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{path}: {error!r}, expected what `python -m trunkline.tools.randomize` writes") from error
+        raise InputError(f"{path}: {error!r}, expected what `trunkline randomize` writes") from error

@@ -1,1 +1,0 @@
-"""The paper's four experiments through the page, the server and the robots' own protocols."""

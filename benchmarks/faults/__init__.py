@@ -1,1 +1,0 @@
-"""What goes wrong in a live session as its robot moves."""

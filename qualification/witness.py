@@ -1,0 +1,112 @@
+"""What the robot's own process notes of its motion, where its reader sees it, whoever else has ended."""
+
+import ctypes
+import os
+import signal
+import time
+from multiprocessing.context import SpawnContext
+
+import numpy as np
+
+from trunkline.ar.drivers.driver_client import DriverClient
+from trunkline.ar.drivers.driver_host import start_driver
+from trunkline.ar.drivers.motors import MotorsOnBus
+from trunkline.ar.session import real
+from trunkline.ar.session.hardware import Hardware
+from trunkline.ar.session.robot import HOLD_TIME, MODE, MODES, SERIAL, RobotChannel
+from trunkline.ar.teleop.trajectory import JOINTS
+
+LEAST = 1e-9  # rad or m between two tellings: it moves
+HEAD = 5  # numbers that a robot tells before its axes
+
+
+class Witness:
+    """Each number is written whole, by one process; times are s of the clock that all processes of a machine share.
+
+    The robot's: held, when it was first commanded to hold in its last motion, as it brakes it is so again and again;
+    moved, when its axes, as they are sent, last moved; far, by how much a joint was off its first place at most, rad;
+    begun, how many motions it began; running, whether one goes on; motors, the process of its motors, if it has some.
+    """
+
+    def __init__(self, context: SpawnContext) -> None:
+        self._held, self._moved, self._far, self._begun, self._running, self._motors = (
+            context.RawValue(ctypes.c_double, 0.0) for _ in range(6)
+        )
+        self._told, self._held_in = 0.0, 0.0  # the last command to hold, and the motion in which the first one was
+
+    @property
+    def held(self) -> float:
+        return self._held.value
+
+    @property
+    def moved(self) -> float:
+        return self._moved.value
+
+    @property
+    def far(self) -> float:
+        return self._far.value
+
+    @property
+    def begun(self) -> int:
+        return int(self._begun.value)
+
+    @property
+    def running(self) -> bool:
+        return bool(self._running.value)
+
+    @property
+    def motors(self) -> int:
+        assert self._motors.value, "a session with motors"
+        return int(self._motors.value)
+
+    @motors.setter
+    def motors(self, pid: int) -> None:
+        self._motors.value = pid
+
+    def hush(self) -> None:
+        """The first motor gives no feedback for `hushed.HUSH` s."""
+        os.kill(self.motors, signal.SIGUSR1)
+
+    def note(self, numbers: np.ndarray, moved: bool, far: float) -> None:
+        """Of the robot's process: what it tells the server."""
+        if moved:
+            self._moved.value = time.monotonic()
+        self._far.value = max(self._far.value, far)
+        if numbers[HOLD_TIME] != self._told and numbers[SERIAL] != self._held_in:
+            self._held.value, self._held_in = numbers[HOLD_TIME], numbers[SERIAL]
+        self._told, self._begun.value = numbers[HOLD_TIME], numbers[SERIAL]
+        self._running.value = MODES[int(numbers[MODE])] == "running"
+
+
+class Watched(RobotChannel):
+    """A channel whose robot tells a `witness` too, if there is one."""
+
+    def __init__(self, context: SpawnContext, tendons: int, bodies: int, witness: Witness | None) -> None:
+        super().__init__(context, tendons, bodies)
+        self.witness, self._axes = witness, np.zeros(JOINTS + tendons)
+        self._first: np.ndarray | None = None
+
+    def tell(self, numbers: np.ndarray, fault: str) -> None:
+        super().tell(numbers, fault)
+        if self.witness is None:
+            return
+        axes = numbers[HEAD : HEAD + JOINTS + self.tendons]
+        self._first = axes[:JOINTS].copy() if self._first is None else self._first
+        far = float(np.abs(axes[:JOINTS] - self._first).max())
+        self.witness.note(numbers, bool(np.abs(axes - self._axes).max() > LEAST), far)
+        self._axes = axes.copy()
+
+
+def machine(channel: Watched, *setup) -> None:
+    """The process of a machine whose first motor can be silent."""
+    witness = channel.witness
+    assert witness is not None
+
+    def motors(hardware: Hardware) -> DriverClient:
+        named = MotorsOnBus(hardware.motors, hardware.bus, hardware.interface)
+        found = start_driver(named, ("-c", "import sys; from qualification.hushed import main; sys.exit(main())"))
+        witness.motors = found.process.pid
+        return found
+
+    real.motors_of = motors
+    real.run(channel, *setup)
