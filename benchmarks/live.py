@@ -24,7 +24,7 @@ from qualification.command import qualify
 from qualification.guests import ADDRESS
 from trunkline.ar.session import binary
 from trunkline.ar.session.certificate import make_certificate, tls_context
-from trunkline.ar.session.composition import Made
+from trunkline.ar.session.composition import SessionParts
 from trunkline.ar.session.server import Server
 from trunkline.ar.session.session import Address, opened
 
@@ -61,11 +61,11 @@ class Looks:
 class Holds:
     """When the robot was commanded to hold, s."""
 
-    made: Made
+    made: SessionParts
     times: list[float]
 
     def look(self) -> None:
-        now = self.made.robot.standing().held
+        now = self.made.robot.robot_state().hold_time
         if now != self.times[-1]:
             self.times.append(now)
 
@@ -81,7 +81,7 @@ class Holds:
 async def held_open(package: Path, address: Address, pem: bytes | None = None) -> AsyncIterator[tuple]:
     """A session and its door."""
     async with opened(package, address, lambda line: None) as (server, made):
-        yield server, made, Door(address.url, server.house.token, pem)
+        yield server, made, Door(address.url, server.composition.token, pem)
 
 
 def halves(found: np.ndarray) -> str:
@@ -125,7 +125,11 @@ async def plainly(package: Path, watchers: int, stops: int) -> tuple[list[Row], 
             ("the same while one more reads nothing", halves(rest.ages), "95th: 5"),
             ("frames that are held for it", str(looks.most(rest, deaf)), "3"),
         ]
-        holds, looks, asked = Holds(made, [made.robot.standing().held]), Looks(server), made.desk.state.serial
+        holds, looks, asked = (
+            Holds(made, [made.robot.robot_state().hold_time]),
+            Looks(server),
+            made.controller.state.serial,
+        )
 
         def look() -> None:
             holds.look()
@@ -133,7 +137,7 @@ async def plainly(package: Path, watchers: int, stops: int) -> tuple[list[Row], 
                 looks.look()
 
         span, sent = await attended(look, CLOSELY, door, stopping, watchers, stops)
-        plans, took = made.desk.state.serial - asked, holds.after(sent)
+        plans, took = made.controller.state.serial - asked, holds.after(sent)
         size = binary.HEAD_BYTES + 28 * (len(made.scene["bodies"]) + len(binary.MARKERS))
     told = 1e3 * np.quantile(took, (0.5, 0.95, 0.99, 1.0))
     rows += [

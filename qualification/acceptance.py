@@ -29,9 +29,9 @@ from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import preview_process
 from trunkline.ar.session.composition import SEARCH, simulation_of, solids, subject_of
 from trunkline.ar.session.log_reader import tip_path
-from trunkline.ar.session.preview_process import Begun, ForeseerProcess, Order, Planned, Shown
-from trunkline.ar.session.settings import Config
-from trunkline.ar.session.simulated import Plant, Simulation
+from trunkline.ar.session.preview_process import Order, PlanAnswer, PreviewBegun, PreviewPiece, PreviewProcess
+from trunkline.ar.session.settings import SessionConfig
+from trunkline.ar.session.simulated import Simulation, TwinPlant
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.executor import SimulatedRobot
 from trunkline.ar.teleop.messages import Request, Target, Targets, Vector, World
@@ -69,7 +69,7 @@ class Previewed:
 
 
 def rows(path: Path) -> list[Row]:
-    teleop, config = load_folder(Teleop, PROJECT / "conf/teleop"), load_folder(Config, PROJECT / "conf/live")
+    teleop, config = load_folder(Teleop, PROJECT / "conf/teleop"), load_folder(SessionConfig, PROJECT / "conf/live")
     package = read_package(path)
     joints = RigidIK(teleop.mount_offset).solve(SEARCH, config.ready, DOWN, 0.0)
     simulation = simulation_of(package, teleop, config, joints)
@@ -105,12 +105,12 @@ def _told(values: np.ndarray, scale: float, unit: str) -> str:
 
 @contextmanager
 def planning(
-    path: Path, teleop: Teleop, config: Config, simulation: Simulation, world: World
-) -> Iterator[tuple[ForeseerProcess, queue.Queue]]:
+    path: Path, teleop: Teleop, config: SessionConfig, simulation: Simulation, world: World
+) -> Iterator[tuple[PreviewProcess, queue.Queue]]:
     """The process once it is ready, and what it answers: (time at which it came, answer)."""
     heard: queue.Queue = queue.Queue()
     setup = path.resolve(), teleop, config.preview, simulation.bodies, world
-    process = ForeseerProcess(preview_process.run, setup, lambda answer: heard.put((time.monotonic(), answer)))
+    process = PreviewProcess(preview_process.run, setup, lambda answer: heard.put((time.monotonic(), answer)))
     try:
         if not process.ready.wait(COMES):
             raise InputError(f"the process that plans: not ready after {COMES:g} s")
@@ -120,7 +120,12 @@ def planning(
 
 
 def previews(
-    process: ForeseerProcess, heard: queue.Queue, package: Package, config: Config, simulation: Simulation, world: World
+    process: PreviewProcess,
+    heard: queue.Queue,
+    package: Package,
+    config: SessionConfig,
+    simulation: Simulation,
+    world: World,
 ) -> Iterator[Previewed]:
     """PLANS of them, of places at random; those that are refused are left out."""
     rng, made = np.random.default_rng(0), 0
@@ -154,15 +159,15 @@ def _heard(heard: queue.Queue, serial: int) -> Previewed | None:
         at, answer = heard.get(timeout=COMES)
         if answer is None:
             raise InputError("the process that plans: it has ended")
-        if (answer.report.serial if isinstance(answer, Planned) else answer.serial) != serial:
+        if (answer.report.serial if isinstance(answer, PlanAnswer) else answer.serial) != serial:
             continue
-        if isinstance(answer, Planned):
+        if isinstance(answer, PlanAnswer):
             plan, began = answer.plan, at
             if plan is None:
                 return None
-        elif isinstance(answer, Begun):
+        elif isinstance(answer, PreviewBegun):
             step = answer.preview.step
-        elif isinstance(answer, Shown):
+        elif isinstance(answer, PreviewPiece):
             pieces.append((at - began, answer))
             if answer.last:
                 break
@@ -176,7 +181,7 @@ def _heard(heard: queue.Queue, serial: int) -> Previewed | None:
 def distances(found: Previewed, simulation: Simulation) -> tuple[np.ndarray, bool]:
     """Of the tip from where the preview has it, m (F,), once the simulated robot runs the plan; whether it pushed the
     thing."""
-    plant = Plant(simulation)
+    plant = TwinPlant(simulation)
     robot = SimulatedRobot(
         simulation.joints, simulation.commands, simulation.limits, simulation.package,
         lambda joints, commands, _: plant.move(joints, commands, smooth=True),

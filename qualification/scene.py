@@ -16,7 +16,7 @@ from pathlib import Path
 from qualification.guests import ADDRESS
 from qualification.operator import PATIENCE, Operator
 from qualification.witness import Watched, Witness, machine
-from trunkline.ar.drivers.settings import Config
+from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.ar.drivers.simulated_motors import SIMULATED
 from trunkline.ar.session import real, robot
 from trunkline.ar.session.hardware import hardware_of
@@ -120,8 +120,8 @@ def serve(pipe: Connection, witness: Witness, package: Path, motors: bool) -> No
     """The process of a session: until the other end of `pipe` is closed. All in it is as it is served, but that the
     robot's process tells the witness too, and that its bank, if it has one, has a motor that can be silent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    robot.Channel, real.run = functools.partial(Watched, witness=witness), machine
-    real.Channel = functools.partial(Watched, witness=None)  # the twin's: the class itself is not found by its name now
+    robot.RobotChannel, real.run = functools.partial(Watched, witness=witness), machine
+    real.RobotChannel = functools.partial(Watched, witness=None)  # the twin's: its class has another name now
     asyncio.run(_serve(pipe, package, motors))
 
 
@@ -130,11 +130,11 @@ async def _serve(pipe: Connection, package: Path, motors: bool) -> None:
         with contextlib.suppress(OSError):  # it says how its end goes to nobody
             pipe.send((time.monotonic(), line))
 
-    execution = load_folder(Config, PROJECT / "conf/execution")
+    execution = load_folder(ExecutionConfig, PROJECT / "conf/execution")
     hardware = hardware_of("simulated", "gm6020", SIMULATED, "", execution) if motors else None
     async with opened(package, ADDRESS, say, hardware) as (server, made):
         assert made.robot.pid is not None
-        assert made.journal.pid is not None
-        pipe.send(Told(server.house.token, made.robot.pid, made.journal.pid, made.journal.path))
+        assert made.log_writer.pid is not None
+        pipe.send(Told(server.composition.token, made.robot.pid, made.log_writer.pid, made.log_writer.path))
         with contextlib.suppress(EOFError, OSError):
             await asyncio.to_thread(pipe.recv)

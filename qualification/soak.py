@@ -27,9 +27,9 @@ from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import messages, preview_process
 from trunkline.ar.session.auth import make_token
 from trunkline.ar.session.composition import SEARCH
-from trunkline.ar.session.controller import Desk
-from trunkline.ar.session.robot import Standing
-from trunkline.ar.session.server import House, Server
+from trunkline.ar.session.controller import SessionController
+from trunkline.ar.session.robot import RobotState
+from trunkline.ar.session.server import Composition, Server
 from trunkline.ar.session.session import listening
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.core import Teleoperation
@@ -66,9 +66,9 @@ class Robot:
     def state(self) -> ExecutorReport:
         return self.robot.state()
 
-    def standing(self) -> Standing:
+    def robot_state(self) -> RobotState:
         bodies = np.tile([0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0], (BODIES, 1))
-        return Standing(self.now, 0.0, self.robot.joints, self.robot.commands, np.full(7, np.nan), bodies)
+        return RobotState(self.now, 0.0, self.robot.joints, self.robot.commands, np.full(7, np.nan), bodies)
 
 
 class Planning:
@@ -78,7 +78,7 @@ class Planning:
         self.robot, self.limits, self.made = robot.robot, robot.limits, 0
         self.server: Server | None = None
 
-    def order(self, order: preview_process.Order | preview_process.Seek) -> None:
+    def order(self, order: preview_process.Order | preview_process.FollowRequest) -> None:
         assert isinstance(order, preview_process.Order)
         assert self.server is not None
         request, robot = order.request, self.robot
@@ -88,13 +88,15 @@ class Planning:
         rows = gentle(here, there, self.limits, 0.01)
         plan = Plan(0.01, rows[:, :JOINTS], rows[:, JOINTS:], (("approach", 0),), request.package, request.world)
         digest, poses = plan.digest(), np.zeros((15, BODIES, 7), dtype=np.float32)
-        told = messages.Foreseen(digest, None, None, None, (0.0,), ((0.0, 0.0, 0.0),), (0.0,), 0.9, 12)
+        told = messages.PredictionMessage(digest, None, None, None, (0.0,), ((0.0, 0.0, 0.0),), (0.0,), 0.9, 12)
         for answer in (
-            preview_process.Planned(PlanReport(request.serial, digest, "", plan.package, plan.world), plan),
-            preview_process.Begun(request.serial, messages.Preview(digest, 0.02, 0.3, 0.02, (("approach", 0.0),))),
-            preview_process.Shown(request.serial, 0, 0.02, poses, False),
-            preview_process.Shown(request.serial, 15, 0.32, poses, True),
-            preview_process.Told(request.serial, told),
+            preview_process.PlanAnswer(PlanReport(request.serial, digest, "", plan.package, plan.world), plan),
+            preview_process.PreviewBegun(
+                request.serial, messages.PreviewMessage(digest, 0.02, 0.3, 0.02, (("approach", 0.0),))
+            ),
+            preview_process.PreviewPiece(request.serial, 0, 0.02, poses, False),
+            preview_process.PreviewPiece(request.serial, 15, 0.32, poses, True),
+            preview_process.PredictionAnswer(request.serial, told),
         ):
             self.server.foreseen(answer)
 
@@ -124,14 +126,14 @@ async def session(package: Package, hours: float) -> None:
     robot, clock, said = Robot(package, teleop), [0.0], Counter()
     planning = Planning(robot)
     core = Teleoperation(teleop.core, package.reach, package.digest, teleop.mount_offset)
-    desk, token = Desk(core, robot, planning, make_world(()), teleop.handling.lift), make_token()
+    controller, token = SessionController(core, robot, planning, make_world(()), teleop.handling.lift), make_token()
 
     def log(line: str) -> None:
         said["silent"] += line.endswith("was silent")
         said["error"] += line.startswith("error:")
 
     scene = {"bodies": [f"b{n}" for n in range(BODIES)]}
-    house = House(desk, token, ADDRESS.origins, package.digest, scene, None, HZ, Path("nowhere"), log)
+    house = Composition(controller, token, ADDRESS.origins, package.digest, scene, None, HZ, Path("nowhere"), log)
     server = planning.server = Stepped(house, lambda: clock[0])
     began = time.monotonic()
     async with listening(server, ADDRESS), ClientSession() as sockets:

@@ -8,12 +8,12 @@ from multiprocessing.context import SpawnContext
 
 import numpy as np
 
-from trunkline.ar.drivers.driver_client import Adapted
-from trunkline.ar.drivers.driver_host import hosted
+from trunkline.ar.drivers.driver_client import DriverClient
+from trunkline.ar.drivers.driver_host import start_driver
 from trunkline.ar.drivers.motors import MotorsOnBus
 from trunkline.ar.session import real
 from trunkline.ar.session.hardware import Hardware
-from trunkline.ar.session.robot import HELD, MODE, MODES, SERIAL, Channel
+from trunkline.ar.session.robot import HOLD_TIME, MODE, MODES, SERIAL, RobotChannel
 from trunkline.ar.teleop.trajectory import JOINTS
 
 LEAST = 1e-9  # rad or m between two tellings: it moves
@@ -72,13 +72,13 @@ class Witness:
         if moved:
             self._moved.value = time.monotonic()
         self._far.value = max(self._far.value, far)
-        if numbers[HELD] != self._told and numbers[SERIAL] != self._held_in:
-            self._held.value, self._held_in = numbers[HELD], numbers[SERIAL]
-        self._told, self._begun.value = numbers[HELD], numbers[SERIAL]
+        if numbers[HOLD_TIME] != self._told and numbers[SERIAL] != self._held_in:
+            self._held.value, self._held_in = numbers[HOLD_TIME], numbers[SERIAL]
+        self._told, self._begun.value = numbers[HOLD_TIME], numbers[SERIAL]
         self._running.value = MODES[int(numbers[MODE])] == "running"
 
 
-class Watched(Channel):
+class Watched(RobotChannel):
     """A channel whose robot tells a `witness` too, if there is one."""
 
     def __init__(self, context: SpawnContext, tendons: int, bodies: int, witness: Witness | None) -> None:
@@ -102,9 +102,9 @@ def machine(channel: Watched, *setup) -> None:
     witness = channel.witness
     assert witness is not None
 
-    def motors(hardware: Hardware) -> Adapted:
+    def motors(hardware: Hardware) -> DriverClient:
         named = MotorsOnBus(hardware.motors, hardware.bus, hardware.interface)
-        found = hosted(named, ("-c", "import sys; from qualification.hushed import main; sys.exit(main())"))
+        found = start_driver(named, ("-c", "import sys; from qualification.hushed import main; sys.exit(main())"))
         witness.motors = found.process.pid
         return found
 

@@ -70,13 +70,16 @@ JUDGES = {  # by function, the test that has its table, and its file below tests
         "identification/test_converged.py",
         "test_only_a_search_whose_starts_agree_has_converged",
     ),
-    "trunkline.ar.session.preview_validation:_held": ("ar/session/test_hindsight.py", "test_what_came_of_a_grasp"),
+    "trunkline.ar.session.preview_validation:_grasped": (
+        "ar/session/test_preview_validation.py",
+        "test_what_came_of_a_grasp",
+    ),
     "trunkline.ar.session.preview_validation:_holds": (
-        "ar/session/test_hindsight.py",
+        "ar/session/test_preview_validation.py",
         "test_whether_the_arm_holds_anything",
     ),
     "trunkline.ar.session.preview_validation:lines": (
-        "ar/session/test_hindsight.py",
+        "ar/session/test_preview_validation.py",
         "test_whether_the_outcome_agreed_with_what_was_foreseen",
     ),
     "trunkline.kinematics.panda.inverse:solve": (
@@ -106,9 +109,6 @@ JUDGES = {  # by function, the test that has its table, and its file below tests
 }
 OTHERWISE = {  # what the word stands for there: no verdict
     "trunkline.identification.results.parameter_table:parameter_table": "looks a name up among those at a bound",
-    "trunkline.ar.session.controller_input:_controller": "buttons that are held down",
-    "trunkline.ar.session.preview_process:_held": "the thing that is in the arm, looked up in the world",
-    "trunkline.recordings.preparation.proposal:_experiment": "whether motors hold in a log; a user confirms it",
     "trunkline.compute.scheduler:spread_rows": "shares rows out to workers",
 }
 

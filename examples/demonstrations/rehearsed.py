@@ -17,9 +17,9 @@ import numpy as np
 from rehearsal.experiments.bench import Bench, bench_of, perform
 from rehearsal.experiments.registry import EXPERIMENTS
 from rehearsal.session import RATE, Session
-from trunkline.ar.session.log_format import Book, Record, Subject
-from trunkline.ar.session.log_writer import Journal
-from trunkline.ar.session.robot import Standing
+from trunkline.ar.session.log_format import LogFormat, Record, Subject
+from trunkline.ar.session.log_writer import LogWriter
+from trunkline.ar.session.robot import RobotState
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.errors import InputError, in_one_line
 
@@ -27,14 +27,14 @@ ZERO = 1_700_000_000 * 10**9  # ns since 1970 at which every run begins
 JOINTS = tuple(f"joint_{number}" for number in range(1, 8))
 
 
-class Kept(Journal):
+class Kept(LogWriter):
     """Writes here and now, by the clock of the session."""
 
     def __init__(self, path: Path, subject: Subject) -> None:
         self.session: Session | None = None
         super().__init__(subject, lambda: 0.0 if self.session is None else self.session.now)
         self.file = open(path, "xb")  # noqa: SIM115
-        self.book = Book(self.file, subject, ZERO)
+        self.book = LogFormat(self.file, subject, ZERO)
 
     def keep(self, record: Record) -> None:
         self.book.write(record)
@@ -49,7 +49,7 @@ class Kept(Journal):
 class Logged(Bench):
     """A bench whose sessions are heard by a journal."""
 
-    journal: Journal = Journal()
+    journal: LogWriter = LogWriter()
 
     def session(self, *args, **kwargs) -> Session:
         session, journal = super().session(*args, **kwargs), self.journal
@@ -63,7 +63,7 @@ class Logged(Bench):
 class RecordedCore:
     """A core whose steps are told to a journal."""
 
-    def __init__(self, core: Teleoperation, journal: Journal) -> None:
+    def __init__(self, core: Teleoperation, journal: LogWriter) -> None:
         self.core, self.journal = core, journal
 
     def step(self, state, inputs, dt):
@@ -75,7 +75,7 @@ class RecordedCore:
         return getattr(self.core, name)
 
 
-def listen(session: Session, journal: Journal) -> None:
+def listen(session: Session, journal: LogWriter) -> None:
     """Tell the journal all that passes in a session, and change nothing of it."""
     frame, readings, start = session.frame, session.robot.readings, session.executor.start
     last: dict = {}
@@ -97,8 +97,8 @@ def listen(session: Session, journal: Journal) -> None:
         view, now = frame(), last["seen"]
         straight, sent = session.package.straight, session.executor
         tip = np.concatenate([now.tip, now.tip_quaternion])
-        journal.standing(
-            Standing(session.now, 0.0, sent.joints, sent.commands, tip, tip[None], now.joints, straight - now.wound)
+        journal.robot_state(
+            RobotState(session.now, 0.0, sent.joints, sent.commands, tip, tip[None], now.joints, straight - now.wound)
         )
         if changed("world", session.world):
             journal.event("world", world=session.world)

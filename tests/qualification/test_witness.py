@@ -5,7 +5,7 @@ import multiprocessing
 import numpy as np
 
 from qualification.witness import HEAD, Watched, Witness
-from trunkline.ar.session.robot import HELD, MODE, MODES, SERIAL
+from trunkline.ar.session.robot import HOLD_TIME, MODE, MODES, SERIAL
 
 TENDONS = 3
 
@@ -18,7 +18,7 @@ def test_a_motion_and_its_first_hold_are_noted():
     def tell(joint, cable, mode, serial, held):
         numbers = np.zeros(channel.size)
         numbers[HEAD], numbers[HEAD + 7] = joint, cable
-        numbers[MODE], numbers[SERIAL], numbers[HELD] = MODES.index(mode), serial, held
+        numbers[MODE], numbers[SERIAL], numbers[HOLD_TIME] = MODES.index(mode), serial, held
         channel.tell(numbers, "")
 
     tell(0.5, 0.2, "idle", 0, 0.0)

@@ -22,5 +22,5 @@ def demo_with(pattern: str) -> Path:
 def package() -> Path:
     """The Unity package that the stage made last."""
     pattern = "artifacts/package_unity/*.tgz"
-    (folder,) = demo_with(pattern).glob(pattern)
-    return folder
+    (path,) = demo_with(pattern).glob(pattern)
+    return path

@@ -46,21 +46,21 @@ def read_folder(root: Path, rooms: tuple[str, ...] = ROOMS) -> list[tuple[str, a
 def judges(modules: list[tuple[str, ast.Module]]) -> set[Judge]:
     """All that decide in these modules."""
     read = [Read(module, tree, _imports(tree)) for module, tree in modules]
-    functions = {f"{file.module}:{name}": function for file in read for name, function in _functions(file.tree)}
+    functions = {f"{source.module}:{name}": function for source in read for name, function in _functions(source.tree)}
     built: dict[str, list[list[str]]] = {}
-    for name, fields in (pair for file in read for pair in _built(file.tree)):
+    for name, fields in (pair for source in read for pair in _built(source.tree)):
         built.setdefault(name, []).append(fields)
-    result = set()
-    for file in read:
-        for name, function in [("<module>", file.tree), *_functions(file.tree)]:
-            name_here = f"{file.module}:{name}"
+    judges = set()
+    for source in read:
+        for name, function in [("<module>", source.tree), *_functions(source.tree)]:
+            name_here = f"{source.module}:{name}"
             if (word := name.rpartition(".")[2].strip("_")) in WORDS and _computes(function):
-                result.add(Judge(name_here, word))
+                judges.add(Judge(name_here, word))
             for word, value in _bound(function, built):
-                result |= {Judge(decider, word) for decider in _deciders(value, name_here, file, functions)}
-            if file.module.startswith(CAUSES) and _says_why(function):
-                result.add(Judge(name_here, "success"))
-    return result
+                judges |= {Judge(decider, word) for decider in _deciders(value, name_here, source, functions)}
+            if source.module.startswith(CAUSES) and _says_why(function):
+                judges.add(Judge(name_here, "success"))
+    return judges
 
 
 def _imports(tree: ast.Module) -> dict[str, str]:
@@ -128,11 +128,11 @@ def _targets(target: ast.expr, value: ast.expr) -> Iterator[tuple[str, ast.expr]
         yield target.id if isinstance(target, ast.Name) else target.attr, value
 
 
-def _deciders(value: ast.AST, function_name: str, read: Read, functions: dict[str, Function]) -> Iterator[str]:
+def _deciders(value: ast.AST, qualified: str, read: Read, functions: dict[str, Function]) -> Iterator[str]:
     """Who computes a value: this function, where there is logic in it; else those that it calls or hands on."""
     aside = _aside(value)
     if any(map(_logical, _without(value, aside))):
-        yield function_name
+        yield qualified
         return
     if isinstance(value, ast.Call):
         called = _called(value, read, functions)
@@ -143,22 +143,25 @@ def _deciders(value: ast.AST, function_name: str, read: Read, functions: dict[st
         return
     for part in ast.iter_child_nodes(value):
         if id(part) not in aside and not isinstance(part, ast.comprehension):
-            yield from _deciders(part, function_name, read, functions)
+            yield from _deciders(part, qualified, read, functions)
 
 
 def _called(call: ast.Call, read: Read, functions: dict[str, Function]) -> set[str]:
     """Functions that are called, or handed on to what is: of this module or imported, and methods that decide."""
     names = [name.id for name in [call.func, *call.args] if isinstance(name, ast.Name)]
-    keys = {key for name in names for key in (read.imports.get(name, ""), f"{read.module}:{name}")}
-    candidates = keys & set(functions)
+    deciders = {
+        qualified for name in names for qualified in (read.imports.get(name, ""), f"{read.module}:{name}")
+    } & set(functions)
     if isinstance(call.func, ast.Attribute) and not (
         isinstance(call.func.value, ast.Name) and call.func.value.id == "np"
     ):
         ending = f".{call.func.attr}"
-        candidates |= {
-            key for key, function in functions.items() if key.partition(":")[2].endswith(ending) and _computes(function)
+        deciders |= {
+            qualified
+            for qualified, function in functions.items()
+            if qualified.partition(":")[2].endswith(ending) and _computes(function)
         }
-    return candidates
+    return deciders
 
 
 def _logical(node: ast.AST) -> bool:

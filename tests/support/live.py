@@ -19,10 +19,10 @@ from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import binary as wire
 from trunkline.ar.session import messages, preview_process
 from trunkline.ar.session.auth import Origins
-from trunkline.ar.session.controller import Desk
-from trunkline.ar.session.robot import Standing
-from trunkline.ar.session.server import House, Server
-from trunkline.ar.session.settings import Config
+from trunkline.ar.session.controller import SessionController
+from trunkline.ar.session.robot import RobotState
+from trunkline.ar.session.server import Composition, Server
+from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.executor import SimulatedRobot
 from trunkline.ar.teleop.following import sought
@@ -40,7 +40,7 @@ PREVIEW = 0.3  # s that a preview lasts, whatever the plan
 @cache
 def live():
     """The settings of a live session."""
-    return load_folder(Config, PROJECT / "conf/live")
+    return load_folder(SessionConfig, PROJECT / "conf/live")
 
 
 class PlainRobot:
@@ -61,14 +61,14 @@ class PlainRobot:
         self.stops.append(time.monotonic())
         self.robot.stop()
 
-    def standing(self):
+    def robot_state(self):
         now = time.monotonic()
         self.last = self.last or now
         while self.last + TICK <= now:
             self.robot.advance(TICK)
             self.last += TICK
         bodies = np.tile([1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0], (BODIES, 1))
-        return Standing(now, 0.0, self.robot.joints, self.robot.commands, np.full(7, np.nan), bodies)
+        return RobotState(now, 0.0, self.robot.joints, self.robot.commands, np.full(7, np.nan), bodies)
 
 
 class PlainPlanning:
@@ -79,26 +79,29 @@ class PlainPlanning:
         self.heard, self.left, self.plans = None, 0, []
 
     def order(self, order):
-        if isinstance(order, preview_process.Seek):
+        if isinstance(order, preview_process.FollowRequest):
             self.heard(
-                preview_process.Found(order.serial, *sought(self.planner, order.targets, order.joints, order.world))
+                preview_process.FollowAnswer(
+                    order.serial, *sought(self.planner, order.targets, order.joints, order.world)
+                )
             )
             return
         serial = order.request.serial
         try:
             plan = self.planner.plan(order.request, order.world, order.joints, order.commands)
         except InputError as error:
-            self.heard(preview_process.Planned(PlanReport(serial, refused=str(error))))
+            self.heard(preview_process.PlanAnswer(PlanReport(serial, refused=str(error))))
             return
         digest = plan.digest()
         self.plans.append(plan)
         poses = np.zeros((15, BODIES, 7), dtype=np.float32)
-        preview = messages.Preview(digest, 0.02, PREVIEW, 0.02, (("approach", 0.0),))
-        prediction = messages.Foreseen(digest, None, None, None, (0.0,), ((0.0, 0.0, 0.0),), (0.0,), 0.9, 12)
+        preview = messages.PreviewMessage(digest, 0.02, PREVIEW, 0.02, (("approach", 0.0),))
+        prediction = messages.PredictionMessage(digest, None, None, None, (0.0,), ((0.0, 0.0, 0.0),), (0.0,), 0.9, 12)
         for answer in (
-            preview_process.Planned(PlanReport(serial, digest, "", plan.package, plan.world), plan),
-            preview_process.Begun(serial, preview), preview_process.Shown(serial, 0, 0.02, poses, False),
-            preview_process.Shown(serial, 15, 0.32, poses, True), preview_process.Told(serial, prediction),
+            preview_process.PlanAnswer(PlanReport(serial, digest, "", plan.package, plan.world), plan),
+            preview_process.PreviewBegun(serial, preview), preview_process.PreviewPiece(serial, 0, 0.02, poses, False),
+            preview_process.PreviewPiece(serial, 15, 0.32, poses, True),
+            preview_process.PredictionAnswer(serial, prediction),
         ):  # fmt: skip
             self.heard(answer)
 
@@ -115,15 +118,16 @@ def patient(**seconds):
 class Laid:
     """A server, its parts, and its log."""
 
-    def __init__(self, port, page=Path("nowhere"), journal=None, anchors=None, settings=None, rate=RATE):
+    def __init__(self, port, page=Path("nowhere"), log_writer=None, anchors=None, settings=None, rate=RATE):
         self.robot, self.planning, self.log = PlainRobot(), PlainPlanning(), []
         core = Teleoperation(settings or patient(), Everywhere(), PACKAGE, OFFSET)
-        self.desk = Desk(core, self.robot, self.planning, make_world(()), 0.1, journal)
-        self.desk.begin(rate)
+        self.controller = SessionController(core, self.robot, self.planning, make_world(()), 0.1, log_writer)
+        self.controller.begin(rate)
         scene = {"bodies": ["a", "b", "c"]}
         origins = Origins.of(["127.0.0.1"], port, tls=False)
-        self.server = Server(House(
-            self.desk, TOKEN, origins, PACKAGE, scene, None, rate, page, self.log.append, live().alignment, anchors
+        self.server = Server(Composition(
+            self.controller, TOKEN, origins, PACKAGE, scene, None, rate, page, self.log.append,
+            live().alignment, anchors,
         ))  # fmt: skip
         self.planning.heard = self.server.foreseen
         self.url, self.origin = f"http://127.0.0.1:{port}", f"http://127.0.0.1:{port}"
@@ -141,10 +145,10 @@ class Guest:
     async def _listen(self):
         async for message in self.socket:
             if message.type is WSMsgType.TEXT:
-                message_body = message.json()
-                self.messages.append(message_body)
-                if message_body["type"] == "ping":
-                    await self.say(type="pong", number=message_body["number"], stamp=self.now())
+                content = message.json()
+                self.messages.append(content)
+                if content["type"] == "ping":
+                    await self.say(type="pong", number=content["number"], stamp=self.now())
             elif message.type is WSMsgType.BINARY:
                 self.received += 1
                 self.frames.append(message.data)
@@ -213,10 +217,10 @@ def hand(place, **buttons):
 
 
 @asynccontextmanager
-async def laid(page=Path("nowhere"), journal=None, anchors=None, settings=None, rate=RATE):
+async def laid(page=Path("nowhere"), log_writer=None, anchors=None, settings=None, rate=RATE):
     """A server that runs, and how to come to it."""
     port = unused_port()
-    here = Laid(port, page, journal, anchors, settings, rate)
+    here = Laid(port, page, log_writer, anchors, settings, rate)
     served = TestServer(here.server.app(), host="127.0.0.1", port=port)
     async with served, ClientSession() as session:
 

@@ -9,18 +9,22 @@ from functools import cache
 import numpy as np
 
 from trunkline.ar.drivers.gm6020 import command_frames, feedback_of
-from trunkline.ar.drivers.motors import Motors, MotorSettings
-from trunkline.ar.drivers.settings import Config
-from trunkline.ar.drivers.simulated_motors import Bank, Plant
+from trunkline.ar.drivers.motors import MotorGroup, MotorSettings
+from trunkline.ar.drivers.settings import ExecutionConfig
+from trunkline.ar.drivers.simulated_motors import MotorParameters, SimulatedMotors
 from trunkline.pipeline.config import PROJECT, load_folder
 
 TICK = 0.001  # s
-PLANTS = (Plant(), Plant(side=-1, begins=8100, stiffness=300.0), Plant(slack=0.03, begins=4000, stiffness=500.0))
+PLANTS = (
+    MotorParameters(),
+    MotorParameters(side=-1, begins=8100, stiffness=300.0),
+    MotorParameters(slack=0.03, begins=4000, stiffness=500.0),
+)
 
 
 def motor_settings() -> MotorSettings:
     """Of the project, the second motor on the other side."""
-    return replace(load_folder(Config, PROJECT / "conf/execution").motors, sides=(1, -1, 1))
+    return replace(load_folder(ExecutionConfig, PROJECT / "conf/execution").motors, sides=(1, -1, 1))
 
 
 class Workbench:
@@ -28,18 +32,18 @@ class Workbench:
 
     def __init__(self, plants=PLANTS, settings=None, lost=0.0, seed=0):
         self.now, self.lost, self._random = 100.0, lost, random.Random(seed)
-        self.bank = Bank(plants, self.now)
-        self.motors = Motors(settings or motor_settings(), self.now)
+        self.simulated = SimulatedMotors(plants, self.now)
+        self.motors = MotorGroup(settings or motor_settings(), self.now)
         self.zeros = np.zeros(len(plants))
 
     @property
     def currents(self):
-        return [motor.current for motor in self.bank.motors]
+        return [motor.current for motor in self.simulated.motors]
 
     @property
     def pulls(self):
         """True ones, (K,), m, once it is homed."""
-        return np.array([motor.reeled for motor in self.bank.motors]) - self.zeros
+        return np.array([motor.reeled for motor in self.simulated.motors]) - self.zeros
 
     def hear(self, frame):
         if self._random.random() >= self.lost:
@@ -48,14 +52,14 @@ class Workbench:
     def drive(self, pulls, speeds, now):
         for frame in command_frames(self.motors.currents(pulls, speeds, now)):
             if self._random.random() >= self.lost:
-                self.bank.hear(*frame, now)
+                self.simulated.hear(*frame, now)
 
     def tick(self, pull=0.0, speed=0.0, commanding=True):
         self.now += TICK
-        for frame in self.bank.advance(self.now):
+        for frame in self.simulated.advance(self.now):
             self.hear(frame)
         if commanding:
-            count = len(self.bank.motors)
+            count = len(self.simulated.motors)
             self.drive([pull] * count, [speed] * count, self.now)
 
     def rest(self, seconds, **how):
@@ -66,7 +70,7 @@ class Workbench:
         end = self.now + 20.0
         while not self.motors.homed and not self.motors.fault and self.now < end:
             self.tick()
-        self.zeros = np.array([motor.reeled for motor in self.bank.motors]) - self.motors.pulls
+        self.zeros = np.array([motor.reeled for motor in self.simulated.motors]) - self.motors.pulls
         return self
 
     def pull(self, depth=0.09, seconds=2.0):

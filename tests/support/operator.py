@@ -49,7 +49,7 @@ class Operator(Recorder):
 
     def __init__(self, reach=None, **changes):
         settings = replace(config().core, **changes)
-        start = Input(
+        core_input = Input(
             stamp=100.0,
             left=Controller((0.0, 0.0, 0.0), FORWARD),
             right=Controller((0.3, -0.3, 0.0), FORWARD),
@@ -58,7 +58,7 @@ class Operator(Recorder):
             world=World("world"),
             package=PACKAGE,
         )
-        super().__init__(Teleoperation(settings, reach or Everywhere(), PACKAGE, 0.05), start, DT)
+        super().__init__(Teleoperation(settings, reach or Everywhere(), PACKAGE, 0.05), core_input, DT)
 
 
 TABLE = Box("the table", (-2.0, -2.0, -1.0), (2.0, 2.0, 0.0))

@@ -110,9 +110,9 @@ def curl_truth(level_mm: float = 40.0, split: str = "validate") -> Truth:
 
 def pull_truth(pulls_mm=(40.0, -20.0, -20.0), split: str = "identify", load: float = 0.0) -> Truth:
     """At rest for 1.5 s with tendons held, bent as far as tendon 1 says."""
-    pulls = 1e-3 * np.tile(pulls_mm, (int(1.5 * RATE), 1))
+    rest = 1e-3 * np.tile(pulls_mm, (int(1.5 * RATE), 1))
     name = "pull_" + "_".join(f"{pull:.0f}" for pull in pulls_mm)
-    truth = bent_truth(name, "static_pull", None, split, 0.0, pulls[:, 0] / 0.03, pulls)
+    truth = bent_truth(name, "static_pull", None, split, 0.0, rest[:, 0] / 0.03, rest)
     return replace(truth, load=load)
 
 

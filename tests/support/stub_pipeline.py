@@ -98,16 +98,16 @@ class StubPipeline:
 
     def tunable(self, stage: str) -> tuple[str, float]:
         """The first number of the stage's section: its dotted key and its value."""
-        match = self._first_number(OmegaConf.load(self.folder / "params.yaml")[stage])
-        assert match, f"params.yaml: {stage}: no number to tune"
-        return f"{stage}.{match[0]}", match[1]
+        number = self._first_number(OmegaConf.load(self.folder / "params.yaml")[stage])
+        assert number, f"params.yaml: {stage}: no number to tune"
+        return f"{stage}.{number[0]}", number[1]
 
     def _first_number(self, section) -> tuple[str, float] | None:
         for key, value in section.items():
             if isinstance(value, int | float) and not isinstance(value, bool):
                 return key, value
-            if OmegaConf.is_dict(value) and (nested := self._first_number(value)):
-                return f"{key}.{nested[0]}", nested[1]
+            if OmegaConf.is_dict(value) and (number := self._first_number(value)):
+                return f"{key}.{number[0]}", number[1]
         return None
 
     def _write_stubs(self) -> None:

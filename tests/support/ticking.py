@@ -6,12 +6,12 @@ from trunkline.ar.session.log_format import EVENTS
 from trunkline.recordings.logs.log import read_log
 
 
-def fed(journal, seconds, pace=0.01):
+def fed(log_writer, seconds, pace=0.01):
     """Times at which something was told, of the journal's clock."""
     times, end = [], time.monotonic() + seconds
     while time.monotonic() < end:
         times.append(time.monotonic())
-        journal.event("tick", number=len(times))
+        log_writer.event("tick", number=len(times))
         time.sleep(pace)
     return times
 

@@ -12,15 +12,15 @@ PLACES = np.array(
 )  # m, to which the flange reaches
 
 
-def noisy_places(places, rng, sigma):
+def observed(places, rng, sigma):
     """Places (..., 3) in the reference frame, with noise of `sigma`, m, along each axis."""
     return in_base(inverse(TRUE), places) + rng.normal(scale=sigma, size=places.shape)
 
 
 def directions(count, rng):
     """Unit vectors (count, 3)."""
-    vectors = rng.normal(size=(count, 3))
-    return vectors / np.linalg.norm(vectors, axis=1)[:, None]
+    points = rng.normal(size=(count, 3))
+    return points / np.linalg.norm(points, axis=1)[:, None]
 
 
 def at_reach(rng):

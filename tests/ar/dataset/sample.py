@@ -6,9 +6,9 @@ import numpy as np
 
 from tests.ar.teleop.test_plan import START, STRAIGHT
 from tests.support.operator import PACKAGE, Operator
-from trunkline.ar.session.log_format import SIMULATED, Book, Subject
-from trunkline.ar.session.log_writer import Journal
-from trunkline.ar.session.robot import Standing
+from trunkline.ar.session.log_format import SIMULATED, LogFormat, Subject
+from trunkline.ar.session.log_writer import LogWriter
+from trunkline.ar.session.robot import RobotState
 from trunkline.ar.teleop.messages import (
     ExecutorReport,
     Intent,
@@ -38,7 +38,7 @@ def sent(at: float) -> tuple[np.ndarray, np.ndarray]:
     return START + 0.1 * np.sin(at), np.array([0.02 + 0.01 * np.sin(at), 0.0, 0.01 * at / 100])
 
 
-class Session(Journal):
+class Session(LogWriter):
     """Writes here and now, by a clock that its steps move on."""
 
     def __init__(self, path, measured: bool, names=TENDONS, hardware: str = SIMULATED):
@@ -46,7 +46,7 @@ class Session(Journal):
         super().__init__(subject, lambda: self.time)
         self.time, self.measured, self.world = 100.0, measured, World("w", (), (CUP,))
         self.file = open(path, "wb")  # noqa: SIM115
-        self.book = Book(self.file, subject, ZERO)
+        self.book = LogFormat(self.file, subject, ZERO)
         message = Operator().message
         self.message = replace(message, world=self.world)
         tip = {"body": "unit_01", "place": PLACE}
@@ -69,7 +69,7 @@ class Session(Journal):
             pose = np.array([[0.0, 0, 0, 1, 0, 0, 0], [0.1 * self.time, 0, 0, 0, 1, 0, 0]])  # turned by 180° about x
             measured = lag_joints if self.measured else None
             wound = STRAIGHT - lag_pulls if self.measured else None
-            self.standing(Standing(self.time, 0.0, joints, STRAIGHT - pulls, nothing, pose, measured, wound))
+            self.robot_state(RobotState(self.time, 0.0, joints, STRAIGHT - pulls, nothing, pose, measured, wound))
             fields = {"targets": None, "rays": ((0.1, 0.2, self.time), None)} | wanted
             if motion == "follow":
                 fields["follow"] = targets(0.1 * self.time)

@@ -14,7 +14,7 @@ from tests.ar.dataset.sample import PLACE, RATE, sent, write_session
 from trunkline.ar.dataset.__main__ import main
 from trunkline.ar.dataset.episodes import ACTION, ENVIRONMENT, GOAL, OPERATOR, RAYS, STATE, episodes
 from trunkline.ar.dataset.recording import read_recording
-from trunkline.ar.session.log_reader import read_logbook
+from trunkline.ar.session.log_reader import read_session_log
 
 FPS = 25
 READER = Path(__file__).parents[3] / "examples/demonstrations/load.py"
@@ -183,7 +183,7 @@ def test_a_log_without_a_demonstration_or_a_folder_that_is_taken_is_one_line(log
         (line,) = capsys.readouterr().err.splitlines()
         assert expected in line
     assert sorted(path.name for path in tmp_path.iterdir()) == ["taken"]
-    assert read_logbook(log).damage == []
+    assert read_session_log(log).damage == []
 
 
 @pytest.mark.skipif(

@@ -11,19 +11,19 @@ from trunkline.ar.drivers import robot as machines
 from trunkline.ar.drivers import ros_arm
 from trunkline.ar.drivers.driver import CONNECTING, SILENT, Watchdog
 from trunkline.ar.drivers.gm6020 import MOST_AMPERES, Feedback, command_frames, commanded
-from trunkline.ar.drivers.motors import PRESENT, Motors
+from trunkline.ar.drivers.motors import PRESENT, MotorGroup
 from trunkline.ar.drivers.motors import SILENT as UNHEARD
-from trunkline.ar.drivers.robot import LEAD, Machine
+from trunkline.ar.drivers.robot import LEAD, HardwareRobot
 from trunkline.ar.drivers.ros_arm import RosArm
 from trunkline.ar.drivers.setpoint_filter import ROUNDING
-from trunkline.ar.drivers.settings import Config
-from trunkline.ar.drivers.winch import Reel
+from trunkline.ar.drivers.settings import ExecutionConfig
+from trunkline.ar.drivers.winch import Winch
 from trunkline.errors import InputError
 from trunkline.kinematics.panda.limits import VELOCITY
 from trunkline.pipeline.config import PROJECT, load_folder
 
 NEAR = 1e-6
-ROS = load_folder(Config, PROJECT / "conf/execution").ros
+ROS = load_folder(ExecutionConfig, PROJECT / "conf/execution").ros
 READY = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])
 JOINTS = range(7)
 
@@ -39,7 +39,7 @@ def heard_at(now, motors, numbers=(1, 2, 3), celsius=30):
 @pytest.mark.parametrize("number", [1, 2, 3])
 @pytest.mark.parametrize(("silent", "faulty"), [(UNHEARD - NEAR, False), (UNHEARD + NEAR, True)])
 def test_a_motor_may_be_silent_for_so_long(number, silent, faulty):
-    motors = Motors(motor_settings(), 100.0)
+    motors = MotorGroup(motor_settings(), 100.0)
     heard_at(100.0, motors)
     heard_at(100.0 + silent, motors, {1, 2, 3} - {number})
     currents = motors.currents([0.0] * 3, [0.0] * 3, 100.0 + silent)
@@ -50,7 +50,7 @@ def test_a_motor_may_be_silent_for_so_long(number, silent, faulty):
 @pytest.mark.parametrize("number", [1, 2, 3])
 @pytest.mark.parametrize(("late", "faulty"), [(PRESENT - NEAR, False), (PRESENT + NEAR, True)])
 def test_each_motor_has_to_be_heard_at_first_and_none_is_driven_before(number, late, faulty):
-    motors = Motors(motor_settings(), 100.0)
+    motors = MotorGroup(motor_settings(), 100.0)
     heard_at(100.0 + late, motors, {1, 2, 3} - {number})
     assert set(motors.currents([0.01] * 3, [0.0] * 3, 100.0 + late).values()) == {0.0}
     assert motors.fault.startswith(f"motor {number}: found no feedback") == faulty
@@ -61,7 +61,7 @@ def test_each_motor_has_to_be_heard_at_first_and_none_is_driven_before(number, l
 def test_a_motor_may_be_so_hot(number, beyond):
     bench = homed()
     hot = int(motor_settings().hot) + beyond
-    bench.motors.hear(Feedback(number, bench.motors.reels[number - 1]._angle, 0, 0.0, hot), bench.now)
+    bench.motors.hear(Feedback(number, bench.motors.winches[number - 1]._angle, 0, 0.0, hot), bench.now)
     assert bench.motors.fault == (f"motor {number}: found {hot} °C, expected at most 80" if beyond else "")
 
 
@@ -74,8 +74,8 @@ def test_a_cable_may_be_so_far_from_where_it_shall_be(cable, sign):
         bench = homed()
         pulls = np.array(bench.motors.pulls)
         currents = bench.motors.currents(pulls + sign * off * np.eye(3)[cable], np.zeros(3), bench.now)
-        said = f"motor {cable + 1}: found 20 mm from where its cable shall be, expected at most 20"
-        assert bench.motors.fault == (said if faulty else "")
+        fault = f"motor {cable + 1}: found 20 mm from where its cable shall be, expected at most 20"
+        assert bench.motors.fault == (fault if faulty else "")
         assert faulty == (not any(currents.values()))
 
 
@@ -92,12 +92,12 @@ def test_a_fault_of_any_motor_ends_the_current_of_all(number):
 @pytest.mark.parametrize("beyond", [-NEAR, NEAR])
 def test_a_cable_may_be_so_loose_as_homing_begins(beyond):
     settings = motor_settings().reel
-    reel = Reel(settings, 1)
-    reel.read(Feedback(1, 0, 0, 0.0, 30), 0.0)
-    reel.pull = settings.slack + beyond
-    current = reel.home(0.001)
-    assert reel.fault == ("found no tension within 100 mm, expected 6 N" if beyond > 0 else "")
-    assert not (reel.fault and current)
+    winch = Winch(settings, 1)
+    winch.read(Feedback(1, 0, 0, 0.0, 30), 0.0)
+    winch.pull = settings.slack + beyond
+    current = winch.home(0.001)
+    assert winch.fault == ("found no tension within 100 mm, expected 6 N" if beyond > 0 else "")
+    assert not (winch.fault and current)
 
 
 @pytest.mark.parametrize("sign", [-1, 1])
@@ -110,9 +110,9 @@ def test_no_command_asks_a_motor_for_more_than_it_may_have(asked, sent, sign):
 @pytest.mark.parametrize("side", [-1, 1])
 @pytest.mark.parametrize("wanted", [-1.0, 1.0])
 def test_the_current_of_a_loop_ends_at_what_the_settings_allow_either_way(side, wanted):
-    reel = Reel(motor_settings().reel, side)
-    reel.read(Feedback(1, 0, 0, 0.0, 30), 0.0)
-    assert reel.current(wanted, 0.0, 0.001) == pytest.approx(side * wanted * motor_settings().reel.most)
+    winch = Winch(motor_settings().reel, side)
+    winch.read(Feedback(1, 0, 0, 0.0, 30), 0.0)
+    assert winch.current(wanted, 0.0, 0.001) == pytest.approx(side * wanted * motor_settings().reel.most)
 
 
 # --- setpoints
@@ -157,10 +157,10 @@ def link(monkeypatch):
 
 @pytest.fixture
 def arm(link):
-    found = RosArm(ROS)
-    found.turn(100.0)
-    assert found.ready
-    return found
+    arm = RosArm(ROS)
+    arm.turn(100.0)
+    assert arm.ready
+    return arm
 
 
 @pytest.mark.parametrize("sign", [-1, 1])
@@ -172,8 +172,8 @@ def test_a_joint_may_be_so_far_from_where_its_controller_is_sent(arm, link, join
     for beyond, faulty in ((-NEAR, False), (NEAR, True)):
         link.joints = READY + (ROS.astray + beyond) * off
         arm.turn(100.01)
-        said = f"{ROS.names[joint]}: found 0.1 rad from where it is sent, expected at most 0.1"
-        assert arm.fault == (said if faulty else "")
+        fault = f"{ROS.names[joint]}: found 0.1 rad from where it is sent, expected at most 0.1"
+        assert arm.fault == (fault if faulty else "")
 
 
 @pytest.mark.parametrize("joint", JOINTS)
@@ -198,12 +198,12 @@ def test_a_controller_has_to_be_there_within_its_time(link, missing, late, fault
         link.listeners = 0
     else:
         link.joints = None
-    found = RosArm(ROS)
-    found.turn(100.0 + late)
-    assert not found.ready
+    arm = RosArm(ROS)
+    arm.turn(100.0 + late)
+    assert not arm.ready
     side = "found nobody who listens" if missing == "listeners" else "found no state of panda_joint1 and others"
     topic = ROS.trajectory if missing == "listeners" else ROS.states
-    assert found.fault == (f"{topic}: {side} within 20 s" if faulty else "")
+    assert arm.fault == (f"{topic}: {side} within 20 s" if faulty else "")
 
 
 @pytest.mark.parametrize("sign", [-1, 1])
@@ -211,12 +211,12 @@ def test_a_controller_has_to_be_there_within_its_time(link, missing, late, fault
 def test_no_joint_is_sent_faster_than_it_may_go(link, joint, sign):
     for share, faulty in ((1 - 1e-4, False), (1 + 1e-4, True)):
         link.joints, link.sent = READY, []
-        found = RosArm(ROS)
-        found.turn(100.0)
+        arm = RosArm(ROS)
+        arm.turn(100.0)
         there = READY + sign * share * ROUNDING * VELOCITY[joint] * LEAD * np.eye(7)[joint]
-        found.send(100.02 + LEAD, there)
-        found.turn(100.02)
-        assert found.fault.startswith(f"setpoint: {ROS.names[joint]} asks for ") == faulty
+        arm.send(100.02 + LEAD, there)
+        arm.turn(100.02)
+        assert arm.fault.startswith(f"setpoint: {ROS.names[joint]} asks for ") == faulty
         assert len(link.sent) == (0 if faulty else 1)
 
 
@@ -240,7 +240,7 @@ def test_a_point_that_cannot_be_sent_is_a_fault(arm, link):
 # --- both limbs
 
 
-class Told:
+class FailedDriver:
     """A limb that is told what to be. `ahead`: s from its clock to when each setpoint is due."""
 
     def __init__(self, ready=True, fault="", at=READY):
@@ -262,9 +262,9 @@ class Told:
     [("", "", ""), ("reflex", "", "robot: reflex"), ("", "hot", "motors: hot"), ("reflex", "hot", "robot: reflex"),
      (None, "hot", "motors: hot"), ("reflex", None, "robot: reflex"), (None, None, "")],
 )  # fmt: skip
-def test_a_fault_of_either_limb_is_the_machines_and_has_its_name(arm, motors, fault):
-    limbs = [None if said is None else Told(fault=said) for said in (arm, motors)]
-    assert Machine(*limbs, np.full(3, 0.5), lambda: 100.0).fault == fault
+def test_a_fault_of_either_driver_is_the_robots_and_has_its_name(arm, motors, fault):
+    drivers = [None if fault is None else FailedDriver(fault=fault) for fault in (arm, motors)]
+    assert HardwareRobot(*drivers, np.full(3, 0.5), lambda: 100.0).fault == fault
 
 
 @pytest.fixture
@@ -275,44 +275,44 @@ def waits(monkeypatch):
     return done
 
 
-def test_a_machine_begins_once_both_limbs_are_ready(waits):
-    arm, motors = Told(ready=False), Told(ready=False, at=np.zeros(3))
+def test_a_robot_begins_once_both_drivers_are_ready(waits):
+    arm, motors = FailedDriver(ready=False), FailedDriver(ready=False, at=np.zeros(3))
     waits += [lambda: setattr(arm, "ready", True), lambda: None, lambda: setattr(motors, "ready", True)]
-    made = Machine(arm, motors, np.full(3, 0.5), lambda: 100.0)
+    made = HardwareRobot(arm, motors, np.full(3, 0.5), lambda: 100.0)
     np.testing.assert_array_equal(made.begin(np.ones(7)), READY)
     assert waits == []
     assert (arm.turns, motors.turns) == (3, 3)
 
 
-@pytest.mark.parametrize(("limb", "said"), [("arm", "robot: no robot"), ("motors", "motors: no robot")])
-def test_a_machine_whose_limb_fails_does_not_begin(waits, limb, said):
-    limbs = {"arm": Told(ready=False), "motors": Told(ready=False)}
-    waits += [lambda: setattr(limbs[limb], "fault", "no robot")]
-    with pytest.raises(InputError, match=f"^{said}$"):
-        Machine(**limbs, straight=np.full(3, 0.5), clock=lambda: 100.0).begin(np.ones(7))
+@pytest.mark.parametrize(("driver", "fault"), [("arm", "robot: no robot"), ("motors", "motors: no robot")])
+def test_a_robot_whose_driver_fails_does_not_begin(waits, driver, fault):
+    drivers = {"arm": FailedDriver(ready=False), "motors": FailedDriver(ready=False)}
+    waits += [lambda: setattr(drivers[driver], "fault", "no robot")]
+    with pytest.raises(InputError, match=f"^{fault}$"):
+        HardwareRobot(**drivers, straight=np.full(3, 0.5), clock=lambda: 100.0).begin(np.ones(7))
 
 
 def test_a_machine_that_is_ready_and_has_failed_does_not_begin():
     with pytest.raises(InputError, match="^robot: reflex$"):
-        Machine(Told(fault="reflex"), Told(), np.full(3, 0.5), lambda: 100.0).begin(np.ones(7))
+        HardwareRobot(FailedDriver(fault="reflex"), FailedDriver(), np.full(3, 0.5), lambda: 100.0).begin(np.ones(7))
 
 
 @pytest.mark.parametrize("ready", [True, False])
 def test_a_machine_that_nobody_wants_any_more_does_not_begin(ready):
     with pytest.raises(InputError, match="^the session is gone$"):
-        Machine(Told(ready=ready), None, np.full(3, 0.5), lambda: 100.0).begin(np.ones(7), lambda: True)
+        HardwareRobot(FailedDriver(ready=ready), None, np.full(3, 0.5), lambda: 100.0).begin(np.ones(7), lambda: True)
 
 
-@pytest.mark.parametrize("limbs", [(True, True), (True, False), (False, True)])
-def test_each_limb_that_is_there_is_given_back(limbs):
-    made = [Told() if there else None for there in limbs]
-    Machine(*made, np.full(3, 0.5), lambda: 100.0).close()
-    assert [limb.closed for limb in made if limb is not None] == [True] * sum(limbs)
+@pytest.mark.parametrize("drivers", [(True, True), (True, False), (False, True)])
+def test_each_driver_that_is_there_is_given_back(drivers):
+    made = [FailedDriver() if there else None for there in drivers]
+    HardwareRobot(*made, np.full(3, 0.5), lambda: 100.0).close()
+    assert [driver.closed for driver in made if driver is not None] == [True] * sum(drivers)
 
 
 def test_moves_that_are_due_anew_are_not_made_up_for():
     now = [100.0]
-    made = Machine(Told(), None, np.full(3, 0.5), lambda: now[0])
+    made = HardwareRobot(FailedDriver(), None, np.full(3, 0.5), lambda: now[0])
     made.begin(READY)
     made.move(READY, np.full(3, 0.5))
     assert made.behind == 0.0  # the first

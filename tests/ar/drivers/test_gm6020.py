@@ -19,8 +19,8 @@ def test_a_current_beyond_the_most_is_cut():
 
 
 def test_feedback_as_the_public_drivers_have_it():
-    said = feedback_of(0x205, bytes.fromhex("1fff0064e0002a00"))
-    assert said == Feedback(1, 8191, 100, -1.5, 42)
+    feedback = feedback_of(0x205, bytes.fromhex("1fff0064e0002a00"))
+    assert feedback == Feedback(1, 8191, 100, -1.5, 42)
     assert feedback_of(0x20B, bytes.fromhex("0000ff9c20002a00")) == Feedback(7, 0, -100, 1.5, 42)
 
 
@@ -32,15 +32,15 @@ def test_other_frames_are_nothing(identifier, data):
 
 @given(st.dictionaries(st.integers(1, 7), st.floats(-3, 3), min_size=1))
 def test_currents_come_back(currents):
-    found = {}
+    decoded = {}
     for frame in command_frames(currents):
-        found |= commanded(*frame)
-    for number, current in found.items():
+        decoded |= commanded(*frame)
+    for number, current in decoded.items():
         assert current == pytest.approx(currents.get(number, 0.0), abs=1.5 / FULL + 1e-12)
-    assert currents.keys() <= found.keys()
+    assert currents.keys() <= decoded.keys()
 
 
 @given(st.integers(1, 7), st.integers(0, 8191), st.integers(-500, 500), st.integers(0, 120))
 def test_feedback_comes_back(number, angle, rpm, celsius):
-    said = Feedback(number, angle, rpm, 0.75, celsius)
-    assert feedback_of(*feedback_frame(said)) == said
+    feedback = Feedback(number, angle, rpm, 0.75, celsius)
+    assert feedback_of(*feedback_frame(feedback)) == feedback

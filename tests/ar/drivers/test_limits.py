@@ -8,8 +8,8 @@ import pytest
 
 from trunkline.ar.drivers.driver import SILENT
 from trunkline.ar.drivers.driver_frames import Setpoint
-from trunkline.ar.drivers.setpoint_filter import LIMITS, NEAR, ROUNDING, Stream
-from trunkline.ar.drivers.time_scaling import PacedRobot
+from trunkline.ar.drivers.setpoint_filter import LIMITS, NEAR, ROUNDING, SetpointFilter
+from trunkline.ar.drivers.time_scaling import TimeScaledRobot
 from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.plan import Plan
 from trunkline.ar.teleop.trajectory import MotionLimits
@@ -22,9 +22,9 @@ JOINTS = range(7)
 SMALL = 0.004  # share of a limit, to either side
 
 
-def played(places: np.ndarray, robot: str) -> tuple[Stream, np.ndarray]:
+def played(places: np.ndarray, robot: str) -> tuple[SetpointFilter, np.ndarray]:
     """A stream that is sent `places` (T, 7), every ms, and what it sends, (T, 7)."""
-    stream, sent = Stream(places[0], LIMITS[robot]), []
+    stream, sent = SetpointFilter(places[0], LIMITS[robot]), []
     ahead = round(LEAD / DT)
     for step in range(len(places) + ahead):
         now = step * DT
@@ -81,11 +81,11 @@ def test_no_joint_goes_beyond_a_limit_though_it_keeps_all_others(robot, kind, jo
     assert not stream.fault.startswith("setpoint:")
     stream, sent = played(way(made(limits, joint, 1 + SMALL), joint, sign), robot)
     most = getattr(limits, kind)[joint]
-    said = rf"setpoint: joint {joint + 1} asks for [\d.e+]+ {unit}, expected at most {re.escape(f'{most:.3g}')}"
-    assert re.fullmatch(said, stream.fault)
+    pattern = rf"setpoint: joint {joint + 1} asks for [\d.e+]+ {unit}, expected at most {re.escape(f'{most:.3g}')}"
+    assert re.fullmatch(pattern, stream.fault)
     for order, name in enumerate(KINDS, 1):
-        found = np.abs(np.diff(sent, order, axis=0)).max(axis=0) / DT**order
-        assert (found < 1.03 * getattr(limits, name)).all()  # braking begins with what it has
+        rates = np.abs(np.diff(sent, order, axis=0)).max(axis=0) / DT**order
+        assert (rates < 1.03 * getattr(limits, name)).all()  # braking begins with what it has
 
 
 @pytest.mark.parametrize("side", ["low", "high"])
@@ -110,7 +110,7 @@ def test_no_joint_leaves_its_range_on_either_side(robot, joint, side):
 @pytest.mark.parametrize("joint", JOINTS)
 def test_no_joint_starts_elsewhere_than_it_is(joint, sign):
     for off, refused in ((NEAR - 1e-6, False), (NEAR + 1e-6, True)):
-        stream = Stream(READY, LIMITS["panda"])
+        stream = SetpointFilter(READY, LIMITS["panda"])
         stream.hear(Setpoint(LEAD, tuple(READY + sign * off * np.eye(7)[joint])), 0.0)
         assert stream.fault.startswith("setpoint: starts 0.002 rad from where the robot is") == refused
 
@@ -118,7 +118,7 @@ def test_no_joint_starts_elsewhere_than_it_is(joint, sign):
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 @pytest.mark.parametrize("place", range(8))
 def test_a_setpoint_that_is_no_number_is_refused(place, value):
-    stream, numbers = Stream(READY, LIMITS["panda"]), [LEAD, *READY]
+    stream, numbers = SetpointFilter(READY, LIMITS["panda"]), [LEAD, *READY]
     numbers[place] = value
     stream.hear(Setpoint(numbers[0], tuple(numbers[1:])), 0.0)
     assert stream.fault == "setpoint: found values that are not finite"
@@ -127,7 +127,7 @@ def test_a_setpoint_that_is_no_number_is_refused(place, value):
 @pytest.mark.parametrize(("silent", "braked"), [(SILENT - 1e-6, False), (SILENT + 1e-6, True)])
 def test_setpoints_that_do_not_come_are_missed_after_so_long(silent, braked):
     """Though those that are there reach further."""
-    stream = Stream(READY, LIMITS["panda"])
+    stream = SetpointFilter(READY, LIMITS["panda"])
     for number in range(200):
         stream.hear(Setpoint(LEAD + number * DT, tuple(READY)), 0.0)
     stream.cycle(silent, DT)
@@ -159,10 +159,10 @@ def test_a_plan_that_leaves_the_robots_own_range_is_refused_and_its_targets_are_
         there = start.copy()
         there[joint] = border + sign * beyond
         plan = Plan(0.01, np.array([start, there, start]), np.full((3, 3), 0.5), (("approach", 0),), "p", "w")
-        robot = PacedRobot(start, np.full(3, 0.5), generous, "p", lambda q, c, _: None, limits)
-        found = robot.check(plan)
-        said = f"plan: joint {joint + 1} leaves this robot's range at {there[joint]:.3f} rad"
-        assert found == (said if beyond > 0 else "")
+        robot = TimeScaledRobot(start, np.full(3, 0.5), generous, "p", lambda q, c, _: None, limits)
+        reason = robot.check(plan)
+        expected = f"plan: joint {joint + 1} leaves this robot's range at {there[joint]:.3f} rad"
+        assert reason == (expected if beyond > 0 else "")
         robot.follow(Following(0.0, 0.0, 0.05), DT)
         robot.hear(0.0, np.append(there, np.full(3, 0.5)))
         assert robot._follower.goal[joint] == (start if beyond > 0 else there)[joint]

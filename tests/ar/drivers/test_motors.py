@@ -7,9 +7,9 @@ import pytest
 
 from tests.support.motors import PLANTS, Workbench, homed, motor_settings
 from trunkline.ar.drivers.gm6020 import Feedback
-from trunkline.ar.drivers.motors import PRESENT, SILENT, Motors
-from trunkline.ar.drivers.simulated_motors import WATCHDOG, Plant
-from trunkline.ar.drivers.winch import Reel
+from trunkline.ar.drivers.motors import PRESENT, SILENT, MotorGroup
+from trunkline.ar.drivers.simulated_motors import WATCHDOG, MotorParameters
+from trunkline.ar.drivers.winch import Winch
 
 
 def rms(off):
@@ -26,7 +26,7 @@ def test_homing_finds_where_the_tension_is_the_pretension():
 
 
 def test_homing_without_a_cable_is_a_fault():
-    bench = Workbench((Plant(), replace(PLANTS[1], stiffness=0.0), Plant())).home()
+    bench = Workbench((MotorParameters(), replace(PLANTS[1], stiffness=0.0), MotorParameters())).home()
     assert bench.motors.fault == "motor 2: found no tension within 100 mm, expected 6 N"
     assert bench.currents == [0.0, 0.0, 0.0]
 
@@ -63,24 +63,24 @@ def test_where_the_encoder_wraps_nothing_jumps():
 
 @pytest.mark.parametrize(("first", "then", "turned"), [(8190, 3, 5), (3, 8190, -5), (0, 4095, 4095), (100, 90, -10)])
 def test_turns_are_counted_the_shorter_way(first, then, turned):
-    reel = Reel(motor_settings().reel, 1)
-    reel.read(Feedback(1, first, 0, 0.0, 30), 0.0)
-    reel.read(Feedback(1, then, 0, 0.0, 30), 0.001)
-    assert reel.pull == pytest.approx(turned / 8192 * 2 * np.pi * 0.015)
+    winch = Winch(motor_settings().reel, 1)
+    winch.read(Feedback(1, first, 0, 0.0, 30), 0.0)
+    winch.read(Feedback(1, then, 0, 0.0, 30), 0.001)
+    assert winch.pull == pytest.approx(turned / 8192 * 2 * np.pi * 0.015)
 
 
 def test_the_current_keeps_its_limit():
-    reel = replace(motor_settings().reel, most=0.3)
-    bench = Workbench(settings=replace(motor_settings(), reel=reel)).home()
+    winch = replace(motor_settings().reel, most=0.3)
+    bench = Workbench(settings=replace(motor_settings(), reel=winch)).home()
     assert bench.motors.homed
-    found = []
+    zeros = []
     for _ in range(300):
         bench.tick(0.019, 0.0)
-        found.append(np.abs(bench.currents).max())
-    assert max(found) == pytest.approx(0.3, abs=1e-3)
+        zeros.append(np.abs(bench.currents).max())
+    assert max(zeros) == pytest.approx(0.3, abs=1e-3)
 
 
-def test_without_commands_the_bank_drives_no_current():
+def test_without_commands_simulated_motors_drive_no_current():
     bench = homed()
     bench.rest(0.3, pull=0.01)
     assert min(np.abs(bench.currents)) > 0.05
@@ -93,20 +93,20 @@ def test_without_commands_the_bank_drives_no_current():
 def test_a_motor_that_is_silent_ends_it_for_all():
     bench = homed()
     bench.rest(0.3, pull=0.01)
-    bench.bank.motors[1].silent = True
+    bench.simulated.motors[1].silent = True
     bench.rest(SILENT - 0.002, pull=0.01)
     assert bench.motors.fault == ""
     bench.rest(0.004, pull=0.01)
     assert bench.currents == [0.0, 0.0, 0.0]
     assert bench.motors.fault.startswith("motor 2: silent for 2")
-    bench.bank.motors[1].silent = False
+    bench.simulated.motors[1].silent = False
     bench.rest(0.5)
     assert bench.currents == [0.0, 0.0, 0.0]
 
 
 def test_a_motor_that_was_never_there():
     bench = Workbench()
-    bench.bank.motors[2].silent = True
+    bench.simulated.motors[2].silent = True
     bench.rest(PRESENT - 0.01)
     assert bench.motors.fault == ""
     assert bench.currents == [0.0, 0.0, 0.0]
@@ -130,7 +130,7 @@ def test_a_hot_motor_ends_it():
 
 
 def test_feedback_of_other_motors_is_nothing():
-    motors = Motors(motor_settings(), 0.0)
+    motors = MotorGroup(motor_settings(), 0.0)
     motors.hear(Feedback(7, 1, 1, 0.0, 200), 0.0)
     assert motors.fault == ""
 

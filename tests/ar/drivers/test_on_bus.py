@@ -13,7 +13,14 @@ from tests.support.motors import PLANTS, TICK, Workbench, homed, motor_settings
 from trunkline.ar.drivers import on_bus
 from trunkline.ar.drivers.gm6020 import Feedback
 from trunkline.ar.drivers.motors import SILENT
-from trunkline.ar.drivers.on_bus import FILTERS, BankInThread, BankOnBus, BusMotors, SimulatedMotors, open_bus
+from trunkline.ar.drivers.on_bus import (
+    FILTERS,
+    BusMotors,
+    SimulatedBusMotors,
+    SimulatedMotorsOnBus,
+    SimulatedMotorsThread,
+    open_bus,
+)
 from trunkline.ar.drivers.simulated_motors import WATCHDOG
 from trunkline.errors import InputError
 
@@ -35,7 +42,7 @@ class BenchBus:
 
     def tick(self):
         self.bench.now += TICK
-        self.waiting += self.bench.bank.advance(self.bench.now)
+        self.waiting += self.bench.simulated.advance(self.bench.now)
 
     def recv(self, timeout):
         assert timeout == 0
@@ -50,7 +57,7 @@ class BenchBus:
         if not self.takes or message.arbitration_id == self.deaf:
             raise can.CanOperationError("full")
         self.sent.append((message.arbitration_id, bytes(message.data)))
-        self.bench.bank.hear(message.arbitration_id, bytes(message.data), self.bench.now)
+        self.bench.simulated.hear(message.arbitration_id, bytes(message.data), self.bench.now)
 
     def shutdown(self):
         self.closed = True
@@ -78,21 +85,21 @@ class Played:
 
 @pytest.fixture
 def driven(monkeypatch):
-    found = Played(monkeypatch, homed()).turn(0.3)
-    assert found.currents.min() > 0.05
-    assert found.driver.fault == ""
-    return found
+    played = Played(monkeypatch, homed()).turn(0.3)
+    assert played.currents.min() > 0.05
+    assert played.driver.fault == ""
+    return played
 
 
 def test_motors_that_are_heard_are_homed_and_driven(monkeypatch):
-    found = Played(monkeypatch, Workbench())
+    played = Played(monkeypatch, Workbench())
     for _ in range(10_000):
-        found.turn()
-        if found.driver.motors.homed:
+        played.turn()
+        if played.driver.motors.homed:
             break
-    assert found.driver.motors.homed
-    assert found.driver.fault == ""
-    assert found.bus.filters == FILTERS
+    assert played.driver.motors.homed
+    assert played.driver.fault == ""
+    assert played.bus.filters == FILTERS
 
 
 def test_a_bus_that_gives_nothing_but_errors_ends_all_current_at_once(driven):
@@ -124,14 +131,14 @@ def test_a_bus_that_takes_nothing_is_a_fault_and_no_current_is_sent_once_it_does
 
 
 def test_a_motor_that_is_silent_ends_all_current(driven):
-    driven.bench.bank.motors[0].silent = True
+    driven.bench.simulated.motors[0].silent = True
     driven.turn(SILENT - TICK)
     assert driven.driver.fault == ""
     assert driven.currents.min() > 0.0
     driven.turn(3 * TICK)
     assert driven.driver.fault.startswith("motor 1: silent for 2")
     assert driven.currents.max() == 0.0
-    driven.bench.bank.motors[0].silent = False
+    driven.bench.simulated.motors[0].silent = False
     driven.turn(0.1)
     assert driven.currents.max() == 0.0
 
@@ -149,16 +156,16 @@ def test_of_the_frames_of_a_motor_that_wait_the_newest_counts(driven):
     assert len(driven.bus.waiting) == 15
     driven.driver.turn([0.01] * 3, [0.0] * 3)
     np.testing.assert_allclose(driven.bench.motors.pulls, driven.bench.pulls, atol=3e-4)
-    assert {reel.heard for reel in driven.bench.motors.reels} == {driven.bench.now}
+    assert {winch.heard for winch in driven.bench.motors.winches} == {driven.bench.now}
 
 
 def test_an_error_frame_is_no_feedback(monkeypatch):
-    found = Played(monkeypatch, Workbench())
+    played = Played(monkeypatch, Workbench())
     frame = can.Message(arbitration_id=0x205, data=bytes(8), is_extended_id=False, is_error_frame=True)
     waits = [frame, None]
-    found.bus.recv = lambda timeout: waits.pop(0)
-    found.driver.turn([0.0] * 3, [0.0] * 3)
-    assert found.bench.motors.reels[0].heard is None
+    played.bus.recv = lambda timeout: waits.pop(0)
+    played.driver.turn([0.0] * 3, [0.0] * 3)
+    assert played.bench.motors.winches[0].heard is None
 
 
 def test_a_closed_driver_leaves_no_current_and_no_bus(driven):
@@ -177,12 +184,12 @@ def test_a_driver_that_stops_sending_leaves_no_current(driven):
 
 
 def test_where_one_frame_is_not_taken_the_other_still_is(monkeypatch):
-    found = Played(monkeypatch, Workbench())
-    driver = BusMotors(replace(motor_settings(), numbers=(1, 5, 6)), found.bus)
-    found.bus.deaf = 0x1FE
+    played = Played(monkeypatch, Workbench())
+    driver = BusMotors(replace(motor_settings(), numbers=(1, 5, 6)), played.bus)
+    played.bus.deaf = 0x1FE
     driver.turn([0.01] * 3, [0.0] * 3)
     assert driver.fault == "bus: full"
-    assert found.bus.sent == [(0x2FE, bytes(8))]
+    assert played.bus.sent == [(0x2FE, bytes(8))]
 
 
 # --- on a bus of python-can
@@ -190,34 +197,34 @@ def test_where_one_frame_is_not_taken_the_other_still_is(monkeypatch):
 
 @pytest.mark.realtime
 def test_motors_in_real_time_are_driven_until_one_is_silent(request):
-    bank = BankInThread(PLANTS, can.Bus(interface="virtual", channel=request.node.name))
+    simulated = SimulatedMotorsThread(PLANTS, can.Bus(interface="virtual", channel=request.node.name))
     driver = BusMotors(motor_settings(), can.Bus(interface="virtual", channel=request.node.name))
-    begun = len(bank.reeled)
+    begun = len(simulated.reeled)
 
     def turn():
         driver.turn([0.0] * 3, [0.0] * 3)
 
     try:
-        until(lambda: all(motor.current for motor in bank.bank.motors), turn)  # homing has begun
-        until(lambda: len(bank.reeled) > begun + 200, turn)
+        until(lambda: all(motor.current for motor in simulated.simulated.motors), turn)  # homing has begun
+        until(lambda: len(simulated.reeled) > begun + 200, turn)
         assert driver.fault == ""
-        bank.bank.motors[0].silent = True
+        simulated.simulated.motors[0].silent = True
         until(lambda: driver.fault, turn)
         assert driver.fault.startswith("motor 1: silent for 2")
-        until(lambda: not any(motor.current for motor in bank.bank.motors), turn)
+        until(lambda: not any(motor.current for motor in simulated.simulated.motors), turn)
     finally:
         driver.close()
-        bank.close()
+        simulated.close()
 
 
 @pytest.mark.realtime
 def test_simulated_motors_turn_when_their_driver_does(request):
     name = request.node.name
-    bank = BankOnBus(PLANTS, can.Bus(interface="virtual", channel=name))
-    driver = SimulatedMotors(motor_settings(), can.Bus(interface="virtual", channel=name), bank)
-    until(lambda: all(motor.current for motor in bank.bank.motors), lambda: driver.turn([0.0] * 3, [0.0] * 3))
-    before = [motor.reeled for motor in bank.bank.motors]
-    until(lambda: all(m.reeled > b for m, b in zip(bank.bank.motors, before, strict=True)),
+    simulated = SimulatedMotorsOnBus(PLANTS, can.Bus(interface="virtual", channel=name))
+    driver = SimulatedBusMotors(motor_settings(), can.Bus(interface="virtual", channel=name), simulated)
+    until(lambda: all(motor.current for motor in simulated.simulated.motors), lambda: driver.turn([0.0] * 3, [0.0] * 3))
+    before = [motor.reeled for motor in simulated.simulated.motors]
+    until(lambda: all(m.reeled > b for m, b in zip(simulated.simulated.motors, before, strict=True)),
           lambda: driver.turn([0.0] * 3, [0.0] * 3))  # fmt: skip
     assert driver.fault == ""
     driver.close()

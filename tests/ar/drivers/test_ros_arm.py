@@ -10,11 +10,11 @@ from trunkline.ar.drivers import ros_arm
 from trunkline.ar.drivers.driver import SILENT, TICK
 from trunkline.ar.drivers.ros_arm import PERIOD, RosArm
 from trunkline.ar.drivers.setpoint_filter import ROUNDING
-from trunkline.ar.drivers.settings import Config
+from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.kinematics.panda.limits import VELOCITY
 from trunkline.pipeline.config import PROJECT, load_folder
 
-SETTINGS = load_folder(Config, PROJECT / "conf/execution").ros
+SETTINGS = load_folder(ExecutionConfig, PROJECT / "conf/execution").ros
 READY = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])
 LEAD, LATE = 0.03, 0.5  # s that setpoints are ahead, and when somebody is late
 FAST = 0.9 * VELOCITY[0]  # rad/s
@@ -78,11 +78,11 @@ class Played:
 
     def assert_it_stands(self):
         """At a place on its way, whatever it is sent; it was never asked for more than its joints may do."""
-        held, points = self.controller._last[0], len(self.controller.points)
+        joints, points = self.controller._last[0], len(self.controller.points)
         self.play(0.5)
-        assert self.turned == held
+        assert self.turned == joints
         assert len(self.controller.points) == points
-        assert self._way(self.controller.points[-1]) <= held <= self._way(self.controller.points[-1] + LEAD)
+        assert self._way(self.controller.points[-1]) <= joints <= self._way(self.controller.points[-1] + LEAD)
         assert max(self.controller.asked) <= ROUNDING * VELOCITY[0]
 
 

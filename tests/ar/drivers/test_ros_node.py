@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from trunkline.ar.drivers.ros_arm import PERIOD, RosArm
-from trunkline.ar.drivers.settings import Config
+from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT, load_folder
 
-SETTINGS = replace(load_folder(Config, PROJECT / "conf/execution").ros, link="rclpy", domain=77)
+SETTINGS = replace(load_folder(ExecutionConfig, PROJECT / "conf/execution").ros, link="rclpy", domain=77)
 READY = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])
 SENSORS = "best effort, the newest"
 LINK = "trunkline.ar.drivers.ros_node"
@@ -83,7 +83,7 @@ class Stub:
 @pytest.fixture
 def stub(monkeypatch):
     stub = Stub()
-    own = {
+    environment = {
         "rclpy": {"Context": object, "init": stub.init, "shutdown": lambda context: stub.ended.append("context")},
         "rclpy.executors": {"SingleThreadedExecutor": stub.executor},
         "rclpy.node": {"Node": stub.node},
@@ -94,7 +94,7 @@ def stub(monkeypatch):
     }
     for package in ("builtin_interfaces", "sensor_msgs", "trajectory_msgs"):
         monkeypatch.setitem(sys.modules, package, ModuleType(package))
-    for name, holds in own.items():
+    for name, holds in environment.items():
         module = ModuleType(name)
         vars(module).update(holds)
         monkeypatch.setitem(sys.modules, name, module)

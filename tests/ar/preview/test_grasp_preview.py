@@ -11,12 +11,12 @@ from trunkline.ar.hybrid.posterior import Posterior
 from trunkline.ar.hybrid.preview import Holding
 from trunkline.ar.preview import grasp_preview
 from trunkline.ar.preview.grasp_preview import GraspPreviewer
-from trunkline.ar.session.settings import Config
+from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.teleop.messages import Thing, World
 from trunkline.ar.teleop.plan import Plan
 from trunkline.pipeline.config import PROJECT, load_folder
 
-SETTINGS = replace(load_folder(Config, PROJECT / "conf/live").preview, sure=0.9, assistant=2, hold=1.0)
+SETTINGS = replace(load_folder(SessionConfig, PROJECT / "conf/live").preview, sure=0.9, assistant=2, hold=1.0)
 CUP = Thing("the cup", "cylinder", 0.05, 0.1, 0.1, (0.6, 0.0, 0.2))
 MOUNT = (0.55, 0.0, 0.5)
 PLACES = np.array([[-0.04, 0.0, 0.32], [-0.06, 0.0, 0.3], [-0.03, 0.0, 0.3]])  # of the mount about the cup, m

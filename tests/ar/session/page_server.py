@@ -32,11 +32,11 @@ from trunkline.ar.session import lease, messages, preview_process
 from trunkline.ar.session import scene as pictured
 from trunkline.ar.session.anchors import Anchors
 from trunkline.ar.session.auth import Origins, make_token
-from trunkline.ar.session.bodies import drawn
-from trunkline.ar.session.controller import Desk
-from trunkline.ar.session.robot import Standing
-from trunkline.ar.session.server import House, Server
-from trunkline.ar.session.settings import Config
+from trunkline.ar.session.bodies import drawn_bodies
+from trunkline.ar.session.controller import SessionController
+from trunkline.ar.session.robot import RobotState
+from trunkline.ar.session.server import Composition, Server
+from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.teleop.alignment import base_quaternion
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.executor import SimulatedRobot
@@ -94,7 +94,7 @@ class Figure:
     def __init__(self) -> None:
         robot = PandaRobot("panda", OFFSET, 1.5, 0.0, list(READY_JOINTS))
         self.model = compose(rubbing_arm(spiral_chain(**SIZE), 8), robot).compile()
-        self.data, self.bodies = mujoco.MjData(self.model), drawn(self.model)
+        self.data, self.bodies = mujoco.MjData(self.model), drawn_bodies(self.model)
         self.ids = [self.model.body(name).id for name in self.bodies]
         self.rigid = self.model.jnt_qposadr[panda_joints(self.model)]
         units = [self.model.body(f"unit_{number:02d}") for number in range(1, UNITS + 1)]
@@ -115,7 +115,7 @@ class Robot:
         self.figure, self.robot = figure, SimulatedRobot(np.array(READY_JOINTS), STRAIGHT, LIMITS, PACKAGE)
         self.start, self.stop, self.hear = self.robot.start, self.robot.stop, self.robot.hear
         self.last, self.fault = time.monotonic(), ""
-        self.kept: Standing | None = None
+        self.frozen: RobotState | None = None
         self.is_silent = False
 
     def permit(self) -> None:
@@ -127,16 +127,16 @@ class Robot:
     def state(self) -> ExecutorReport:
         return ExecutorReport("fault", "", self.fault) if self.fault else self.robot.state()
 
-    def standing(self) -> Standing:
-        if self.is_silent and self.kept is not None:
-            return self.kept
+    def robot_state(self) -> RobotState:
+        if self.is_silent and self.frozen is not None:
+            return self.frozen
         now = time.monotonic()
         while self.last + TICK <= now:
             self.robot.advance(TICK)
             self.last += TICK
         poses = self.figure.poses(self.robot.joints, self.robot.commands)
-        self.kept = Standing(now, 0.0, self.robot.joints, self.robot.commands, np.full(7, np.nan), poses)
-        return self.kept
+        self.frozen = RobotState(now, 0.0, self.robot.joints, self.robot.commands, np.full(7, np.nan), poses)
+        return self.frozen
 
 
 def within(targets: Targets) -> Targets:
@@ -156,33 +156,39 @@ class Planning:
         self.figure, self.heard = figure, None
         self.planner = Planner(RigidIK(OFFSET), NETWORK, STRAIGHT, LIMITS, OFFSET, step=0.005)
 
-    def order(self, order: preview_process.Order | preview_process.Seek) -> None:
-        if isinstance(order, preview_process.Seek):
+    def order(self, order: preview_process.Order | preview_process.FollowRequest) -> None:
+        if isinstance(order, preview_process.FollowRequest):
             targets = order.targets and within(order.targets)
-            self.heard(preview_process.Found(order.serial, *sought(self.planner, targets, order.joints, order.world)))
+            self.heard(
+                preview_process.FollowAnswer(order.serial, *sought(self.planner, targets, order.joints, order.world))
+            )
             return
         serial = order.request.serial
         try:
             request = replace(order.request, targets=within(order.request.targets))
             plan = self.planner.plan(request, order.world, order.joints, order.commands)
         except InputError as error:
-            self.heard(preview_process.Planned(PlanReport(serial, refused=str(error))))
+            self.heard(preview_process.PlanAnswer(PlanReport(serial, refused=str(error))))
             return
         digest, step = plan.digest(), 1 / RATE
         times = np.arange(0.0, plan.duration, step)
         poses = np.array([self.figure.poses(*plan.at(time)) for time in times], dtype=np.float32)
         tips, shares = poses[::9, -1, :3].astype(float), np.linspace(0, 1, len(times[::9]))
-        self.heard(preview_process.Planned(PlanReport(serial, digest, "", plan.package, plan.world), plan))
+        self.heard(preview_process.PlanAnswer(PlanReport(serial, digest, "", plan.package, plan.world), plan))
         phases = tuple((name, plan.step * row) for name, row in plan.phases)
-        preview = messages.Preview(digest, step, float(times[-1]), 0.0, phases)
-        self.heard(preview_process.Begun(serial, preview))
+        preview = messages.PreviewMessage(digest, step, float(times[-1]), 0.0, phases)
+        self.heard(preview_process.PreviewBegun(serial, preview))
         for first in range(0, len(times), 18):
             piece = poses[first : first + 18]
-            self.heard(preview_process.Shown(serial, first, float(times[first]), piece, first + 18 >= len(times)))
+            self.heard(
+                preview_process.PreviewPiece(serial, first, float(times[first]), piece, first + 18 >= len(times))
+            )
         spread = tuple(float(share) for share in 0.004 + 0.018 * shares)
         path = tuple(tuple(map(float, tip)) for tip in tips)
-        told = messages.Foreseen(digest, 0.84, 0.68, 0.93, tuple(map(float, times[::9])), path, spread, 0.9, 32)
-        self.heard(preview_process.Told(serial, told))
+        prediction = messages.PredictionMessage(
+            digest, 0.84, 0.68, 0.93, tuple(map(float, times[::9])), path, spread, 0.9, 32
+        )
+        self.heard(preview_process.PredictionAnswer(serial, prediction))
 
     def leave(self) -> None:
         pass
@@ -193,8 +199,8 @@ def drawing(figure: Figure) -> dict:
     maps = {"rigid": np.ones((4, 4, 4)), "rigid_origin": np.zeros(3), "rigid_spacing": np.array(0.1)}
     ball = icosphere(subdivisions=3, radius=REACH).apply_translation(CENTRE)
     reach = {"vertices": ball.vertices.ravel().tolist(), "faces": ball.faces.ravel().tolist()}
-    found = pictured.scene(figure.model, figure.bodies, maps, LENGTH)
-    return found | {"reach": reach, "shell": {"around": AROUND, "along": ALONG}}
+    scene = pictured.scene(figure.model, figure.bodies, maps, LENGTH)
+    return scene | {"reach": reach, "shell": {"around": AROUND, "along": ALONG}}
 
 
 async def listen(runner: web.AppRunner, port: int) -> web.TCPSite:
@@ -207,7 +213,7 @@ async def obey(server: Server, robot: Robot, runner: web.AppRunner, port: int, l
     """Lines of the input, until it ends; the log goes out for each."""
     loop = asyncio.get_running_loop()
     site = await listen(runner, port)
-    print(f"ready {port} {server.house.token}", flush=True)
+    print(f"ready {port} {server.composition.token}", flush=True)
     while line := await loop.run_in_executor(None, sys.stdin.readline):
         word = line.strip()
         robot.is_silent = word == "silent" or (robot.is_silent and word != "speak")
@@ -231,20 +237,20 @@ async def serve(port: int, folder: Path) -> None:
     safety = replace(core.safety, silence=PATIENCE, plan_wait=PATIENCE, start_wait=PATIENCE)
     settings = replace(core, delay=0.3, safety=safety)
     core = Teleoperation(settings, Balls(), PACKAGE, OFFSET)
-    desk = Desk(core, robot, planning, make_world((TABLE,), (CUP,)), 0.1)
+    controller = SessionController(core, robot, planning, make_world((TABLE,), (CUP,)), 0.1)
     page, origins = PROJECT / "trunkline/ar/session/page", Origins.of(["127.0.0.1"], port, tls=False)
-    alignment = load_folder(Config, PROJECT / "conf/live").alignment
+    alignment = load_folder(SessionConfig, PROJECT / "conf/live").alignment
     anchors = Anchors(folder / "anchors.json")
-    server = Server(House(
-        desk, token, origins, PACKAGE, drawing(figure), Bowl(), RATE, page, log.append, alignment, anchors
+    server = Server(Composition(
+        controller, token, origins, PACKAGE, drawing(figure), Bowl(), RATE, page, log.append, alignment, anchors
     ))  # fmt: skip
     planning.heard, tick = server.foreseen, server.tick
 
     def watched(now: float, dt: float) -> None:
-        before = desk.intent.mode if desk.intent else ""
+        before = controller.intent.mode if controller.intent else ""
         tick(now, dt)
-        if desk.intent.mode != before:
-            log.append(f"mode {desk.intent.mode}")
+        if controller.intent.mode != before:
+            log.append(f"mode {controller.intent.mode}")
 
     server.tick = watched
     runner = web.AppRunner(server.app())

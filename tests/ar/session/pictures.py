@@ -26,7 +26,7 @@ from trunkline.ar.preview.package import only_package
 from trunkline.ar.session import lease, preview_process, robot
 from trunkline.ar.session.controller import Planning
 from trunkline.ar.session.session import Address, opened
-from trunkline.ar.session.settings import Config
+from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.messages import Mode
 from trunkline.errors import InputError, in_one_line
@@ -80,7 +80,7 @@ class Kept:
     def __init__(self, planning: Planning) -> None:
         self._planning, self._orders = planning, []
 
-    def order(self, order: preview_process.Order | preview_process.Seek) -> None:
+    def order(self, order: preview_process.Order | preview_process.FollowRequest) -> None:
         self._orders.append(order)
 
     def leave(self) -> None:
@@ -187,15 +187,15 @@ async def taken(camera: Camera, planning: Kept) -> None:
 
 async def session(package: Path) -> dict[Mode, bytes]:
     """PNGs by state."""
-    config, teleop = load_folder(Config, PROJECT / "conf/live"), load_folder(Teleop, PROJECT / "conf/teleop")
+    config, teleop = load_folder(SessionConfig, PROJECT / "conf/live"), load_folder(Teleop, PROJECT / "conf/teleop")
     safety = replace(teleop.core.safety, silence=SILENCE, plan_wait=PATIENCE)
     teleop = replace(teleop, core=replace(teleop.core, safety=safety))
     lease.SILENCE, robot.STALE = SILENCE, STALE
     with tempfile.TemporaryDirectory() as logs:
         config = replace(config, journal=replace(config.journal, folder=logs))
         async with opened(package, ADDRESS, lambda line: None, config=config, teleop=teleop) as (server, made):
-            planning = made.desk.planning = Kept(made.desk.planning)
-            async with browsing(f"{ADDRESS.url}/#token={server.house.token}", SIZE, YIELDS) as page:
+            planning = made.controller.planning = Kept(made.controller.planning)
+            async with browsing(f"{ADDRESS.url}/#token={server.composition.token}", SIZE, YIELDS) as page:
                 camera = Camera(page)
                 await taken(camera, planning)
     return camera.pictures
@@ -206,13 +206,13 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("package", nargs="?", type=Path)
     parser.add_argument("--folder", type=Path, default=PROJECT / "docs")
-    given = parser.parse_args(arguments)
-    pictures = asyncio.run(session(given.package or only_package()))
+    args = parser.parse_args(arguments)
+    pictures = asyncio.run(session(args.package or only_package()))
     missing = [mode for mode in get_args(Mode) if mode not in pictures]
     if missing:
         raise InputError(f"states: found no picture of {', '.join(missing)}, expected one of each")
     for mode, png in pictures.items():
-        path = given.folder / f"live-{mode}.png"
+        path = args.folder / f"live-{mode}.png"
         picture = Image.open(io.BytesIO(png)).convert("RGB")
         picture.quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
         print(f"{path}: {path.stat().st_size / 1000:.0f} kB")

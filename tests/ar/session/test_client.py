@@ -38,8 +38,8 @@ def run(*arguments: str) -> subprocess.CompletedProcess:
 
 
 def test_the_page_is_what_its_sources_make_to_the_byte():
-    found = run("client/build.mjs", "--check")
-    assert found.returncode == 0, found.stderr
+    result = run("client/build.mjs", "--check")
+    assert result.returncode == 0, result.stderr
 
 
 def test_the_page_is_small_and_names_no_other_host():
@@ -67,5 +67,5 @@ def test_in_node_and_in_a_browser(file):
             pytest.skip("TRUNKLINE_BROWSER=none")
         if not Path(BROWSER).is_file():
             pytest.fail(f"{BROWSER}: no such browser; `make client` installs Debian's chromium", pytrace=False)
-    found = run("--test", "--test-reporter=spec", str(file))
-    assert found.returncode == 0, found.stdout[-6000:] + found.stderr[-2000:]
+    result = run("--test", "--test-reporter=spec", str(file))
+    assert result.returncode == 0, result.stdout[-6000:] + result.stderr[-2000:]

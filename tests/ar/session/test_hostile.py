@@ -19,9 +19,9 @@ from trunkline.ar.session.auth import CODE_SECONDS, HEADERS, Origins, PairingCod
 def test_another_origin_does_not_come_in(origin):
     async def session():
         async with laid() as here:
-            with pytest.raises(WSServerHandshakeError) as found:
+            with pytest.raises(WSServerHandshakeError) as refusal:
                 await here.come(origin=origin)
-            assert found.value.status == 403
+            assert refusal.value.status == 403
             assert "origin" in here.log[-1]
             assert here.server.clients == {}
 
@@ -32,9 +32,9 @@ def test_another_origin_does_not_come_in(origin):
 def test_no_origin_and_another_host_do_not_come_in():
     async def session():
         async with laid() as here:
-            with pytest.raises(WSServerHandshakeError) as found:
+            with pytest.raises(WSServerHandshakeError) as refusal:
                 await here.session.ws_connect(f"{here.url}/ws")
-            assert found.value.status == 403
+            assert refusal.value.status == 403
             for path in ("/", "/scene.json", "/ws"):
                 answer = await here.session.get(f"{here.url}{path}", headers={"Host": "rebound.example:80"})
                 assert (answer.status, await answer.text()) == (403, "error: host: not a name of this server\n")
@@ -117,9 +117,9 @@ def test_what_is_no_message_ends_the_connection_and_nothing_else(message):
             await asyncio.wait_for(guest.closed.wait(), 3.0)
             assert guest.socket.close_code in (1006, 1008, 1009)
             assert any(line.startswith(f"refused {guest.id}: ") for line in here.log)
-            seen = len(other.frames)
+            count = len(other.frames)
             await asyncio.sleep(0.3)
-            assert len(other.frames) > seen
+            assert len(other.frames) > count
             assert here.robot.permits == 0
 
     asyncio.run(session())
@@ -138,9 +138,9 @@ def test_poses_that_are_no_numbers_hold_the_robot(number):
             if not math.isfinite(number):
                 assert "not a number" in state["notice"]
             assert here.robot.state().mode != "running"
-            seen = len(guest.frames)
+            count = len(guest.frames)
             await asyncio.sleep(0.3)
-            assert len(guest.frames) > seen
+            assert len(guest.frames) > count
 
     asyncio.run(session())
 
@@ -200,10 +200,10 @@ def test_a_preview_that_was_not_shown_is_not_taken_for_shown():
             await asyncio.sleep(0.6)
             await guest.say(type="shown", digest="b" * 64)
             await guest.refused("shown: found digest 'bbbbbbbbbbbb'")
-            assert here.desk.intent.mode == "preview"
+            assert here.controller.intent.mode == "preview"
             guest.right = grips(TIP, trigger=1.0)
             await asyncio.sleep(0.3)
-            assert here.desk.intent.mode == "preview"
+            assert here.controller.intent.mode == "preview"
             assert here.robot.permits == 0
 
     asyncio.run(session())
@@ -215,10 +215,10 @@ def test_a_preview_lasts_as_long_as_it_lasts():
         async with laid() as here:
             guest = await controlling(here)
             state = await asked(here, guest)
-            here.desk._since = here.server.now()
+            here.controller._since = here.server.now()
             await guest.say(type="shown", digest=state["preview"])
             await guest.refused("shown: its preview lasts")
-            assert here.desk.intent.mode == "preview"
+            assert here.controller.intent.mode == "preview"
 
     asyncio.run(session())
 
@@ -236,8 +236,8 @@ def test_a_second_client_moves_nothing():
             await second.refused("input: you do not control")
             await second.refused("alignment")
             await asyncio.sleep(0.5)
-            assert here.desk.state.left.target is None
-            assert here.desk.intent.mode == "aim"
+            assert here.controller.state.left.target is None
+            assert here.controller.intent.mode == "aim"
 
     asyncio.run(session())
 
@@ -280,15 +280,15 @@ def test_only_the_page_s_own_files_are_served_with_every_header(tmp_path):
 
     async def session():
         async with laid(page) as here:
-            found = {}
+            responses = {}
             for path in ("/", "/app.js", "/index.html", "/notes.txt", "/link.js", "/../secret.js", "/%2e%2e/secret.js",
                          "/pyproject.toml", "/scene.json"):  # fmt: skip
                 answer = await here.session.get(here.url + path)
-                found[path] = answer.status
+                responses[path] = answer.status
                 assert "secret" not in await answer.text()
                 assert {name: answer.headers[name] for name in HEADERS} == HEADERS
-            assert [path for path, status in found.items() if status == 200] == ["/", "/app.js", "/index.html"]
-            assert found["/scene.json"] == 401
+            assert [path for path, status in responses.items() if status == 200] == ["/", "/app.js", "/index.html"]
+            assert responses["/scene.json"] == 401
             answer = await here.session.get(f"{here.url}/scene.json", headers={"Authorization": f"Bearer {TOKEN}"})
             assert (await answer.json())["bodies"] == ["a", "b", "c"]
             assert (await here.session.post(here.url, data=b"x")).status in (404, 405)

@@ -12,11 +12,11 @@ import pytest
 from tests.ar.session.test_robot import Still
 from tests.ar.teleop.test_plan import START, STRAIGHT
 from tests.support.operator import PACKAGE, config
-from trunkline.ar.session import robot as seen
+from trunkline.ar.session import robot as robot_module
 from trunkline.ar.session import simulated
 from trunkline.ar.session.robot import (
     DEAD_MAN,
-    HELD,
+    HOLD_TIME,
     LOOKS,
     MODE,
     MODES,
@@ -27,8 +27,8 @@ from trunkline.ar.session.robot import (
     STALE,
     STOPS,
     TIME,
-    Channel,
     Goal,
+    RobotChannel,
     RobotProcess,
 )
 from trunkline.ar.session.simulated import LISTENS, Loop
@@ -53,7 +53,7 @@ class Played:
     """The robot's process, turn by turn; `serial`: of what was started last."""
 
     def __init__(self):
-        self.channel = Channel(multiprocessing.get_context("spawn"), 3, 0)
+        self.channel = RobotChannel(multiprocessing.get_context("spawn"), 3, 0)
         self.channel.plans = queue.Queue()
         self.plant = Still()
         self.robot = SimulatedRobot(START, STRAIGHT, LIMITS, PACKAGE)
@@ -83,13 +83,13 @@ class Played:
         return self
 
     @property
-    def told(self):
+    def report(self):
         self.loop.tell(self.now)
         return self.channel.hear()
 
     @property
     def mode(self):
-        return MODES[int(self.told[0][MODE])]
+        return MODES[int(self.report[0][MODE])]
 
     def rests(self, seconds=0.3) -> bool:
         before = self.robot.joints.copy()
@@ -125,13 +125,13 @@ def test_without_a_permit_it_brakes_after_so_long_and_goes_on_by_none(played):
     assert played.robot._pace == 1.0
     played.turn(2 * TICK, permits=False)
     assert played.robot._pace < 1.0
-    held = played.told[0][HELD]
-    assert DEAD_MAN <= held - (BEGINS + 0.5) + NEAR < DEAD_MAN + 2 * TICK
+    hold_time = played.report[0][HOLD_TIME]
+    assert DEAD_MAN <= hold_time - (BEGINS + 0.5) + NEAR < DEAD_MAN + 2 * TICK
     played.turn(BRAKE / 2, permits=False)
-    assert played.told[0][HELD] == held  # when it was told to hold, not since when it rests
+    assert played.report[0][HOLD_TIME] == hold_time  # when it was told to hold, not since when it rests
     played.turn(BRAKE)  # permitted again
     assert played.mode == "idle"
-    assert played.told[0][HELD] == held
+    assert played.report[0][HOLD_TIME] == hold_time
     assert played.rests()
 
 
@@ -140,7 +140,7 @@ def test_a_stop_counts_though_it_is_permitted(played, times):
     played.begin(plan_of()).turn(0.5)
     played.channel.asked[STOPS] += times
     played.turn(TICK)
-    assert played.told[0][HELD] == played.now
+    assert played.report[0][HOLD_TIME] == played.now
     assert played.robot._pace < 1.0
     played.turn(BRAKE)
     assert played.mode == "idle"
@@ -152,7 +152,7 @@ def test_a_stop_that_comes_before_what_it_stops_counts(played):
     played.channel.asked[STOPS] += 1
     played.begin(plan_of(), stops)
     assert played.mode == "fault"
-    assert played.told[1] == "a stop came before it began"
+    assert played.report[1] == "a stop came before it began"
     assert played.rests()
     played.begin(plan_of())
     assert played.mode == "running"
@@ -189,16 +189,16 @@ def test_a_plant_that_fails_stops_the_robot_and_lasts(played, monkeypatch):
     played.plant.fault = "motors: silent"
     played.turn(TICK)
     assert played.mode == "fault"
-    assert played.told[1] == "motors: silent"
-    assert played.told[0][HELD] == played.now
+    assert played.report[1] == "motors: silent"
+    assert played.report[0][HOLD_TIME] == played.now
     played.turn(BRAKE + TICK)
     assert played.rests()
     assert played.begin(plan_of()).mode == "fault"
-    assert played.told[1] == "motors: silent"
+    assert played.report[1] == "motors: silent"
     assert played.rests()
     played.plant.fault = "robot: reflex"
     played.turn(TICK)
-    assert played.told[1] == "motors: silent"
+    assert played.report[1] == "motors: silent"
 
 
 @pytest.mark.parametrize("first", range(3))
@@ -208,7 +208,7 @@ def test_why_a_plan_does_not_begin(played, first):
     plan = replace(plan_of(), package="b" * 64)
     played.plant.fault = "motors: silent" if first < 2 else ""
     played.begin(plan, stops=played.channel.asked[STOPS] - (first < 1))
-    assert played.told[1].startswith(reasons[first])
+    assert played.report[1].startswith(reasons[first])
 
 
 # --- the server's end
@@ -248,7 +248,7 @@ class There:
 @pytest.fixture
 def clock(monkeypatch):
     made = Clock()
-    monkeypatch.setattr(seen, "time", made)
+    monkeypatch.setattr(robot_module, "time", made)
     return made
 
 
@@ -270,7 +270,7 @@ def tell(robot, clock, mode="idle", serial=0, ago=0.0, ready=True, fault="", joi
 
 
 @pytest.mark.parametrize(
-    ("told", "alive", "report"),
+    ("numbers", "alive", "report"),
     [
         ({}, True, ExecutorReport("idle", "")),
         ({"mode": "running"}, True, ExecutorReport("running", "")),
@@ -288,8 +288,8 @@ def tell(robot, clock, mode="idle", serial=0, ago=0.0, ready=True, fault="", joi
          ExecutorReport("fault", "", "its process is silent for 1.00 s")),
     ],
 )  # fmt: skip
-def test_what_a_robot_does(robot, clock, told, alive, report):
-    tell(robot, clock, **told)
+def test_what_a_robot_does(robot, clock, numbers, alive, report):
+    tell(robot, clock, **numbers)
     robot._process.ended = not alive
     assert robot.state() == report
 
@@ -365,4 +365,4 @@ def test_a_process_is_ended_once_its_robot_rests_or_has_not_for_too_long(robot, 
     robot.close()
     assert robot.channel.asked[STOPS] == 1
     assert robot._process.ended
-    assert clock.now - BEGINS == pytest.approx(0.1 if comes_to_rest else seen.RESTING, abs=2 * LOOKS)
+    assert clock.now - BEGINS == pytest.approx(0.1 if comes_to_rest else robot_module.RESTING, abs=2 * LOOKS)

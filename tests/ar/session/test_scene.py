@@ -6,7 +6,7 @@ import pytest
 import trimesh
 from point_cloud_utils import signed_distance_to_mesh
 
-from trunkline.ar.session.bodies import drawn
+from trunkline.ar.session.bodies import drawn_bodies
 from trunkline.ar.session.scene import MOST_TRIANGLES, SHELL_TRIANGLES, scene
 from trunkline.kinematics.panda.shipped import shipped_panda
 
@@ -37,8 +37,8 @@ def model() -> mujoco.MjModel:
 
 
 @pytest.fixture(scope="module")
-def found(model) -> dict:
-    return scene(model, drawn(model), empty(), 0.5)
+def drawing(model) -> dict:
+    return scene(model, drawn_bodies(model), empty(), 0.5)
 
 
 def empty() -> dict[str, np.ndarray]:
@@ -46,13 +46,18 @@ def empty() -> dict[str, np.ndarray]:
     return {"rigid": np.ones((4, 4, 4)), "rigid_origin": np.zeros(3), "rigid_spacing": np.array(0.1)}
 
 
-def test_bodies_are_those_with_geoms_in_the_models_order(found):
-    assert found["bodies"] == ["foot", "link", "cup"]
+def test_bodies_are_those_with_geoms_in_the_models_order(drawing):
+    assert drawing["bodies"] == ["foot", "link", "cup"]
 
 
-def test_geoms_are_those_that_are_seen_each_on_its_body(found):
-    geoms = found["geoms"]
-    assert [(one["body"], one["shape"]) for one in geoms] == [(-1, "box"), (0, "cylinder"), (1, "capsule"), (2, "box")]
+def test_geoms_are_those_that_are_seen_each_on_its_body(drawing):
+    geoms = drawing["geoms"]
+    assert [(geom["body"], geom["shape"]) for geom in geoms] == [
+        (-1, "box"),
+        (0, "cylinder"),
+        (1, "capsule"),
+        (2, "box"),
+    ]
     assert geoms[0]["position"] == [1, 0, -0.1]
     assert geoms[0]["rgba"] == [1, 0, 0, 1]
     assert geoms[1]["rgba"] == [0, 1, 0, 1]  # of its material
@@ -61,15 +66,15 @@ def test_geoms_are_those_that_are_seen_each_on_its_body(found):
 
 def test_meshes_are_decimated_to_what_may_be_drawn_and_stay_where_they_are():
     panda = shipped_panda(0.05).compile()
-    meshes = scene(panda, drawn(panda), empty(), 0.5)["meshes"]
+    meshes = scene(panda, drawn_bodies(panda), empty(), 0.5)["meshes"]
     assert panda.mesh_facenum.sum() > 5 * MOST_TRIANGLES
     assert sum(len(mesh["faces"]) for mesh in meshes) <= 3 * MOST_TRIANGLES
     assert len(meshes) == panda.nmesh
     for number, mesh in enumerate(meshes):
         corners = panda.mesh_vert[panda.mesh_vertadr[number] :][: panda.mesh_vertnum[number]].astype(float)
         faces = panda.mesh_face[panda.mesh_faceadr[number] :][: panda.mesh_facenum[number]]
-        kept = np.reshape(mesh["vertices"], (-1, 3))
-        away, _, _ = signed_distance_to_mesh(kept, corners, faces.astype(np.int64))
+        vertices = np.reshape(mesh["vertices"], (-1, 3))
+        away, _, _ = signed_distance_to_mesh(vertices, corners, faces.astype(np.int64))
         assert np.quantile(np.abs(away), 0.99) < 0.002
         assert np.abs(away).max() < 0.005
 
@@ -94,6 +99,6 @@ def test_reach_of_the_mount_is_a_surface_in_the_base_frame():
     assert surface.volume == pytest.approx(4 / 3 * np.pi * 0.6**3, rel=0.02)
 
 
-def test_a_package_without_maps_has_no_reach(found):
-    assert found["shell"] is None
-    assert found["reach"] is None
+def test_a_package_without_maps_has_no_reach(drawing):
+    assert drawing["shell"] is None
+    assert drawing["reach"] is None

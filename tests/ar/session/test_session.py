@@ -53,10 +53,10 @@ async def executing(here, guest):
     await guest.say(type="shown", digest=state["preview"])
     await guest.hears("state", mode="ready")
     guest.right = grips(TIP, trigger=1.0)
-    found = await guest.hears("state", mode="execute")
+    state = await guest.hears("state", mode="execute")
     guest.right = grips(TIP)
     await guest.hears("state", robot="running")
-    return found
+    return state
 
 
 @pytest.mark.realtime
@@ -90,7 +90,7 @@ def test_a_robot_follows_moving_targets_until_both_grips_are_let_go():
             await guest.hears("state", motion="follow", robot="running")
             for mount in (MOUNT + aside, np.array(MOUNT)):  # there, and back again
                 guest.left, guest.right = grips(mount), grips(TIP + mount - MOUNT)
-                await asyncio.sleep(here.desk.core.settings.follow_delay)
+                await asyncio.sleep(here.controller.core.settings.follow_delay)
                 async with asyncio.timeout(20.0):
                     while np.abs(mount_pose(here.robot.robot.joints[None], OFFSET)[0][0][:2] - mount[:2]).max() > 5e-3:
                         await asyncio.sleep(0.1)
@@ -108,10 +108,10 @@ def test_a_robot_that_follows_stops_where_the_process_that_plans_is_silent_and_d
             guest = await controlling(here)
             await aimed(guest, stick_pressed=1.0)
             await guest.hears("state", motion="follow", robot="running")
-            seeking = here.desk._seeking
+            seeking = here.controller._follow
             answers, seeking._order = seeking._order, lambda order: None
-            told = await guest.hears("state", mode="stopped")
-            assert "the process that plans has not answered for 1.0" in told["notice"]
+            state = await guest.hears("state", mode="stopped")
+            assert "the process that plans has not answered for 1.0" in state["notice"]
             seeking._order = answers
             aside = np.array([0.0, 0.05, 0.0])
             guest.left, guest.right = grips(MOUNT + aside), grips(TIP + aside)
@@ -119,20 +119,20 @@ def test_a_robot_that_follows_stops_where_the_process_that_plans_is_silent_and_d
             rests = here.robot.robot.joints.copy()
             await asyncio.sleep(0.5)
             np.testing.assert_array_equal(here.robot.robot.joints, rests)
-            assert here.desk.intent.mode == "stopped"
+            assert here.controller.intent.mode == "stopped"
 
     asyncio.run(session())
 
 
 def test_a_start_that_is_on_its_way_is_stopped_by_what_comes_after_it():
     here = Laid(0)
-    desk, plan = here.desk, Plan(1.0, np.zeros((2, 7)), np.zeros((2, 3)), (), "", "")
-    desk.plan, here.robot.start = plan, lambda *_: ""  # its process has not told of it yet
-    desk._drive(Intent("execute", "execute", "", None, (None, None), execute=plan.digest()))
+    controller, plan = here.controller, Plan(1.0, np.zeros((2, 7)), np.zeros((2, 3)), (), "", "")
+    controller.plan, here.robot.start = plan, lambda *_: ""  # its process has not told of it yet
+    controller._drive(Intent("execute", "execute", "", None, (None, None), execute=plan.digest()))
     assert here.robot.permits == 1
-    desk._drive(Intent("hold", "hold", "", None, (None, None)))
+    controller._drive(Intent("hold", "hold", "", None, (None, None)))
     assert len(here.robot.stops) == 1
-    desk._drive(Intent("hold", "hold", "", None, (None, None)))
+    controller._drive(Intent("hold", "hold", "", None, (None, None)))
     assert len(here.robot.stops) == 1
 
 
@@ -142,8 +142,8 @@ def test_nobody_is_told_that_nobody_who_controls_is_silent():
         async with laid() as here:
             guest = await here.come()
             await asyncio.sleep(1.0)
-            assert here.desk.intent.notice == "base is not aligned; holding"
-            assert {told["notice"] for told in guest.messages if told["type"] == "state"} == {""}
+            assert here.controller.intent.notice == "base is not aligned; holding"
+            assert {message["notice"] for message in guest.messages if message["type"] == "state"} == {""}
 
     asyncio.run(session())
 
@@ -208,10 +208,10 @@ def test_a_robot_under_way_is_told_to_hold_and_does_not_go_on(way):
             mode = "stopped" if way in ("watcher", "secondary") else "hold"
             await watcher.hears("state", mode=mode, motion="hold")
             await asyncio.sleep(0.2)
-            kept = here.robot.robot.joints.copy()
+            joints = here.robot.robot.joints.copy()
             guest.left, guest.right = grips(MOUNT), grips(TIP, trigger=1.0)
             await asyncio.sleep(0.5)
-            np.testing.assert_array_equal(here.robot.robot.joints, kept)
+            np.testing.assert_array_equal(here.robot.robot.joints, joints)
             assert here.robot.state().mode != "running"
 
     asyncio.run(session())
@@ -258,8 +258,8 @@ def test_a_watcher_that_does_not_read_holds_three_frames_and_delays_nobody():
             before = len(other.frames)
             await asyncio.sleep(2.0)
             boxes = [client.outbox for client in here.server.clients.values()]
-            held = [box for box in boxes if box.received == 0]
-            assert [(box.sent, len(box.frames)) for box in held] == [(3, 1)]
+            full = [box for box in boxes if box.received == 0]
+            assert [(box.sent, len(box.frames)) for box in full] == [(3, 1)]
             assert len(other.frames) - before > 0.8 * 2.0 * 72
             await stalled.socket.close()
 
@@ -284,7 +284,7 @@ def test_who_comes_later_sees_the_plan_that_is_previewed():
             last = await here.come()
             await last.hears("state")
             await asyncio.sleep(0.2)
-            assert not [told for told in last.messages if told["type"] == "preview"]
+            assert not [message for message in last.messages if message["type"] == "preview"]
             assert not any(frame[0] == 2 for frame in last.frames)
 
     asyncio.run(session())
@@ -320,30 +320,30 @@ def test_a_stop_is_heard_beyond_the_rate_limit_too():
 
 
 @pytest.mark.realtime
-@pytest.mark.parametrize("told", ENDS)
-def test_a_session_that_is_told_to_end_is_closed_in_order(monkeypatch, capsys, told):
+@pytest.mark.parametrize("number", ENDS)
+def test_a_session_that_is_told_to_end_is_closed_in_order(monkeypatch, capsys, number):
     """As by Ctrl-C, so by `kill`, by whatever else ends a service, and by a terminal that is closed."""
-    closed, before = [], [signal.getsignal(one) for one in ENDS]
-    for one in ENDS:  # also where the tests run in the background or under `nohup`, which have some ignored
-        signal.signal(one, signal.default_int_handler if one == signal.SIGINT else signal.SIG_DFL)
+    closed, before = [], [signal.getsignal(ending) for ending in ENDS]
+    for ending in ENDS:  # also where the tests run in the background or under `nohup`, which have some ignored
+        signal.signal(ending, signal.default_int_handler if ending == signal.SIGINT else signal.SIG_DFL)
 
     @contextlib.asynccontextmanager
     async def opened(*_):
         try:
-            asyncio.get_running_loop().call_later(0.05, os.kill, os.getpid(), told)
+            asyncio.get_running_loop().call_later(0.05, os.kill, os.getpid(), number)
             await asyncio.sleep(10.0)
             yield None, None
         finally:
             await asyncio.sleep(0.05)
-            closed.append(told)
+            closed.append(number)
 
     monkeypatch.setattr("trunkline.ar.session.session.opened", opened)
     try:
         assert main(["package.tgz", "--port", "18459"]) == 0
     finally:
-        for one, usual in zip(ENDS, before, strict=True):
-            signal.signal(one, usual)
-    assert closed == [told]
+        for ending, usual in zip(ENDS, before, strict=True):
+            signal.signal(ending, usual)
+    assert closed == [number]
     assert capsys.readouterr().out.splitlines() == ["ended"]
 
 

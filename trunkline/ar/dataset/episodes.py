@@ -117,7 +117,7 @@ def _judged(recording: SessionRecording, judged: list[Execution], step: Recorded
     if not same:
         return "refused by the robot", False
     execution = min(same, key=lambda execution: abs(execution.time - since))
-    if execution.held is False:
+    if execution.success is False:
         return "not held", False
     return execution.end, execution.end == "done"
 

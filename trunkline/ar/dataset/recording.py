@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from trunkline.ar.session.log_format import INPUT, JOINTS, JOINTS_SENT, TENDONS, TENDONS_SENT
-from trunkline.ar.session.log_reader import Logbook, read_logbook, tip_path
+from trunkline.ar.session.log_reader import LogReader, read_session_log, tip_path
 from trunkline.ar.teleop.messages import Input, Intent, from_json
 from trunkline.errors import InputError
 from trunkline.recordings.logs.joint_stream import joint_stream
@@ -42,7 +42,7 @@ class SessionRecording:
     the rigid base, m; of a real machine where its twin had it, as nobody sees the arm: its names end in `.twin`."""
 
     path: Path
-    logbook: Logbook
+    logbook: LogReader
     steps: list[RecordedStep]
     sent: AxisSeries
     measured: AxisSeries
@@ -54,10 +54,10 @@ def read_recording(path: Path) -> SessionRecording:
     Raises:
         InputError: it is no log of a live session, or of none in which a robot was seen.
     """
-    logbook, log = read_logbook(path), read_log(path)
+    logbook, log = read_session_log(path), read_log(path)
     zero = int(log.topics[INPUT].log_times[0])  # of the steps' times
     steps = [
-        RecordedStep(zero + round(1e9 * step.time), from_json(Input, step.given), from_json(Intent, step.intent))
+        RecordedStep(zero + round(1e9 * step.time), from_json(Input, step.input), from_json(Intent, step.intent))
         for step in logbook.steps
     ]
     sent = [_axes(path, log, topic) for topic in (JOINTS_SENT, TENDONS_SENT)]
@@ -94,7 +94,7 @@ def _joined(parts: list[AxisSeries]) -> AxisSeries:
     return AxisSeries(times, values, tuple(name for part in parts for name in part.names))
 
 
-def _tip(path: Path, logbook: Logbook) -> AxisSeries:
+def _tip(path: Path, logbook: LogReader) -> AxisSeries:
     tip, poses, ending = logbook.begin["tip"], logbook.drawn, "" if logbook.twin is None else ".twin"
     if poses is None or poses.quaternions is None or tip["body"] not in poses.names:
         raise InputError(f"{path}: /tf: found no body {tip['body']!r}, which has the tip, expected its poses")

@@ -1,1 +1,1 @@
-"""Plans on real machines: the tendons' motors on a CAN bus, the Panda behind an adapter, both on one clock."""
+"""Plans on real machines: the tendons' motors on a CAN bus, the Panda behind a driver process, both on one clock."""

@@ -33,7 +33,7 @@ class Watchdog:
         return f"heard no setpoint for {1e3 * silent:.0f} ms, expected one every {1e3 * TICK:.0f} ms"
 
 
-class Limb(Protocol):
+class Driver(Protocol):
     """Axes, (n,), in rad or m, that are sent where they shall be. None of its calls waits but `close`.
 
     Attributes:

@@ -1,7 +1,7 @@
-"""A limb, seen from the machine's process: its adapter, a process of its own.
+"""A hardware driver in a process of its own, as the robot's process uses it.
 
-An adapter is started with a socket, over which it tells of itself every few ms, and hears where its axes shall be. Once
-nobody is at the other end, it brings its limb to rest, and gives it back.
+The driver process is started with a socket, over which it sends its state every few ms and receives setpoints. Once the
+other end is closed, it brings the hardware to rest and releases it.
 """
 
 import math
@@ -19,12 +19,12 @@ import numpy as np
 from pydantic import Field
 
 from trunkline.ar.drivers.driver import CONNECTING
-from trunkline.ar.drivers.driver_frames import Line, Setpoint, Told
+from trunkline.ar.drivers.driver_frames import DriverState, FrameSocket, Setpoint
 from trunkline.ar.drivers.driver_process import AXES
 from trunkline.errors import InputError
 
 ROOT = Path(__file__).parents[3]
-SILENT = 0.1  # s without a frame of the adapter
+SILENT = 0.1  # s without a frame of the driver process
 CLOSING = 3.0  # s
 
 
@@ -38,27 +38,27 @@ class ArmSettings:
     astray: Annotated[float, Field(gt=0, le=0.5)]
 
 
-class Adapted:
-    """A `Limb` of so many `axes` whose adapter is this `command`, with the socket's descriptor behind it.
+class DriverClient:
+    """A `Driver` of so many `axes` whose process is this `command`, with the socket's descriptor as last argument.
 
     Attributes:
-        told: the adapter's newest frame, None before the first.
+        state: newest frame of the driver process, None before the first.
 
     Raises:
         OSError: the command is not there.
     """
 
-    told: Told | None
+    state: DriverState | None
 
     def __init__(
         self, command: Sequence[str], axes: int, patience: float = CONNECTING, astray: float = math.inf, at: str = ""
     ) -> None:
-        """patience: s that the adapter has to be ready. astray: rad that a joint may be from where it is sent. at: what
-        is said of where the limb should be."""
-        self._axes, self._astray, self._at, self.fault, self.told = axes, astray, at, "", None
+        """patience: s within which the driver process has to be ready. astray: rad that a joint may be from where it
+        is sent. at: added to the fault, where the hardware should be."""
+        self._axes, self._astray, self._at, self.fault, self.state = axes, astray, at, "", None
         self._patience, self._until = patience, time.monotonic() + patience
         ours, theirs = socket.socketpair()
-        self.line, path = Line(ours, Told.size(axes)), os.environ.get("PYTHONPATH", "")
+        self.line, path = FrameSocket(ours, DriverState.size(axes)), os.environ.get("PYTHONPATH", "")
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, (str(ROOT), path)))}
         try:
             self.process = subprocess.Popen(
@@ -70,36 +70,36 @@ class Adapted:
 
     @property
     def ready(self) -> bool:
-        return self.told is not None
+        return self.state is not None
 
     @property
     def sent(self) -> np.ndarray:
-        assert self.told is not None
-        return np.array(self.told.sent)
+        assert self.state is not None
+        return np.array(self.state.sent)
 
     @property
     def measured(self) -> np.ndarray:
-        return np.full(self._axes, np.nan) if self.told is None else np.array(self.told.measured)
+        return np.full(self._axes, np.nan) if self.state is None else np.array(self.state.measured)
 
     def send(self, due: float, axes: np.ndarray) -> None:
         try:
             self.line.send(Setpoint(due, tuple(axes.tolist())).pack())
         except OSError as error:
-            self._hear()  # an adapter that has ended has told why
+            self._hear()  # the last frame of a driver process that has ended has the reason
             self._fail(f"its adapter takes no setpoints ({error.strerror})")
 
     def turn(self, now: float) -> None:
-        """Hear what the adapter tells, at `now`, s."""
+        """Read the frames of the driver process, at `now`, s."""
         self._hear()
-        if self.told is None:
+        if self.state is None:
             if now > self._until:
                 self._fail(f"its adapter is not ready after {self._patience:.0f} s{self._at}")
             return
-        if (silent := now - self.told.time) > SILENT:
+        if (silent := now - self.state.time) > SILENT:
             self._fail(f"its adapter is silent for {1e3 * silent:.0f} ms")
 
     def close(self) -> None:
-        """The adapter hears no more: it brings its limb to rest, and gives it back."""
+        """Close the socket: the driver process brings the hardware to rest and releases it."""
         self.line.close()
         try:
             self.process.wait(CLOSING)
@@ -109,18 +109,18 @@ class Adapted:
 
     def _hear(self) -> None:
         for frame in self.line.heard():
-            told = Told.unpack(frame)
-            if told.fault:
-                self._fail(told.fault)
-            if self.told is not None or not told.fault:
-                self.told = told
-                self._look(told)
+            state = DriverState.unpack(frame)
+            if state.fault:
+                self._fail(state.fault)
+            if self.state is not None or not state.fault:
+                self.state = state
+                self._check(state)
         if not self.line.open:
             self._fail("its adapter has ended")
 
-    def _look(self, told: Told) -> None:
+    def _check(self, state: DriverState) -> None:
         """Whether each joint is where it is sent."""
-        off = np.abs(np.subtract(told.measured, told.sent))
+        off = np.abs(np.subtract(state.measured, state.sent))
         if not off.max() <= self._astray:  # or no number
             where = f"found {off.max():.3g} rad from where it is sent, expected at most {self._astray:g}"
             self._fail(f"joint {int(off.argmax()) + 1}: {where}")
@@ -129,7 +129,7 @@ class Adapted:
         self.fault = self.fault or fault
 
 
-def panda(settings: ArmSettings, robot: str) -> Adapted:
+def panda(settings: ArmSettings, robot: str) -> DriverClient:
     """A robot, "panda", "fr3" or "fake".
 
     Raises:
@@ -138,6 +138,6 @@ def panda(settings: ArmSettings, robot: str) -> Adapted:
     python = settings.python or sys.executable
     command = [python, "-m", "trunkline.ar.drivers.driver_process", robot, settings.address]
     try:
-        return Adapted(command, AXES, astray=settings.astray, at=f", expected {robot} at {settings.address}")
+        return DriverClient(command, AXES, astray=settings.astray, at=f", expected {robot} at {settings.address}")
     except OSError as error:
         raise InputError(f"arm.python: found {python} ({error.strerror}), expected a Python") from error

@@ -1,7 +1,7 @@
-"""Frames between the machine's process and a limb's adapter, over a socket: of one size each way, little-endian.
+"""Frames between the robot's process and a driver process, over a socket: of one size each way, little-endian.
 
-This, `adapter`, `limb`, `stream` and `urgency` run in an environment of the robot's own library: they import the
-standard library, numpy, each other and `trunkline.kinematics.panda` alone.
+This, `driver_process`, `driver`, `setpoint_filter` and `realtime_priority` run in an environment of the robot's own
+library: they import the standard library, numpy, each other and `trunkline.kinematics.panda` alone.
 """
 
 import contextlib
@@ -15,7 +15,7 @@ LAST = 1.0  # s that the last frame may take
 
 @dataclass(frozen=True)
 class Setpoint:
-    """Where the limb's `axes` shall be, rad or m, at `due`, s of the clock that all processes have (time.monotonic)."""
+    """Where the driver's `axes` shall be, rad or m, at `due`, s of the clock of all processes (time.monotonic)."""
 
     due: float
     axes: tuple[float, ...]
@@ -35,7 +35,7 @@ class Setpoint:
 
 
 @dataclass(frozen=True)
-class Told:
+class DriverState:
     """At `time`, s: the axes as `measured` and as `sent`, rad or m; `fault` in words, "" for none."""
 
     time: float
@@ -54,14 +54,14 @@ class Told:
         return struct.pack(f"<{len(numbers)}d{TEXT}s", *numbers, text)
 
     @classmethod
-    def unpack(cls, data: bytes) -> "Told":
+    def unpack(cls, data: bytes) -> "DriverState":
         count = (len(data) - TEXT) // 8
         time, *axes, text = struct.unpack(f"<{count}d{TEXT}s", data)
         half = count // 2
         return cls(time, tuple(axes[:half]), tuple(axes[half:]), text.rstrip(b"\0").decode(errors="replace"))
 
 
-class Line:
+class FrameSocket:
     """One end of a socket that hears frames of `size` bytes; nothing waits. `open`: whether the other end is there."""
 
     def __init__(self, channel: socket.socket, size: int) -> None:
@@ -92,16 +92,16 @@ class Line:
         self._unsent = self._unsent or frame
         self._unsent = self._unsent[self._socket.send(self._unsent) :]
 
-    def tell(self, told: Told) -> None:
+    def tell(self, state: DriverState) -> None:
         """The same, unless nobody listens; whoever is slow misses a frame."""
         with contextlib.suppress(OSError):
-            self.send(told.pack())
+            self.send(state.pack())
 
-    def end(self, told: Told) -> None:
+    def end(self, state: DriverState) -> None:
         """The last frame, for which it waits."""
         self._socket.settimeout(LAST)
         with contextlib.suppress(OSError):
-            self._socket.sendall(self._unsent + told.pack())
+            self._socket.sendall(self._unsent + state.pack())
 
     def close(self) -> None:
         """This end."""

@@ -1,5 +1,5 @@
-"""The Panda's adapter: a process in the environment of the robot's own library, that speaks to nothing but the robot
-and, over a socket, the process that started it.
+"""The Panda's driver process, in the environment of the robot's own library. It speaks to nothing but the robot and,
+over a socket, the process that started it.
 
     python -m trunkline.ar.drivers.driver_process ROBOT ADDRESS DESCRIPTOR
 
@@ -15,9 +15,9 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from trunkline.ar.drivers.driver_frames import Line, Setpoint, Told
-from trunkline.ar.drivers.realtime_priority import be_urgent
-from trunkline.ar.drivers.setpoint_filter import LIMITS, Stream
+from trunkline.ar.drivers.driver_frames import DriverState, FrameSocket, Setpoint
+from trunkline.ar.drivers.realtime_priority import raise_priority
+from trunkline.ar.drivers.setpoint_filter import LIMITS, SetpointFilter
 
 TELL = 5  # cycles from one frame told to the next
 AXES = len(LIMITS["panda"].velocity)
@@ -73,7 +73,7 @@ class PyLibfranka:
             control.writeOnce(command)
 
 
-class Fake:
+class FakeDevice:
     """No robot: joints that go where they are sent within LAG s, 1000 times a second of this machine's time."""
 
     LAG, READY = 0.005, (0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785)  # s, rad
@@ -90,14 +90,17 @@ class Fake:
             time.sleep(max(due - time.monotonic(), 0.0))
 
 
-DEVICES = {"panda": PandaPython, "fr3": PyLibfranka, "fake": Fake}
+DEVICES = {"panda": PandaPython, "fr3": PyLibfranka, "fake": FakeDevice}
 
 
-class Adapter:
+class DriverProcess:
     """Between the socket and the device."""
 
     def __init__(self, robot: str, channel: socket.socket) -> None:
-        self._limits, self._line = LIMITS["fr3" if robot == "fr3" else "panda"], Line(channel, Setpoint.size(AXES))
+        self._limits, self._line = (
+            LIMITS["fr3" if robot == "fr3" else "panda"],
+            FrameSocket(channel, Setpoint.size(AXES)),
+        )
         self._stream, self._count = None, 0
 
     def cycle(
@@ -105,34 +108,34 @@ class Adapter:
     ) -> tuple[list[float], bool]:
         """One cycle of the robot; it ends once the other side is gone and the joints are at rest."""
         if self._stream is None:
-            self._stream = Stream(desired, self._limits)
+            self._stream = SetpointFilter(desired, self._limits)
         now, stream = time.monotonic(), self._stream
         if rates is not None:
-            stream.found(desired, *rates)
+            stream.synchronize(desired, *rates)
         for frame in self._line.heard():
             stream.hear(Setpoint.unpack(frame), now)
         if not self._line.open:
             stream.brake("the machine's process is gone")
         sent = stream.cycle(now, dt).tolist()
         if self._count % TELL == 0:
-            self._line.tell(Told(now, tuple(measured), tuple(sent), stream.fault))
+            self._line.tell(DriverState(now, tuple(measured), tuple(sent), stream.fault))
         self._count += 1
         return sent, stream.resting and not self._line.open
 
     def fail(self, fault: str) -> None:
         """The robot has ended control."""
         sent = tuple(self._stream.joints) if self._stream is not None else (0.0,) * AXES
-        self._line.end(Told(time.monotonic(), sent, sent, fault))
+        self._line.end(DriverState(time.monotonic(), sent, sent, fault))
 
 
 def main(arguments: list[str]) -> int:
     robot, address, descriptor = arguments
     signal.signal(signal.SIGTERM, signal.SIG_IGN)  # it ends once nobody is at the other end, and the joints rest
     with socket.socket(fileno=int(descriptor)) as channel:
-        adapter = Adapter(robot, channel)
+        adapter = DriverProcess(robot, channel)
         try:
             device = DEVICES[robot](address)
-            be_urgent()
+            raise_priority()
             device.control(adapter.cycle)
         except Exception as error:  # whatever the robot's library raises is the fault that is told
             adapter.fail(" ".join(f"{type(error).__name__}: {error}".split()))

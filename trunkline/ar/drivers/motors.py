@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from trunkline.ar.drivers.gm6020 import FEEDBACK, Feedback
-from trunkline.ar.drivers.winch import Reel, ReelSettings
+from trunkline.ar.drivers.winch import Winch, WinchSettings
 
 SILENT = 0.02  # s without feedback of a motor
 HOMING = 60.0  # s
@@ -27,7 +27,7 @@ class MotorSettings:
     sides: tuple[Literal[-1, 1], ...]
     astray: Annotated[float, Field(gt=0, le=0.1)]
     hot: Annotated[float, Field(ge=30, le=120)]
-    reel: ReelSettings
+    reel: WinchSettings
 
     def __post_init__(self) -> None:
         if len(self.sides) != len(self.numbers):
@@ -38,7 +38,7 @@ class MotorSettings:
 
 @dataclass(frozen=True)
 class MotorsOnBus:
-    """`motors` on a `bus` of python-can's `interface`; on the bus `bank.SIMULATED`, simulated ones."""
+    """`motors` on a `bus` of python-can's `interface`; on the bus `simulated_motors.SIMULATED`, simulated ones."""
 
     motors: MotorSettings
     bus: str
@@ -50,62 +50,62 @@ class MotorsOnBus:
         return len(self.motors.numbers)
 
 
-class Motors:
+class MotorGroup:
     """Feedback in, currents out; it knows no bus and no clock. `begun`: s at which listening began."""
 
     def __init__(self, settings: MotorSettings, begun: float) -> None:
         self._settings, self._begun = settings, begun
-        self.reels = [Reel(settings.reel, side) for side in settings.sides]
-        self._by_number = dict(zip(settings.numbers, self.reels, strict=True))
+        self.winches = [Winch(settings.reel, side) for side in settings.sides]
+        self._by_number = dict(zip(settings.numbers, self.winches, strict=True))
         self.fault = ""
 
     @property
     def homed(self) -> bool:
         """Whether every cable's zero is known."""
-        return all(reel.homed for reel in self.reels)
+        return all(winch.homed for winch in self.winches)
 
     @property
     def pulls(self) -> list[float]:
         """Of the cables, m."""
-        return [reel.pull for reel in self.reels]
+        return [winch.pull for winch in self.winches]
 
     def hear(self, feedback: Feedback, now: float) -> None:
         """What a motor says at `now`, s."""
-        reel = self._by_number.get(feedback.number)
-        if reel is None:
+        winch = self._by_number.get(feedback.number)
+        if winch is None:
             return
-        reel.read(feedback, now)
+        winch.read(feedback, now)
         if feedback.celsius > self._settings.hot:
             self._fail(f"motor {feedback.number}: found {feedback.celsius} °C, expected at most {self._settings.hot:g}")
 
     def currents(self, pulls: Sequence[float], speeds: Sequence[float], now: float) -> dict[int, float]:
         """A, by the motor's number, at `now`, s, so that the cables follow `pulls` (K,), m, moving at `speeds` (K,),
         m/s; until all are homed, so that they become so."""
-        found = dict.fromkeys(self._settings.numbers, 0.0)
+        currents = dict.fromkeys(self._settings.numbers, 0.0)
         if not self._heard(now):
-            return found
+            return currents
         wanted = zip(self._by_number.items(), pulls, speeds, strict=True)
         homed = self.homed
-        for (number, reel), pull, speed in wanted:
+        for (number, winch), pull, speed in wanted:
             if not homed:
-                found[number] = reel.current(0.0, 0.0, now) if reel.homed else reel.home(now)
-            elif abs(pull - reel.pull) > self._settings.astray:
-                where = f"{1e3 * abs(pull - reel.pull):.0f} mm from where its cable shall be"
+                currents[number] = winch.current(0.0, 0.0, now) if winch.homed else winch.home(now)
+            elif abs(pull - winch.pull) > self._settings.astray:
+                where = f"{1e3 * abs(pull - winch.pull):.0f} mm from where its cable shall be"
                 self._fail(f"motor {number}: found {where}, expected at most {1e3 * self._settings.astray:.0f}")
             else:
-                found[number] = reel.current(pull, speed, now)
-            if reel.fault:
-                self._fail(f"motor {number}: {reel.fault}")
-        return dict.fromkeys(found, 0.0) if self.fault else found
+                currents[number] = winch.current(pull, speed, now)
+            if winch.fault:
+                self._fail(f"motor {number}: {winch.fault}")
+        return dict.fromkeys(currents, 0.0) if self.fault else currents
 
     def _heard(self, now: float) -> bool:
         """Whether each is heard, and none failed."""
-        for number, reel in self._by_number.items():
-            if reel.heard is None:
+        for number, winch in self._by_number.items():
+            if winch.heard is None:
                 if now - self._begun > PRESENT:
                     self._fail(f"motor {number}: found no feedback, expected it under the id {FEEDBACK + number:#x}")
                 return False
-            if (silent := now - reel.heard) > SILENT:
+            if (silent := now - winch.heard) > SILENT:
                 self._fail(f"motor {number}: silent for {1e3 * silent:.0f} ms, expected feedback every 1 ms")
         return not self.fault
 

@@ -1,4 +1,4 @@
-"""Motors, or a bank of simulated ones, on a CAN bus. Both are turned from outside, RATE times a second."""
+"""Motors, real or simulated, on a CAN bus. Both are turned from outside, RATE times a second."""
 
 import random
 import threading
@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import can
 
 from trunkline.ar.drivers.gm6020 import FEEDBACK, NUMBERS, RATE, Feedback, command_frames, feedback_of
-from trunkline.ar.drivers.motors import Motors, MotorSettings, MotorsOnBus
-from trunkline.ar.drivers.simulated_motors import SIMULATED, Bank, Plant
+from trunkline.ar.drivers.motors import MotorGroup, MotorSettings, MotorsOnBus
+from trunkline.ar.drivers.simulated_motors import SIMULATED, MotorParameters, SimulatedMotors
 from trunkline.errors import InputError
 
 FILTERS: can.typechecking.CanFilters = [
@@ -32,14 +32,14 @@ def open_bus(interface: str, channel: str) -> can.BusABC:
 
 
 class BusMotors:
-    """The tendons' motors on `bus`: what `Motors` finds goes out, what they say comes in.
+    """The tendons' motors on `bus`: what `MotorGroup` finds goes out, what they say comes in.
 
     Of the frames of one motor that wait, the newest counts: their age is not known, and the cable's speed is made of
     times.
     """
 
     def __init__(self, settings: MotorSettings, bus: can.BusABC) -> None:
-        self.motors, self._bus, self._fault = Motors(settings, time.monotonic()), bus, ""
+        self.motors, self._bus, self._fault = MotorGroup(settings, time.monotonic()), bus, ""
         self._off = dict.fromkeys(settings.numbers, 0.0)
         bus.set_filters(FILTERS)
 
@@ -80,11 +80,11 @@ class BusMotors:
         self._fault = self._fault or f"bus: {error}"
 
 
-class BankOnBus:
+class SimulatedMotorsOnBus:
     """Simulated motors on the other end of `bus`. `lost`: share of frames, either way, that get lost."""
 
-    def __init__(self, plants: Sequence[Plant], bus: can.BusABC, seed: int = 0) -> None:
-        self.bank, self.lost = Bank(plants, time.monotonic()), 0.0
+    def __init__(self, plants: Sequence[MotorParameters], bus: can.BusABC, seed: int = 0) -> None:
+        self.simulated, self.lost = SimulatedMotors(plants, time.monotonic()), 0.0
         self._bus, self._random = bus, random.Random(seed)
 
     def turn(self) -> None:
@@ -92,8 +92,8 @@ class BankOnBus:
         now = time.monotonic()
         while (message := self._bus.recv(0)) is not None:
             if self._random.random() >= self.lost:
-                self.bank.hear(message.arbitration_id, bytes(message.data), now)
-        for identifier, data in self.bank.advance(now):
+                self.simulated.hear(message.arbitration_id, bytes(message.data), now)
+        for identifier, data in self.simulated.advance(now):
             if self._random.random() >= self.lost:
                 self._bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
 
@@ -102,21 +102,21 @@ class BankOnBus:
         self._bus.shutdown()
 
 
-class SimulatedMotors(BusMotors):
-    """Motors before a `bank` of simulated ones, which turns when they do: python-can's bus "virtual" is of one process
-    only, and two threads of it would wait for each other."""
+class SimulatedBusMotors(BusMotors):
+    """The driver's side of a bus with `simulated` motors, which turn when it does: python-can's bus "virtual" is of
+    one process only, and two threads of it would wait for each other."""
 
-    def __init__(self, settings: MotorSettings, bus: can.BusABC, bank: BankOnBus) -> None:
+    def __init__(self, settings: MotorSettings, bus: can.BusABC, simulated: SimulatedMotorsOnBus) -> None:
         super().__init__(settings, bus)
-        self._bank = bank
+        self._simulated = simulated
 
     def turn(self, pulls: Sequence[float], speeds: Sequence[float]) -> None:
-        self._bank.turn()
+        self._simulated.turn()
         super().turn(pulls, speeds)
 
     def close(self) -> None:
         super().close()
-        self._bank.close()
+        self._simulated.close()
 
 
 def motors_on(settings: MotorsOnBus) -> BusMotors:
@@ -128,23 +128,24 @@ def motors_on(settings: MotorsOnBus) -> BusMotors:
     bus = open_bus(settings.interface, settings.bus)
     if settings.bus != SIMULATED:
         return BusMotors(settings.motors, bus)
-    bank = BankOnBus(plants_of(settings.motors), open_bus(settings.interface, settings.bus))
-    return SimulatedMotors(settings.motors, bus, bank)
+    simulated = SimulatedMotorsOnBus(motor_parameters(settings.motors), open_bus(settings.interface, settings.bus))
+    return SimulatedBusMotors(settings.motors, bus, simulated)
 
 
-def plants_of(settings: MotorSettings) -> list[Plant]:
+def motor_parameters(settings: MotorSettings) -> list[MotorParameters]:
     """Simulated motors that are as the settings have them."""
-    reel = settings.reel
+    winch = settings.reel
     return [
-        Plant(inertia=reel.inertia, radius=reel.radius, stiffness=reel.stiffness, side=side) for side in settings.sides
+        MotorParameters(inertia=winch.inertia, radius=winch.radius, stiffness=winch.stiffness, side=side)
+        for side in settings.sides
     ]
 
 
-class BankInThread(BankOnBus):
-    """A bank that turns by itself. `reeled`: (s, (m, …)) of every turn. `driven`: s of the last turn that ended with a
-    motor driven."""
+class SimulatedMotorsThread(SimulatedMotorsOnBus):
+    """Simulated motors that turn in a thread. `reeled`: (s, (m, …)) of every turn. `driven`: s of the last turn that
+    ended with a motor driven."""
 
-    def __init__(self, plants: Sequence[Plant], bus: can.BusABC, seed: int = 0) -> None:
+    def __init__(self, plants: Sequence[MotorParameters], bus: can.BusABC, seed: int = 0) -> None:
         super().__init__(plants, bus, seed)
         self.reeled, self.driven, self._ended = [], 0.0, threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True, name="bank")
@@ -161,6 +162,6 @@ class BankInThread(BankOnBus):
             now = time.monotonic()
             due = max(due + 1 / RATE, now - 0.1)
             self.turn()
-            if any(motor.current for motor in self.bank.motors):
+            if any(motor.current for motor in self.simulated.motors):
                 self.driven = now
-            self.reeled.append((now, tuple(motor.reeled for motor in self.bank.motors)))
+            self.reeled.append((now, tuple(motor.reeled for motor in self.simulated.motors)))

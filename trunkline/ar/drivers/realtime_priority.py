@@ -6,7 +6,7 @@ import os
 URGENT = 40  # of SCHED_FIFO
 
 
-def be_urgent() -> None:
+def raise_priority() -> None:
     """This process before all that have no such priority; done without where there is no right to it. Call it when
     everything is loaded: what still loads is stopped by the kernel for 50 ms of each second."""
     with contextlib.suppress(OSError, AttributeError):

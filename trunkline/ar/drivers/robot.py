@@ -1,8 +1,8 @@
-"""Panda and motors as one machine, on one clock.
+"""Panda and motors as one robot, on one clock.
 
 Every tick both are sent where they shall be LEAD s later, and each plays that by the same clock: a process that is late
-by less moves nothing otherwise. What ends one of them is the machine's fault, which lasts, and whoever turns the
-machine stops it along its plan. So the limb that is well comes to rest where the plan has it, and holds.
+by less moves nothing otherwise. What ends one of them is the robot's fault, which lasts, and the caller stops the robot
+along its plan. So the driver without a fault comes to rest where the plan has it, and holds.
 """
 
 import math
@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from trunkline.ar.drivers.driver import TICK, Limb
+from trunkline.ar.drivers.driver import TICK, Driver
 from trunkline.ar.drivers.time_scaling import Smoother
 from trunkline.ar.teleop.trajectory import JOINTS
 from trunkline.errors import InputError
@@ -21,7 +21,7 @@ LEAD = 0.03  # s
 SMOOTH = 10  # ticks of each of the smoother's means
 
 
-class Machine:
+class HardwareRobot:
     """Of an `arm`, whose axes are joints, and `motors`, whose axes are pulls, or one of them; the cables' commands (K,)
     where the arm is straight are `straight`, m.
 
@@ -32,13 +32,13 @@ class Machine:
 
     def __init__(
         self,
-        arm: Limb | None,
-        motors: Limb | None,
+        arm: Driver | None,
+        motors: Driver | None,
         straight: np.ndarray,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._arm, self._motors, self._straight, self._clock = arm, motors, np.array(straight, dtype=float), clock
-        self._limbs = {name: limb for name, limb in (("robot", arm), ("motors", motors)) if limb is not None}
+        self._drivers = {name: driver for name, driver in (("robot", arm), ("motors", motors)) if driver is not None}
         self._smoother: Smoother | None = None
         self._due, self._anew = 0.0, False
 
@@ -53,12 +53,12 @@ class Machine:
             Where the joints are, (7,), rad.
 
         Raises:
-            InputError: a limb is not there, or cannot be homed, or nobody waits any more.
+            InputError: a driver is not there, or cannot be homed, or nobody waits any more.
         """
-        while not (self.fault or left() or all(limb.ready for limb in self._limbs.values())):
+        while not (self.fault or left() or all(driver.ready for driver in self._drivers.values())):
             time.sleep(TICK)
-            for limb in self._limbs.values():
-                limb.turn(self._clock())
+            for driver in self._drivers.values():
+                driver.turn(self._clock())
         if self.fault or left():
             raise InputError(self.fault or "the session is gone")
         joints = np.array(joints if self._arm is None else self._arm.sent)
@@ -68,7 +68,7 @@ class Machine:
     @property
     def fault(self) -> str:
         """What ended it, "" while it goes."""
-        return next((f"{name}: {limb.fault}" for name, limb in self._limbs.items() if limb.fault), "")
+        return next((f"{name}: {driver.fault}" for name, driver in self._drivers.items() if driver.fault), "")
 
     def move(self, joints: np.ndarray, commands: np.ndarray) -> None:
         """One tick, at whose end the axes shall be at `joints` (7,), rad, and `commands` (K,), m."""
@@ -82,8 +82,8 @@ class Machine:
             self._arm.send(self._due, wanted[:JOINTS])
         if self._motors is not None:
             self._motors.send(self._due, self._straight - wanted[JOINTS:])
-        for limb in self._limbs.values():
-            limb.turn(now)
+        for driver in self._drivers.values():
+            driver.turn(now)
 
     @property
     def behind(self) -> float:
@@ -102,4 +102,4 @@ class Machine:
     def close(self) -> None:
         """Give back all there is: the motors are without current, the arm brakes."""
         with ThreadPoolExecutor() as pool:  # each waits for its own
-            list(pool.map(lambda limb: limb.close(), self._limbs.values()))
+            list(pool.map(lambda driver: driver.close(), self._drivers.values()))

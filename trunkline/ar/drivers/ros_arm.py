@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from trunkline.ar.drivers.driver import CONNECTING, TICK, Watchdog
-from trunkline.ar.drivers.ros_settings import RosSettings, Said
+from trunkline.ar.drivers.ros_settings import JointReading, RosSettings
 from trunkline.ar.drivers.setpoint_filter import LIMITS, ROUNDING
 from trunkline.errors import InputError
 
@@ -37,7 +37,7 @@ class Link(Protocol):
         """
         ...
 
-    def states(self) -> list[Said]:
+    def states(self) -> list[JointReading]:
         """What was said since the last call, the newest last."""
         ...
 
@@ -61,7 +61,7 @@ def link_of(settings: RosSettings) -> Link:
 
 
 class RosArm:
-    """A `Limb` of the Panda's joints, rad, that a controller moves, and whose states are told.
+    """A `Driver` of the Panda's joints, rad, that a controller moves, and whose states are told.
 
     After a fault nothing is sent: the controller stands at the last point, which is on the way, at most the setpoints'
     lead from where the joints are. Any other point, such as where they are measured, would turn them back.
@@ -70,7 +70,7 @@ class RosArm:
     def __init__(self, settings: RosSettings) -> None:
         self._settings, self.fault, self.ready = settings, "", False
         self.measured, self._sent = np.full(settings.axes, np.nan), np.full(settings.axes, np.nan)
-        self._heard, self._told = time.monotonic(), 0.0
+        self._heard, self._sent_at = time.monotonic(), 0.0
         self._next: tuple[float, np.ndarray] | None = None
         self._watchdog, self._fresh = Watchdog(), False  # whether setpoints came since the last turn
         self._way: tuple[float, np.ndarray] | None = None  # when the last point is due, and where it was gone to from
@@ -94,7 +94,7 @@ class RosArm:
             self._look(now)
             return
         self._check(now)
-        if not self.fault and self._next is not None and now - self._told >= PERIOD:
+        if not self.fault and self._next is not None and now - self._sent_at >= PERIOD:
             self._send(now, *self._next)
 
     def close(self) -> None:
@@ -127,7 +127,7 @@ class RosArm:
             asked = f"asks for {speed[joint]:.3g} rad/s, expected at most {VELOCITY[joint]:.3g}"
             self._fail(f"setpoint: {self._settings.names[joint]} {asked}")
             return
-        self._told, self._sent, self._next, self._way = now, joints, None, (due, here)
+        self._sent_at, self._sent, self._next, self._way = now, joints, None, (due, here)
         try:
             self.link.send(max(due - now, 0.0), joints.tolist())
         except InputError as error:
@@ -138,15 +138,15 @@ class RosArm:
         if self._way is None:
             return self.measured
         due, here = self._way
-        return here + min((now - self._told) / max(due - self._told, TICK), 1.0) * (self._sent - here)
+        return here + min((now - self._sent_at) / max(due - self._sent_at, TICK), 1.0) * (self._sent - here)
 
     def _look(self, now: float) -> None:
         """Whether the joints' state is told and a controller listens."""
-        known = not np.isnan(self.measured).any()
-        self.ready = known and self.link.listeners > 0
+        measured = not np.isnan(self.measured).any()
+        self.ready = measured and self.link.listeners > 0
         if not self.ready and now > self._until:
-            missing = self._settings.trajectory if known else self._settings.states
-            side = "found nobody who listens" if known else f"found no state of {self._settings.names[0]} and others"
+            missing = self._settings.trajectory if measured else self._settings.states
+            side = "found nobody who listens" if measured else f"found no state of {self._settings.names[0]} and others"
             self._fail(f"{missing}: {side} within {CONNECTING:.0f} s")
 
     def _hear(self, now: float) -> None:

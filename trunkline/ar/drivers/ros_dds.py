@@ -7,7 +7,7 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
 from trunkline.ar.drivers.ros_messages import JointState, JointTrajectory, trajectory
-from trunkline.ar.drivers.ros_settings import NEWEST, RosSettings, Said
+from trunkline.ar.drivers.ros_settings import NEWEST, JointReading, RosSettings
 from trunkline.errors import InputError
 
 
@@ -42,7 +42,7 @@ class DdsLink:
         except DDSException as error:
             raise InputError(f"{self._settings.trajectory}: {error}") from error
 
-    def states(self) -> list[Said]:
+    def states(self) -> list[JointReading]:
         # what was disposed of has neither
         taken = self._reader.take(NEWEST)
         return [(list(getattr(state, "name", ())), list(getattr(state, "position", ()))) for state in taken]

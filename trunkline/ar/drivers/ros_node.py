@@ -14,7 +14,7 @@ from rclpy.qos import QoSProfile, qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from trunkline.ar.drivers.ros_settings import NANO, NEWEST, RosSettings, Said
+from trunkline.ar.drivers.ros_settings import NANO, NEWEST, JointReading, RosSettings
 from trunkline.errors import InputError
 
 PARTING = 1.0  # s that its thread has to end
@@ -29,7 +29,7 @@ class NodeLink:
     """
 
     def __init__(self, settings: RosSettings) -> None:
-        self._settings, self._said = settings, deque(maxlen=NEWEST)
+        self._settings, self._readings = settings, deque(maxlen=NEWEST)
         self._context = rclpy.Context()
         try:
             rclpy.init(args=[], context=self._context, domain_id=settings.domain)
@@ -55,8 +55,8 @@ class NodeLink:
         except RuntimeError as error:
             raise InputError(f"{self._settings.trajectory}: {error}") from error
 
-    def states(self) -> list[Said]:
-        return [self._said.popleft() for _ in range(len(self._said))]
+    def states(self) -> list[JointReading]:
+        return [self._readings.popleft() for _ in range(len(self._readings))]
 
     def close(self) -> None:
         """End the node."""
@@ -66,4 +66,4 @@ class NodeLink:
         rclpy.shutdown(context=self._context)
 
     def _hear(self, state: JointState) -> None:
-        self._said.append((list(state.name), list(state.position)))
+        self._readings.append((list(state.name), list(state.position)))

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 Name = Annotated[str, Field(pattern=r"^(/\w+)+$", max_length=255)]
-Said = tuple[list[str], list[float]]  # names of joints, and where each is, rad
+JointReading = tuple[list[str], list[float]]  # names of joints, and where each is, rad
 NEWEST = 10  # states that wait to be heard
 NANO = 1_000_000_000
 

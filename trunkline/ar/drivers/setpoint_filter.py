@@ -1,4 +1,4 @@
-"""What the Panda is sent, cycle by cycle: the adapter's own logic, without robot, socket and clock.
+"""What the Panda is sent, cycle by cycle: the driver process's own logic, without robot, socket and clock.
 
 Setpoints are stamped with when they are due, and come some time before. They are played by the robot's time, which is
 drawn towards this machine's, and every cycle is held against the robot's limits before it is sent. Where setpoints run
@@ -78,7 +78,7 @@ class Bridge:
         return place * self._place + BRIDGED * speed * self._speed + BRIDGED**2 * gain * self._gain
 
 
-class Stream:
+class SetpointFilter:
     """From rest at `joints` (7,), rad.
 
     Attributes:
@@ -105,7 +105,7 @@ class Stream:
         """Whether it is at rest, its fault braked for."""
         return bool(self.fault) and not self._sent[1:].any()
 
-    def found(self, joints: Sequence[float], speed: Sequence[float], gain: Sequence[float]) -> None:
+    def synchronize(self, joints: Sequence[float], speed: Sequence[float], gain: Sequence[float]) -> None:
         """Before a cycle: where the robot's own motion generator is, (7,) each, rad, rad/s, rad/s²."""
         place, rate = np.abs(np.subtract([joints, speed], self._sent[:2])).max(axis=1)
         if place > LOST or rate > LOST / CYCLE:
@@ -184,13 +184,13 @@ class Stream:
         place, speed, gain = sent = _moved(self._sent, wanted + self._bridge.next(dt), dt)
         jerk = (gain - self._sent[2]) / dt
         limits = self._limits
-        for found, most, unit in (
+        for rates, most, unit in (
             (speed, limits.velocity, "rad/s"), (gain, limits.acceleration, "rad/s²"), (jerk, limits.jerk, "rad/s³")
         ):  # fmt: skip
-            over = np.abs(found) / (ROUNDING * most)
+            over = np.abs(rates) / (ROUNDING * most)
             if over.max() > 1:
                 joint = int(over.argmax())
-                asked = f"asks for {abs(found[joint]):.3g} {unit}, expected at most {most[joint]:.3g}"
+                asked = f"asks for {abs(rates[joint]):.3g} {unit}, expected at most {most[joint]:.3g}"
                 self.brake(f"setpoint: joint {joint + 1} {asked}")
                 return
         outside = np.maximum(limits.low - place, place - limits.high)

@@ -7,7 +7,7 @@ from trunkline.settings import settings
 
 
 @settings
-class Config:
+class ExecutionConfig:
     """Of real machines: the robot's `arm`, or a controller of `ros`, the tendons' `motors`."""
 
     arm: ArmSettings

@@ -1,4 +1,4 @@
-"""Motors that are not there: a bank of simulated GM6020 on reels, the other end of a bus.
+"""Simulated motors: GM6020 with spools of cable, the other end of a bus.
 
 Each has a rotor with dry and viscous friction, and a cable that is a spring from a slack length on:
 
@@ -22,7 +22,7 @@ SLOW = 0.05  # rad/s below which dry friction is less than all of it
 
 
 @dataclass(frozen=True)
-class Plant:
+class MotorParameters:
     """inertia: kg m². dry: N m. viscous: N m s. radius: of the spool, m. stiffness: of the cable with what it pulls,
     N/m. slack: m that it is loose at first. side: 1 where a positive current reels in. begins: encoder's first angle,
     counts. All assumed: nobody measured the rotor's inertia or friction."""
@@ -37,10 +37,10 @@ class Plant:
     begins: int = 0
 
 
-class Motor:
+class SimulatedMotor:
     """`silent`: whether it gives no feedback. `angle`: rad, since it began, that reels in where it is positive."""
 
-    def __init__(self, number: int, plant: Plant) -> None:
+    def __init__(self, number: int, plant: MotorParameters) -> None:
         self.number, self.plant = number, plant
         self.angle = self.rate = self.current = 0.0
         self.silent, self._commanded = False, -math.inf
@@ -77,11 +77,11 @@ class Motor:
         return Feedback(self.number, math.floor(counts) % COUNTS, rpm, self.current, 30)
 
 
-class Bank:
+class SimulatedMotors:
     """Motors 1, 2, …; `now`: s at which it begins."""
 
-    def __init__(self, plants: Sequence[Plant], now: float) -> None:
-        self.motors = [Motor(number, plant) for number, plant in zip(NUMBERS, plants, strict=False)]
+    def __init__(self, plants: Sequence[MotorParameters], now: float) -> None:
+        self.motors = [SimulatedMotor(number, plant) for number, plant in zip(NUMBERS, plants, strict=False)]
         self._now = now
 
     def hear(self, identifier: int, data: bytes, now: float) -> None:

@@ -1,4 +1,4 @@
-"""The tendons' motors as a limb: homed first, then on their way through what they are sent."""
+"""The tendons' motors as a driver: homed first, then on their way through what they are sent."""
 
 import math
 from collections import deque
@@ -10,8 +10,8 @@ from trunkline.ar.drivers.motors import HOMING
 from trunkline.ar.drivers.on_bus import BusMotors
 
 
-class Cables:
-    """A `Limb` whose axes are the cables' pulls from zero, m.
+class TendonDriver:
+    """A `Driver` whose axes are the cables' pulls from zero, m.
 
     Where setpoints end, or this process is late itself, the cables hold at the last one, and follow no more. Where a
     motor fails, none is driven.
@@ -20,7 +20,7 @@ class Cables:
     def __init__(self, motors: BusMotors, begun: float) -> None:
         """begun: s at which homing begins."""
         self._motors, self._until, self._fault = motors, begun + HOMING, ""
-        self.sent = np.zeros(len(motors.motors.reels))
+        self.sent = np.zeros(len(motors.motors.winches))
         self._queue: deque[tuple[float, np.ndarray]] = deque()
         self._watchdog, self._fresh = Watchdog(), False  # whether setpoints came since the last turn
 

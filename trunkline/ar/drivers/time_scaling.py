@@ -16,7 +16,7 @@ LEAST = 0.3  # of them, whatever the plan itself accelerates there
 STRIDE = 0.005  # s between the places that a robot seeks as it follows; it goes evenly from one to the next
 
 
-class PacedRobot(SimulatedRobot):
+class TimeScaledRobot(SimulatedRobot):
     """A `SimulatedRobot` that keeps the limits of `robot`: no plan leaves its range, no stop its accelerations.
 
     Along the plan q(s), time slows as ds/dt = p. The joints accelerate by q'' p² + q' dp/dt, so

@@ -1,4 +1,4 @@
-"""A motor as a reel of cable: its encoder in, a current out.
+"""A motor with a spool of cable: its encoder in, a current out.
 
 A pull x is the cable reeled in since zero, in m. The motor has no position mode, so the loop is ours. With e = x_d - x,
 the mass of the turning parts as the cable feels it, m = J / r², and ω the angular frequency at which the loop's gain
@@ -26,7 +26,7 @@ CREEP = 0.002  # m/s below which f is less than all of it
 
 
 @dataclass(frozen=True)
-class ReelSettings:
+class WinchSettings:
     """Of a motor and its spool.
 
     radius: of the spool, m. inertia: J of rotor and spool, kg m². crossover: ω / 2π, Hz. most: A. stiffness: k, N/m.
@@ -45,7 +45,7 @@ class ReelSettings:
     slack: Annotated[float, Field(gt=0, le=0.5)]
 
 
-class Reel:
+class Winch:
     """One of them; `side` is 1 where a positive current reels in, else -1.
 
     Attributes:
@@ -54,7 +54,7 @@ class Reel:
             zero is known. fault: why it cannot be homed.
     """
 
-    def __init__(self, settings: ReelSettings, side: int) -> None:
+    def __init__(self, settings: WinchSettings, side: int) -> None:
         self._settings, self._side = settings, side
         omega, self._mass = 2 * math.pi * settings.crossover, settings.inertia / settings.radius**2
         self._gains = omega, 0.4 * omega**2, 0.08 * omega**3
@@ -81,10 +81,10 @@ class Reel:
         """A, so that the cable is at `pull`, m, and moves at `speed`, m/s."""
         dt = self._lapse(now)
         damping, stiffness, integral = (self._mass * gain for gain in self._gains)
-        error, known = pull - self.pull, self._settings.friction * min(max(speed / CREEP, -1.0), 1.0)
+        error, feedforward = pull - self.pull, self._settings.friction * min(max(speed / CREEP, -1.0), 1.0)
         if self.homed:
-            known += self._settings.stiffness * pull
-        force = damping * (speed - self.speed) + stiffness * error + self._integral + known
+            feedforward += self._settings.stiffness * pull
+        force = damping * (speed - self.speed) + stiffness * error + self._integral + feedforward
         most = self._settings.most * TORQUE / self._settings.radius
         if abs(force) < most:
             self._integral += integral * error * dt
@@ -93,8 +93,8 @@ class Reel:
     def home(self, now: float) -> float:
         """A, on the way to zero: where the tension is the pretension. To be called until `homed`, or a `fault`.
 
-        The reel goes in until the motor bears twice the pretension, then out until it bears it no longer. Friction adds
-        to the one and takes from the other, so zero is the middle of both places where it bore the pretension.
+        The winch goes in until the motor bears twice the pretension, then out until it bears it no longer. Friction
+        adds to the one and takes from the other, so zero is the middle of both places where it bore the pretension.
         """
         dt = min(now - self._stepped, LONGEST) if self._stepped is not None else 0.0
         settings, speed = self._settings, self._settings.homing

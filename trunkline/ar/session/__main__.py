@@ -44,18 +44,18 @@ def parsed(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--motors", choices=MOTORS, default=MOTORS[0], help="of the tendons")
     parser.add_argument("--bus", default="", help=f"the motors', such as can0; {SIMULATED}: simulated motors behind it")
     parser.add_argument("--interface", default="", help="python-can's, for the bus; socketcan unless it is named")
-    found = parser.parse_args(arguments)
-    if (found.cert is None) != (found.key is None):
+    args = parser.parse_args(arguments)
+    if (args.cert is None) != (args.key is None):
         raise InputError("--cert, --key: found one of them, expected both")
-    if not is_local(found.host) and not (found.tls or found.cert):
-        raise InputError(f"--host {found.host}: found no TLS, expected --tls, or --cert and --key: others reach it")
-    if found.host in ANY:
-        raise InputError(f"--host {found.host}: found every address, expected one: the page is served under it alone")
-    if found.dry_run and (found.robot != ROBOTS[0] or found.motors != MOTORS[0]):
+    if not is_local(args.host) and not (args.tls or args.cert):
+        raise InputError(f"--host {args.host}: found no TLS, expected --tls, or --cert and --key: others reach it")
+    if args.host in ANY:
+        raise InputError(f"--host {args.host}: found every address, expected one: the page is served under it alone")
+    if args.dry_run and (args.robot != ROBOTS[0] or args.motors != MOTORS[0]):
         raise InputError("--dry-run: found --robot or --motors besides, expected it alone: nothing real moves")
-    if not 0 < found.port < 65536:
-        raise InputError(f"--port: found {found.port}, expected 1 to 65535")
-    return found
+    if not 0 < args.port < 65536:
+        raise InputError(f"--port: found {args.port}, expected 1 to 65535")
+    return args
 
 
 def context_of(options: argparse.Namespace, names: list[str]) -> ssl.SSLContext | None:

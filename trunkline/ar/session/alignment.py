@@ -50,14 +50,14 @@ def tip_of(positions: np.ndarray, quaternions: np.ndarray) -> Tip:
     turns = rotation_from_wxyz(quaternions).as_matrix()
     turned = np.linalg.svd((turns - turns.mean(axis=0)).reshape(-1, 3), compute_uv=False)[-1] / np.sqrt(count)
     if turned < TURN:
-        found, expected = np.degrees([turned, TURN])
-        raise InputError(f"tip: found {found:.1f}° of turn about one axis, expected {expected:.0f}° about each")
+        turn_deg, expected = np.degrees([turned, TURN])
+        raise InputError(f"tip: found {turn_deg:.1f}° of turn about one axis, expected {expected:.0f}° about each")
     rows = np.concatenate([turns, np.tile(-np.eye(3), (count, 1, 1))], axis=2).reshape(-1, 6)
-    found = np.linalg.lstsq(rows, -positions.ravel(), rcond=None)[0]
-    missed = float(np.sqrt(np.mean(np.sum((rows @ found + positions.ravel()).reshape(-1, 3) ** 2, axis=1))))
+    solution = np.linalg.lstsq(rows, -positions.ravel(), rcond=None)[0]
+    missed = float(np.sqrt(np.mean(np.sum((rows @ solution + positions.ravel()).reshape(-1, 3) ** 2, axis=1))))
     if missed > TIP_MOVED:
         raise InputError(f"tip: it moved by {1e3 * missed:.1f} mm, expected at most {1e3 * TIP_MOVED:.0f} mm")
-    return Tip(found[:3], found[3:], missed)
+    return Tip(solution[:3], solution[3:], missed)
 
 
 @dataclass
@@ -65,22 +65,22 @@ class Dwell:
     """Whether a tip rests, on a flange that rests: `hear` gives the mean of the last DWELL s once they do, and then not
     again until the tip has moved."""
 
-    _heard: deque[tuple[float, np.ndarray, np.ndarray]] = field(default_factory=deque)
+    _samples: deque[tuple[float, np.ndarray, np.ndarray]] = field(default_factory=deque)
     _done: bool = False
 
     def hear(self, time: float, point: np.ndarray | None, mark: np.ndarray | None) -> np.ndarray | None:
         """At `time`, s, the tip is at `point`, m (3,), None where it is not known; the flange's mark at `mark`."""
-        if point is None or mark is None or (self._heard and time <= self._heard[-1][0]):
-            self._heard.clear()
+        if point is None or mark is None or (self._samples and time <= self._samples[-1][0]):
+            self._samples.clear()
             return None
-        self._heard.append((time, point, mark))
-        while self._heard[0][0] < time - DWELL:
-            self._heard.popleft()
-        points, marks = (np.array([one[index] for one in self._heard]) for index in (1, 2))
+        self._samples.append((time, point, mark))
+        while self._samples[0][0] < time - DWELL:
+            self._samples.popleft()
+        points, marks = (np.array([sample[index] for sample in self._samples]) for index in (1, 2))
         moved = np.linalg.norm(points - points[0], axis=1).max() > STILL * DWELL
         moved |= np.linalg.norm(marks - marks[0], axis=1).max() > MARK_STILL
         self._done &= not moved
-        if self._done or moved or time - self._heard[0][0] < WHOLE * DWELL:
+        if self._done or moved or time - self._samples[0][0] < WHOLE * DWELL:
             return None
         self._done = True
         return points.mean(axis=0)
@@ -107,8 +107,8 @@ def fit(reference: np.ndarray, base: np.ndarray) -> Pose:
                 raise InputError(f"touch {number}: found ({x:g}, {y:g}, {z:g}), expected finite numbers")
     off_plane = np.linalg.svd(base - base.mean(axis=0), compute_uv=False)[-1] / np.sqrt(len(base))
     if off_plane < FLAT:
-        found = f"found all within {1e3 * off_plane:.0f} mm of a plane"
-        raise InputError(f"touches: {found}, expected {1e3 * FLAT:.0f} mm: touch higher and lower ones")
+        span = f"found all within {1e3 * off_plane:.0f} mm of a plane"
+        raise InputError(f"touches: {span}, expected {1e3 * FLAT:.0f} mm: touch higher and lower ones")
     return _fit(reference, base)
 
 
@@ -139,13 +139,13 @@ def suspect(reference: np.ndarray, base: np.ndarray) -> Suspect | None:
     """The touch without which the others agree best, if it misses them by more than BAD; of FEWEST or more touches."""
     if len(base) < FEWEST:
         return None
-    found = []
+    misses = []
     for index in range(len(base)):
-        kept = np.arange(len(base)) != index
-        pose = _fit(reference[kept], base[kept])
+        others = np.arange(len(base)) != index
+        pose = _fit(reference[others], base[others])
         missed = residuals(pose, reference, base)
-        found.append((float(np.sum(missed[kept] ** 2)), index, float(missed[index])))
-    _, index, off = min(found)
+        misses.append((float(np.sum(missed[others] ** 2)), index, float(missed[index])))
+    _, index, off = min(misses)
     return Suspect(index, off) if off > BAD else None
 
 

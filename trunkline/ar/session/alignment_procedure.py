@@ -28,7 +28,7 @@ from trunkline.ar.session.alignment import (
     tip_of,
 )
 from trunkline.ar.session.anchors import Anchor
-from trunkline.ar.session.settings import Alignment
+from trunkline.ar.session.settings import AlignmentSettings
 from trunkline.ar.teleop.messages import Pose, Vector
 from trunkline.ar.teleop.vectors import Quaternion, add, angle_between, distance, rotate
 from trunkline.errors import InputError
@@ -49,41 +49,41 @@ NEXT: dict[messages.AligningStep, str] = {
 }
 
 
-class Held(NamedTuple):
+class ControllerPose(NamedTuple):
     """A tracked controller, in the reference frame."""
 
     position: Vector
     quaternion: Quaternion
 
 
-class Aligner:
-    """Of one client. `known`: its anchor of another day, to be restored; None where there is none.
+class AlignmentProcedure:
+    """Of one client. `stored`: its anchor of another day, to be restored; None where there is none.
 
     `alignment`: pose of the reference frame in the base, None where it must not be relied on. `expected`: error where
     it is told, m; None where nothing tells.
     """
 
-    def __init__(self, settings: Alignment, known: Anchor | None = None) -> None:
+    def __init__(self, settings: AlignmentSettings, stored: Anchor | None = None) -> None:
         self.settings = settings
-        self.known = known if self._is_trusted(known) else None
+        self.stored = stored if self._is_trusted(stored) else None
         self.reset()
 
     def reset(self) -> None:
         """Nothing is known of the room any more, but the anchors."""
         self.step: messages.AligningStep = "place"
-        self.said, self.place, self.fasten = "", None, False
+        self.message, self.place, self.fasten = "", None, False
         self.tip: Vector | None = None
         self.expected: float | None = None
         self.residual: float | None = None
         self.anchor: Anchor | None = None
-        self._seen: Pose | None = None  # the anchor's pose
+        self._anchor_pose: Pose | None = None  # the anchor's pose
         self._then: messages.AligningStep = "touch"  # after the tip
         self._back: messages.AligningStep = "done"  # once a lost anchor is
         self._former = ""  # id of the anchor that was left
         self._forget()
 
     def _forget(self) -> None:
-        self._poses: list[Held] = []
+        self._poses: list[ControllerPose] = []
         self._dwell = Dwell()
         self._reference: list[np.ndarray] = []
         self._base: list[np.ndarray] = []
@@ -98,14 +98,16 @@ class Aligner:
         limit = self.settings.limit
         if self.step != "done" or self.expected is None or self.expected <= limit:
             return ""
-        found = f"expected error {_mm(self.expected)}, more than {_mm(limit)}"
-        return f"alignment: {found}: align anew; nothing is executed"
+        reason = f"expected error {_mm(self.expected)}, more than {_mm(limit)}"
+        return f"alignment: {reason}: align anew; nothing is executed"
 
-    def told(self) -> messages.Aligning:
+    def progress(self) -> messages.AlignmentProgress:
         words = NEXT[self.step].format(len(self._base) + 1, self.settings.places)
-        anchor = self.anchor or (self.known if self.step == "place" else None)
+        anchor = self.anchor or (self.stored if self.step == "place" else None)
         id = anchor.id if anchor is not None else ""
-        return messages.Aligning(self.step, words, self.said, self.place, self.expected, self.residual, id, self.fasten)
+        return messages.AlignmentProgress(
+            self.step, words, self.message, self.place, self.expected, self.residual, id, self.fasten
+        )
 
     # --- what the user wants
 
@@ -121,53 +123,53 @@ class Aligner:
     def touch(self) -> None:
         """Align anew, by touches."""
         self._forget()
-        self.step, self._then, self.said, self.fasten = "tip", "touch", "", False
+        self.step, self._then, self.message, self.fasten = "tip", "touch", "", False
         self.expected = self.residual = None
         self._leave_anchor()
 
     # --- what is seen
 
-    def hear(self, time: float, held: Held | None, mark: np.ndarray | None) -> None:
+    def hear(self, time: float, controller: ControllerPose | None, mark: np.ndarray | None) -> None:
         """At `time`, s, the touching hand, None where it is not tracked; the flange's mark in the base, m (3,), None
         where the robot moves."""
-        if self.step in ("tip", "touch", "check") and held is None:
-            self.said = UNTRACKED
-        elif self.said == UNTRACKED:
-            self.said = ""
+        if self.step in ("tip", "touch", "check") and controller is None:
+            self.message = UNTRACKED
+        elif self.message == UNTRACKED:
+            self.message = ""
         if self.step == "tip":
-            self._turned(held)
+            self._turned(controller)
         elif self.step in ("touch", "check"):
             point = None
-            if held is not None and self.tip is not None:
-                point = np.array(add(held.position, rotate(held.quaternion, self.tip)))
+            if controller is not None and self.tip is not None:
+                point = np.array(add(controller.position, rotate(controller.quaternion, self.tip)))
             touched = self._dwell.hear(time, point, mark)
             if touched is not None and mark is not None:
                 self._checked(touched, mark) if self.step == "check" else self._touched(touched, mark)
 
-    def anchored(self, id: str, seen: Pose | None, known: Anchor | None) -> str:
-        """The anchor `id` is at `seen` of the reference frame, None where it is lost; `known`: what is kept of it. Why
+    def anchored(self, id: str, pose: Pose | None, stored: Anchor | None) -> str:
+        """The anchor `id` is at `pose` of the reference frame, None where it is lost; `stored`: its stored form. Why
         that does not count. One that nobody asked for does nothing."""
-        if seen is not None and not _is_pose(seen):
+        if pose is not None and not _is_pose(pose):
             return "anchor: found what is no pose"
-        if self.fasten and seen is not None and self.place is not None and id != self._former:
-            kept = after(inverse(seen), self.place)
+        if self.fasten and pose is not None and self.place is not None and id != self._former:
+            transform = after(inverse(pose), self.place)
             date = datetime.now(UTC).isoformat(timespec="seconds")
-            self.anchor, self.fasten = Anchor(id, kept, self.residual, self.tip, date), False
-            self._seen = seen
+            self.anchor, self.fasten = Anchor(id, transform, self.residual, self.tip, date), False
+            self._anchor_pose = pose
             return ""
-        if self.anchor is None and self._is_trusted(known) and self.step == "place" and seen is not None:
-            assert known is not None
-            self.anchor, self.tip, self.residual = known, known.tip, known.residual
+        if self.anchor is None and self._is_trusted(stored) and self.step == "place" and pose is not None:
+            assert stored is not None
+            self.anchor, self.tip, self.residual = stored, stored.tip, stored.residual
             self._then = "check"
             self.step = "tip" if self.tip is None else "check"
         if self.anchor is None or self.anchor.id != id:
             return ""
-        if seen is None:
+        if pose is None:
             if self.step in ("done", "check"):
-                self._back, self.step, self._seen = self.step, "lost", None
+                self._back, self.step, self._anchor_pose = self.step, "lost", None
             return ""
-        if self._seen is None or _crept(self._seen, seen):
-            self._seen, self.place = seen, after(seen, self.anchor.transform)
+        if self._anchor_pose is None or _crept(self._anchor_pose, pose):
+            self._anchor_pose, self.place = pose, after(pose, self.anchor.transform)
         self.step = self._back if self.step == "lost" else self.step
         return ""
 
@@ -184,73 +186,73 @@ class Aligner:
 
     def _leave_anchor(self) -> None:
         self._former = self.anchor.id if self.anchor is not None else self._former
-        self.anchor = self._seen = None
+        self.anchor = self._anchor_pose = None
 
     # --- steps
 
-    def _turned(self, held: Held | None) -> None:
+    def _turned(self, controller: ControllerPose | None) -> None:
         poses = self._poses
-        if held is None or (poses and angle_between(poses[-1].quaternion, held.quaternion) < TURNED):
+        if controller is None or (poses and angle_between(poses[-1].quaternion, controller.quaternion) < TURNED):
             return
-        poses.append(held)
+        poses.append(controller)
         if len(poses) < POSES:
             return
         try:
-            found = tip_of(*(np.array([one[index] for one in poses]) for index in (0, 1)))
+            tip = tip_of(*(np.array([pose[index] for pose in poses]) for index in (0, 1)))
         except InputError as error:
-            self.said = f"{str(error)[:1].upper()}{str(error)[1:]}."
+            self.message = f"{str(error)[:1].upper()}{str(error)[1:]}."
             del poses[: POSES // 4]  # it may rest by now
             return
-        x, y, z = (float(value) for value in found.place)
-        self.tip, self.step, self.said = (x, y, z), self._then, f"The tip is found, within {_mm(found.missed)}."
+        x, y, z = (float(value) for value in tip.place)
+        self.tip, self.step, self.message = (x, y, z), self._then, f"The tip is found, within {_mm(tip.missed)}."
         self._poses = []
 
     def _touched(self, point: np.ndarray, mark: np.ndarray) -> None:
         reference, base = self._reference, self._base
         if any(np.linalg.norm(mark - other) < self.settings.apart for other in base):
-            self.said = "Move the robot further before the next touch."
+            self.message = "Move the robot further before the next touch."
             return
         reference.append(point)
         base.append(mark)
-        self.said = f"Touch {len(base)} is heard."
+        self.message = f"Touch {len(base)} is heard."
         if len(base) < self.settings.places:
             return
-        touched, known = np.array(reference), np.array(base)
-        wrong = suspect(touched, known)
+        touched, marks = np.array(reference), np.array(base)
+        wrong = suspect(touched, marks)
         if wrong is not None:
-            self.said = f"Touch {wrong.index + 1} is {_mm(wrong.off)} off the others; touch there again."
+            self.message = f"Touch {wrong.index + 1} is {_mm(wrong.off)} off the others; touch there again."
             del reference[wrong.index], base[wrong.index]
             return
         try:
-            pose = fit(touched, known)
+            pose = fit(touched, marks)
         except InputError as error:
-            self.said = f"{str(error)[:1].upper()}{str(error)[1:]}."
+            self.message = f"{str(error)[:1].upper()}{str(error)[1:]}."
             del reference[-1], base[-1]
             return
         level, most = np.degrees(tilt(pose)), self.settings.level_deg
         if level > most:
             self._forget()
-            self.said = f"The headset’s vertical is {level:.1f}° off the robot’s, more than {most:g}°: touch again."
+            self.message = f"The headset’s vertical is {level:.1f}° off the robot’s, more than {most:g}°: touch again."
             return
-        self.expected = expected_error(pose, touched, known, np.array(self.settings.at))
-        missed = float(np.sqrt(np.mean(residuals(pose, touched, known) ** 2)))
-        said = f"Aligned; expected error {_mm(self.expected)} where the arm works."
-        self._placed(inverse(pose), missed, self.expected, self.unfit or said)
-        self.said = self.unfit or said
+        self.expected = expected_error(pose, touched, marks, np.array(self.settings.at))
+        missed = float(np.sqrt(np.mean(residuals(pose, touched, marks) ** 2)))
+        message = f"Aligned; expected error {_mm(self.expected)} where the arm works."
+        self._placed(inverse(pose), missed, self.expected, self.unfit or message)
+        self.message = self.unfit or message
 
     def _checked(self, point: np.ndarray, mark: np.ndarray) -> None:
         assert self.place is not None
         off, limit = float(np.linalg.norm(in_base(inverse(self.place), point) - mark)), self.settings.limit
         self.expected = off
         if off <= limit:
-            self.step, self.said = "done", f"The base is within {_mm(off)} of where it was."
+            self.step, self.message = "done", f"The base is within {_mm(off)} of where it was."
             return
         self.touch()
         self.step = "touch"  # the tip is known
-        self.said = f"The touch is {_mm(off)} off, more than {_mm(limit)}: align again."
+        self.message = f"The touch is {_mm(off)} off, more than {_mm(limit)}: align again."
 
-    def _placed(self, place: Pose, residual: float | None, expected: float | None, said: str) -> None:
-        self.place, self.residual, self.expected, self.said = place, residual, expected, said
+    def _placed(self, place: Pose, residual: float | None, expected: float | None, message: str) -> None:
+        self.place, self.residual, self.expected, self.message = place, residual, expected, message
         self.step = "done"
         self.fasten = not self.unfit  # what is not good enough today is not kept for tomorrow
         self._leave_anchor()
@@ -261,8 +263,8 @@ def _mm(metres: float) -> str:
 
 
 def _is_pose(pose: Pose) -> bool:
-    found = np.array([*pose.position, *pose.quaternion])
-    return bool(np.isfinite(found).all() and abs(np.linalg.norm(found[3:]) - 1) <= UNIT)
+    values = np.array([*pose.position, *pose.quaternion])
+    return bool(np.isfinite(values).all() and abs(np.linalg.norm(values[3:]) - 1) <= UNIT)
 
 
 def _crept(before: Pose, now: Pose) -> bool:

@@ -37,28 +37,28 @@ class Anchors:
         Raises:
             InputError: the file holds something else.
         """
-        self.path, self.kept, self._saving = path, tuple[Anchor, ...](), threading.Lock()
+        self.path, self.stored, self._saving = path, tuple[Anchor, ...](), threading.Lock()
         if not path.is_file():
             return
         try:
-            self.kept = tuple(_FILE.validate_json(path.read_bytes()))
+            self.stored = tuple(_FILE.validate_json(path.read_bytes()))
         except ValidationError as error:
             first = error.errors()[0]
             where = ".".join(map(str, first["loc"])) or "the whole"
             raise InputError(f"{path}: {where}: {first['msg']}, expected anchors of live sessions") from error
 
     def find(self, id: str) -> Anchor | None:
-        return next((anchor for anchor in self.kept if anchor.id == id), None)
+        return next((anchor for anchor in self.stored if anchor.id == id), None)
 
     @property
     def newest(self) -> str:
         """Its id, "" where there is none."""
-        return self.kept[-1].id if self.kept else ""
+        return self.stored[-1].id if self.stored else ""
 
     def keep(self, anchor: Anchor) -> None:
         """From now on; the oldest goes where there are too many. `save` writes them."""
-        others = [one for one in self.kept if one.id != anchor.id]
-        self.kept = (*others, anchor)[-MOST:]
+        others = [stored for stored in self.stored if stored.id != anchor.id]
+        self.stored = (*others, anchor)[-MOST:]
 
     def save(self) -> None:
         """Whole or not at all.
@@ -69,4 +69,4 @@ class Anchors:
         with self._saving:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             with written_whole(self.path) as part:
-                part.write_bytes(_FILE.dump_json(list(self.kept), indent=1) + b"\n")
+                part.write_bytes(_FILE.dump_json(list(self.stored), indent=1) + b"\n")

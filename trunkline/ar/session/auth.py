@@ -26,9 +26,9 @@ def make_token() -> str:
     return secrets.token_urlsafe(TOKEN_BYTES)
 
 
-def same(found: str, expected: str) -> bool:
+def same(value: str, expected: str) -> bool:
     """In a time that tells nothing."""
-    return secrets.compare_digest(found.encode(), expected.encode())
+    return secrets.compare_digest(value.encode(), expected.encode())
 
 
 @dataclass

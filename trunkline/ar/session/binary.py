@@ -27,7 +27,7 @@ MARKERS = ("left_ray", "right_ray", "rigid_target", "tip_target")
 
 
 @dataclass(frozen=True)
-class Kind:
+class BinaryMessage:
     """A binary message. row: the float32 numbers of a row. flags: by bit, from the lowest. The three others say in
     words what fields of the head hold."""
 
@@ -40,30 +40,34 @@ class Kind:
 
 
 FROM_SERVER = {
-    "robot": Kind(
+    "robot": BinaryMessage(
         1, POSE, ("moving", "stopped", "stale"), "rows: the bodies of the scene, then the markers",
         "number of the frame", "s of the server's clock at which the robot was so",
     ),
-    "preview": Kind(
+    "preview": BinaryMessage(
         2, POSE, ("last",), "bodies of the scene; as many rows for each frame of the piece, one frame after the other",
         "number of the piece's first frame in the preview", "s of the plan at that frame",
     ),
-    "shell": Kind(
+    "shell": BinaryMessage(
         3, POINT, (), "rows: points of the reach of the tip, `around` × `along` of the scene, along fastest; in the "
         "frame of the marker rigid_target", "number of the shell", "s of the server's clock",
     ),
 }  # fmt: skip
 FROM_CLIENT = {
-    "input": Kind(
+    "input": BinaryMessage(
         16, HAND, ("left_tracked", "right_tracked", "visible"), "2: the left, then the right hand",
         "binary messages received so far, on this connection", "s of the client's clock at which the poses were so",
     ),
-    "view": Kind(
+    "view": BinaryMessage(
         19, POSE, ("tracked",), "1: the viewer's eyes, in the client's reference frame",
         "binary messages received so far, on this connection", "s of the client's clock at which they were there",
     ),
-    "ack": Kind(17, (), (), "0", "binary messages received so far, on this connection", "s of the client's clock"),
-    "stop": Kind(18, (), (), "0", "binary messages received so far, on this connection", "s of the client's clock"),
+    "ack": BinaryMessage(
+        17, (), (), "0", "binary messages received so far, on this connection", "s of the client's clock"
+    ),
+    "stop": BinaryMessage(
+        18, (), (), "0", "binary messages received so far, on this connection", "s of the client's clock"
+    ),
 }  # fmt: skip
 
 _CODES = {"u8": "B", "u16": "H", "u32": "I", "f64": "d"}

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Literal, get_args, get_origin
 
 from trunkline.ar.session import binary, messages
-from trunkline.ar.session.binary import Kind
+from trunkline.ar.session.binary import BinaryMessage
 from trunkline.errors import InputError, in_one_line
 
 MODULE, PAGE = Path("client/src/wire_table.js"), Path("docs/live-sessions.md")
@@ -38,14 +38,14 @@ def table() -> dict:
         "MARKERS": list(binary.MARKERS),
         "FROM_SERVER": {name: _kind(kind) for name, kind in binary.FROM_SERVER.items()},
         "FROM_CLIENT": {name: _kind(kind) for name, kind in binary.FROM_CLIENT.items()},
-        "SAID": {_type(kind): _fields(kind) for kind in messages.SAID},
-        "ANSWERS": {_type(kind): _fields(kind) for kind in messages.ANSWERS},
+        "SAID": {_type(kind): _fields(kind) for kind in messages.CLIENT_MESSAGES},
+        "ANSWERS": {_type(kind): _fields(kind) for kind in messages.SERVER_MESSAGES},
     }
 
 
 def module() -> str:
     """The client's, in JavaScript."""
-    lines = [f"// Written by `{COMMAND}` from trunkline/ar/session/binary.py and talk.py; do not edit."]
+    lines = [f"// Written by `{COMMAND}` from trunkline/ar/session/binary.py and messages.py; do not edit."]
     for name, value in table().items():
         lines.append(f"export const {name} = {json.dumps(value, indent=2 if isinstance(value, dict) else None)};")
     return "\n".join(lines) + "\n"
@@ -58,8 +58,8 @@ def blocks() -> dict[str, str]:
         "wire_head": "\n".join(head),
         "wire_server": _kinds(binary.FROM_SERVER),
         "wire_client": _kinds(binary.FROM_CLIENT),
-        "wire_said": _messages(messages.SAID),
-        "wire_answers": _messages(messages.ANSWERS),
+        "wire_said": _messages(messages.CLIENT_MESSAGES),
+        "wire_answers": _messages(messages.SERVER_MESSAGES),
     }
 
 
@@ -71,31 +71,31 @@ def written(page: str) -> str:
     """
     for name, text in blocks().items():
         begin, end = f"<!-- {name} -->", f"<!-- /{name} -->"
-        before, found, rest = page.partition(begin)
+        before, opened, rest = page.partition(begin)
         _, closed, after = rest.partition(end)
-        if not found or not closed:
+        if not opened or not closed:
             raise InputError(f"{PAGE}: found no block {begin} … {end}")
         page = f"{before}{begin}\n{text}\n{end}{after}"
     return page
 
 
-def _kind(kind: Kind) -> dict:
+def _kind(kind: BinaryMessage) -> dict:
     return {"type": kind.number, "row": list(kind.row), "flags": {name: 1 << n for n, name in enumerate(kind.flags)}}
 
 
 def _type(kind: type) -> str:
-    return next(str(one.default) for one in fields(kind) if one.name == "type")
+    return next(str(field.default) for field in fields(kind) if field.name == "type")
 
 
 def _fields(kind: type) -> dict:
     """Field to what is missing: "required", or the default."""
     return {
-        one.name: "required" if one.default is MISSING and one.default_factory is MISSING else one.default
-        for one in fields(kind)
+        field.name: "required" if field.default is MISSING and field.default_factory is MISSING else field.default
+        for field in fields(kind)
     }
 
 
-def _kinds(kinds: dict[str, Kind]) -> str:
+def _kinds(kinds: dict[str, BinaryMessage]) -> str:
     lines = ["| message | type | flags, from bit 0 | count | sequence | time | a row, float32 |", "|---" * 7 + "|"]
     for name, kind in kinds.items():
         row, flags = ", ".join(kind.row) or "–", ", ".join(kind.flags) or "–"
@@ -106,9 +106,9 @@ def _kinds(kinds: dict[str, Kind]) -> str:
 def _messages(kinds: tuple[type, ...]) -> str:
     lines = ["| `type` | fields | what |", "|---|---|---|"]
     for kind in kinds:
-        names = ", ".join(f"`{one.name}`{_choice(one.type)}" for one in fields(kind) if one.name != "type")
-        told = " ".join((kind.__doc__ or "").split())
-        lines.append(f"| `{_type(kind)}` | {names or '–'} | {told} |")
+        names = ", ".join(f"`{field.name}`{_choice(field.type)}" for field in fields(kind) if field.name != "type")
+        summary = " ".join((kind.__doc__ or "").split())
+        lines.append(f"| `{_type(kind)}` | {names or '–'} | {summary} |")
     return "\n".join(lines)
 
 

@@ -6,13 +6,13 @@ import numpy as np
 from trunkline.ar.hybrid.rollouts import Piece
 
 
-def drawn(model: mujoco.MjModel) -> tuple[str, ...]:
+def drawn_bodies(model: mujoco.MjModel) -> tuple[str, ...]:
     """Names of the bodies that have geoms and move, in the model's order; the object is there or not."""
     with_geoms = sorted({int(body) for body in model.geom_bodyid if body})
     return tuple(model.body(body).name for body in with_geoms)
 
 
-class Poses:
+class BodyPoses:
     """Poses (N, 7) of the bodies `names` of a model, position and quaternion, w first; NaN of those that it lacks."""
 
     def __init__(self, model: mujoco.MjModel, names: tuple[str, ...]) -> None:
@@ -25,10 +25,10 @@ class Poses:
         """At `qpos` (nq,)."""
         self._data.qpos[:] = qpos
         mujoco.mj_kinematics(self._model, self._data)
-        found = np.full((self._count, 7), np.nan)
-        found[self._there, :3] = self._data.xpos[self._numbers]
-        found[self._there, 3:] = self._data.xquat[self._numbers]
-        return found
+        poses = np.full((self._count, 7), np.nan)
+        poses[self._there, :3] = self._data.xpos[self._numbers]
+        poses[self._there, 3:] = self._data.xquat[self._numbers]
+        return poses
 
     def of_piece(self, piece: Piece) -> np.ndarray:
         """Of its first future. Shape (F, N, 7), float32."""

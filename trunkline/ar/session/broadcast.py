@@ -3,7 +3,7 @@
 import numpy as np
 
 from trunkline.ar.session import binary, messages, preview_process
-from trunkline.ar.session.controller import Desk
+from trunkline.ar.session.controller import SessionController
 from trunkline.ar.session.robot import STALE
 from trunkline.ar.session.scene import Shells
 from trunkline.ar.teleop.alignment import base_quaternion
@@ -13,35 +13,35 @@ STATES = 0.1  # s between states that tell no new mode
 TURNED = np.cos(np.radians(1.0))  # of gravity in the soft base, from which on there is a new shell
 
 
-class Showing:
+class Broadcast:
     """frames: of the robot so far. shell: of the tip's reach, the newest; empty where there are none."""
 
-    def __init__(self, desk: Desk, shells: Shells | None) -> None:
+    def __init__(self, controller: SessionController, shells: Shells | None) -> None:
         self.frames, self.shell = 0, b""
-        self._desk, self._shells = desk, shells
-        self._said: tuple[float, messages.State | None] = (0.0, None)
+        self._controller, self._shells = controller, shells
+        self._sent: tuple[float, messages.StateMessage | None] = (0.0, None)
         self._down, self._shelled = None, 0
 
     def robot(self, now: float) -> bytes:
         """A frame of its bodies and of the markers."""
-        desk, standing = self._desk, self._desk.robot.standing()
-        assert desk.intent is not None
+        controller, robot_state = self._controller, self._controller.robot.robot_state()
+        assert controller.intent is not None
         self.frames += 1
-        rows = np.concatenate([standing.bodies, desk.markers()])
+        rows = np.concatenate([robot_state.bodies, controller.markers()])
         flags = {
             name
             for name, is_set in (
-                ("moving", desk.robot.state().mode == "running"),
-                ("stopped", desk.intent.mode == "stopped"),
-                ("stale", now - standing.time > STALE),
+                ("moving", controller.robot.state().mode == "running"),
+                ("stopped", controller.intent.mode == "stopped"),
+                ("stale", now - robot_state.time > STALE),
             )
             if is_set
         }
-        return binary.frame("robot", flags, len(rows), self.frames & 0xFFFFFFFF, standing.time, rows)
+        return binary.frame("robot", flags, len(rows), self.frames & 0xFFFFFFFF, robot_state.time, rows)
 
     def new_shell(self, now: float) -> bytes:
         """Of the tip's reach, where gravity has turned; else nothing."""
-        intent, shells = self._desk.intent, self._shells
+        intent, shells = self._controller.intent, self._shells
         if shells is None or intent is None:
             return b""
         down = np.array(DOWN)
@@ -55,21 +55,21 @@ class Showing:
         self.shell = binary.frame("shell", set(), len(points), self._shelled, now, points)
         return self.shell
 
-    def new_state(self, now: float, holder: str) -> messages.State | None:
+    def new_state(self, now: float, holder: str) -> messages.StateMessage | None:
         """What has changed, a new mode at once, all else every STATES; None where nothing is to be told."""
-        (since, before), intent, robot = self._said, self._desk.intent, self._desk.robot.state()
+        (since, before), intent, robot = self._sent, self._controller.intent, self._controller.robot.state()
         assert intent is not None
         urgent = before is None or (intent.mode, robot.mode, robot.fault) != (before.mode, before.robot, before.fault)
         if not urgent and now - since < STATES:
             return None
-        state = self._desk.told(holder)
+        state = self._controller.state_message(holder)
         if state == before:
             return None
-        self._said = now, state
+        self._sent = now, state
         return state
 
 
-def piece(shown: preview_process.Shown) -> bytes:
+def piece(shown: preview_process.PreviewPiece) -> bytes:
     """Of a preview."""
     flags = {"last"} if shown.last else set()
     return binary.frame("preview", flags, shown.poses.shape[1], shown.first, shown.time, shown.poses)

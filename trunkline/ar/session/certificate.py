@@ -20,7 +20,7 @@ def make_certificate(names: list[str]) -> tuple[bytes, bytes]:
     """A self-signed leaf on P-256 for DNS names and IP addresses, and its key, both PEM."""
     key, now = ec.generate_private_key(ec.SECP256R1()), datetime.now(UTC)
     name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "Trunkline")])
-    found = (
+    certificate = (
         x509.CertificateBuilder()
         .subject_name(name)
         .issuer_name(name)
@@ -28,13 +28,13 @@ def make_certificate(names: list[str]) -> tuple[bytes, bytes]:
         .serial_number(x509.random_serial_number())
         .not_valid_before(now - timedelta(hours=1))
         .not_valid_after(now + timedelta(days=DAYS))
-        .add_extension(x509.SubjectAlternativeName([_alternative(one) for one in names]), critical=False)
+        .add_extension(x509.SubjectAlternativeName([_alternative(host) for host in names]), critical=False)
         .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
         .add_extension(x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH]), critical=False)
         .sign(key, hashes.SHA256())
     )
     pem = key.private_bytes(serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption())
-    return found.public_bytes(serialization.Encoding.PEM), pem
+    return certificate.public_bytes(serialization.Encoding.PEM), pem
 
 
 def tls_context(certificate: bytes, key: bytes) -> ssl.SSLContext:

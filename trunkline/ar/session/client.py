@@ -8,14 +8,14 @@ from dataclasses import dataclass, field
 from aiohttp import WSCloseCode, web
 
 from trunkline.ar.session import messages
-from trunkline.ar.session.alignment_procedure import Aligner
+from trunkline.ar.session.alignment_procedure import AlignmentProcedure
 from trunkline.ar.session.clock import EVERY, PINGS, ClientClock
 from trunkline.ar.session.controller import HERE
 from trunkline.ar.session.outbox import Outbox
 from trunkline.ar.teleop.messages import Pose
 
 PER_SECOND, BURST = 400.0, 400.0  # messages
-SAID_AGAIN = 1.0  # s until the same refusal is said again
+REPEAT_AFTER = 1.0  # s until the same refusal is said again
 PING_GAP = 0.03  # s
 
 
@@ -27,7 +27,7 @@ class Client:
     name: str
     space: str
     socket: web.WebSocketResponse
-    aligner: Aligner | None  # None for who is in the base frame
+    procedure: AlignmentProcedure | None  # None for who is in the base frame
     outbox: Outbox = field(default_factory=Outbox)
     clock: ClientClock = field(default_factory=ClientClock)
     left: float = BURST
@@ -39,12 +39,12 @@ class Client:
     @property
     def alignment(self) -> Pose | None:
         """Of its reference frame in the base, None where that is not known."""
-        return HERE if self.aligner is None else self.aligner.alignment
+        return HERE if self.procedure is None else self.procedure.alignment
 
     @property
     def unfit(self) -> str:
         """Why its alignment is not good enough to execute anything."""
-        return "" if self.aligner is None else self.aligner.unfit
+        return "" if self.procedure is None else self.procedure.unfit
 
     def count(self, now: float) -> None:
         """One more message."""
@@ -54,7 +54,7 @@ class Client:
     def refuse(self, reason: str, now: float) -> bool:
         """Say it in one line; whether it was said, which is the same no oftener than every SAID_AGAIN."""
         kind = reason.partition(":")[0]
-        if kind in self.refused and now - self.refused[kind] < SAID_AGAIN:
+        if kind in self.refused and now - self.refused[kind] < REPEAT_AFTER:
             return False
         self.refused[kind] = now
         self.outbox.say(messages.tell(messages.Refusal(reason)))

@@ -10,15 +10,15 @@ from trunkline.ar.preview.package import Package, read_package
 from trunkline.ar.preview.preview_twin import compose_twin, robot_model_of
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import preview_process, simulated
-from trunkline.ar.session.bodies import drawn
-from trunkline.ar.session.controller import Desk
+from trunkline.ar.session.bodies import drawn_bodies
+from trunkline.ar.session.controller import SessionController
 from trunkline.ar.session.hardware import Hardware
 from trunkline.ar.session.log_format import SIMULATED, Subject
-from trunkline.ar.session.log_writer import JournalProcess, new_path
-from trunkline.ar.session.preview_process import ForeseerProcess
+from trunkline.ar.session.log_writer import LogWriterProcess, new_path
+from trunkline.ar.session.preview_process import PreviewProcess
 from trunkline.ar.session.robot import RobotProcess
 from trunkline.ar.session.scene import Shells, scene
-from trunkline.ar.session.settings import Config
+from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.session.simulated import Simulation
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.core import Teleoperation
@@ -35,30 +35,30 @@ BELOW, AROUND = 1.0, 3.0  # m, of the floor as a solid
 
 
 @dataclass(frozen=True)
-class Made:
+class SessionParts:
     """What a server serves, and the processes behind it."""
 
-    desk: Desk
+    controller: SessionController
     package: str
     scene: dict
     shells: Shells | None
     robot: RobotProcess
-    planning: ForeseerProcess
-    journal: JournalProcess
+    planning: PreviewProcess
+    log_writer: LogWriterProcess
 
     def close(self) -> None:
         self.robot.close()  # first: it may be moving
         self.planning.close()
-        self.journal.close()
+        self.log_writer.close()
 
 
 def make(
     path: Path,
     teleop: Teleop,
-    config: Config,
+    config: SessionConfig,
     heard: Callable[[preview_process.Answer | None], None],
     hardware: Hardware | None = None,
-) -> Made:
+) -> SessionParts:
     """Of the package at `path`, the robot simulated, or as `hardware` has it.
 
     Args:
@@ -72,16 +72,16 @@ def make(
     simulation, maps = simulation_of(package, teleop, config, joints), unpacked.maps_of(package.files)
     world = make_world(solids(config), () if config.thing is None else (config.thing,))
     setup = path.resolve(), teleop, config.preview, simulation.bodies, world
-    planning = ForeseerProcess(preview_process.run, setup, heard)  # first: it takes longest until it is ready
+    planning = PreviewProcess(preview_process.run, setup, heard)  # first: it takes longest until it is ready
     drawing = scene(simulation.twin.model, simulation.bodies, maps, package.geometry.length)
     subject = subject_of(simulation, hardware)
-    journal = JournalProcess(new_path(Path(config.journal.folder)), subject, config.journal.period)
+    log_writer = LogWriterProcess(new_path(Path(config.journal.folder)), subject, config.journal.period)
     robot = robot_of(simulation, hardware)
     core = Teleoperation(teleop.core, package.reach, package.digest, teleop.mount_offset)
-    desk = Desk(core, robot, planning, world, teleop.handling.lift, journal, package.period)
-    desk.begin(config.rate)
-    journal.await_begun()
-    return Made(desk, package.digest, drawing, Shells.of(maps), robot, planning, journal)
+    controller = SessionController(core, robot, planning, world, teleop.handling.lift, log_writer, package.period)
+    controller.begin(config.rate)
+    log_writer.await_begun()
+    return SessionParts(controller, package.digest, drawing, Shells.of(maps), robot, planning, log_writer)
 
 
 def subject_of(simulation: Simulation, hardware: Hardware | None = None) -> Subject:
@@ -105,17 +105,17 @@ def robot_of(simulation: Simulation, hardware: Hardware | None) -> RobotProcess:
     return RobotProcess(simulated.run, (simulation,), tendons, bodies, simulation.limits, simulation.package)
 
 
-def simulation_of(package: Package, teleop: Teleop, config: Config, joints: np.ndarray) -> Simulation:
+def simulation_of(package: Package, teleop: Teleop, config: SessionConfig, joints: np.ndarray) -> Simulation:
     """The simulated robot, at rest at `joints` (7,), rad, with its arm straight."""
-    known = robot_model_of(config.preview, package.files)
+    robot_model = robot_model_of(config.preview, package.files)
     world = make_world(solids(config))
-    twin = compose_twin(known, world, config.thing, joints, package.straight, config.preview)
+    twin = compose_twin(robot_model, world, config.thing, joints, package.straight, config.preview)
     limits = limits_of(teleop.motors, package.rate_limit, len(package.straight))
-    bodies, offset = drawn(twin.model), teleop.mount_offset
+    bodies, offset = drawn_bodies(twin.model), teleop.mount_offset
     return Simulation(twin, joints, package.straight, bodies, limits, package.digest, offset)
 
 
-def solids(config: Config) -> tuple[Box, ...]:
+def solids(config: SessionConfig) -> tuple[Box, ...]:
     """What stands around the robot: the floor, and the boxes."""
     floor = Box("the floor", (-AROUND, -AROUND, config.floor - BELOW), (AROUND, AROUND, config.floor))
     return floor, *config.boxes

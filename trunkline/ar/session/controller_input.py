@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from trunkline.ar.session.alignment_procedure import Held
+from trunkline.ar.session.alignment_procedure import ControllerPose
 from trunkline.ar.session.binary import HAND, HANDS, Received
 from trunkline.ar.teleop.input_validation import fault_of
 from trunkline.ar.teleop.messages import Controller
@@ -35,17 +35,17 @@ def buttons(received: Received) -> bytes:
     return (received.hands.take(_BUTTONS, axis=1) >= PRESSED).tobytes()
 
 
-def held(received: Received, side: str) -> Held | None:
+def controller_pose(received: Received, side: str) -> ControllerPose | None:
     """The pose of a hand's controller, None where it is not tracked or is no pose."""
     if not {f"{side}_tracked", "visible"} <= received.flags:
         return None
     x, y, z, a, b, c, d = (float(value) for value in received.hands[HANDS.index(side)][:7])
-    found = Controller((x, y, z), (a, b, c, d))
-    return None if fault_of(found) else Held(found.position, unit(found.quaternion))
+    controller = Controller((x, y, z), (a, b, c, d))
+    return None if fault_of(controller) else ControllerPose(controller.position, unit(controller.quaternion))
 
 
 def _controller(hand: np.ndarray, tracked: bool) -> Controller:
     x, y, z, a, b, c, d = (float(value) for value in hand[:7])
     stick_x, stick_y = (float(value) for value in hand[STICK : STICK + 2])
-    held = {name: bool(hand[_AT[name]] >= PRESSED) for name in BUTTONS}
-    return Controller((x, y, z), (a, b, c, d), tracked, stick=(stick_x, stick_y), **held)
+    pressed = {name: bool(hand[_AT[name]] >= PRESSED) for name in BUTTONS}
+    return Controller((x, y, z), (a, b, c, d), tracked, stick=(stick_x, stick_y), **pressed)

@@ -4,7 +4,7 @@ from collections import deque
 
 import numpy as np
 
-from trunkline.ar.session.robot import Standing
+from trunkline.ar.session.robot import RobotState
 
 SELDOM = 0.25  # s between two that are kept then
 AFTER = 10.0  # s of rest that are kept whole: shapes at rest are identified from them
@@ -13,17 +13,17 @@ STILL = 3e-4  # m, rad, of quaternions: what nothing moves by within SELDOM; a t
 NOWHERE = -1e3  # in place of what is not seen: it has moved once it is
 
 
-class Resting:
+class LogDecimation:
     """Keeps all standings of a robot that moves; those at rest it keeps so late that a motion could still follow."""
 
     def __init__(self) -> None:
-        self._waiting: deque[tuple[Standing, float]] = deque()
-        self._sent, self._seen, self._since = np.empty(0), np.empty(0), -np.inf
-        self._whole, self._kept = -np.inf, -np.inf  # s until which all is kept, of the last that was
+        self._waiting: deque[tuple[RobotState, float]] = deque()
+        self._sent, self._measured, self._since = np.empty(0), np.empty(0), -np.inf
+        self._whole, self._last_time = -np.inf, -np.inf  # s until which all is kept, of the last that was
 
-    def take(self, robot: Standing, told: float) -> list[tuple[Standing, float]]:
+    def take(self, robot: RobotState, now: float) -> list[tuple[RobotState, float]]:
         """What is to be kept now, each with the s at which it was told, in their order."""
-        self._waiting.append((robot, told))
+        self._waiting.append((robot, now))
         self._look(robot)
         if robot.time < self._whole:
             return self.rest()
@@ -31,28 +31,28 @@ class Resting:
         if robot.time - first.time < BEFORE:
             return []
         self._waiting.popleft()
-        if first.time - self._kept < SELDOM:
+        if first.time - self._last_time < SELDOM:
             return []
-        self._kept = first.time
+        self._last_time = first.time
         return [oldest]
 
-    def rest(self) -> list[tuple[Standing, float]]:
+    def rest(self) -> list[tuple[RobotState, float]]:
         """What waits."""
-        found = list(self._waiting)
+        waiting = list(self._waiting)
         self._waiting.clear()
-        if found:
-            self._kept = found[-1][0].time
-        return found
+        if waiting:
+            self._last_time = waiting[-1][0].time
+        return waiting
 
-    def _look(self, robot: Standing) -> None:
+    def _look(self, robot: RobotState) -> None:
         """Whether it moves: it is sent anything new, or is seen elsewhere than shortly before."""
         measured = [axes for axes in (robot.measured, robot.lengths) if axes is not None]
         sent = np.concatenate([robot.joints, robot.commands])
-        seen = np.concatenate([*measured, robot.bodies.ravel()])
-        seen[np.isnan(seen)] = NOWHERE
-        rests = np.array_equal(sent, self._sent) and seen.shape == self._seen.shape
-        rests = rests and np.abs(seen - self._seen).max(initial=0.0) <= STILL
+        measured_now = np.concatenate([*measured, robot.bodies.ravel()])
+        measured_now[np.isnan(measured_now)] = NOWHERE
+        rests = np.array_equal(sent, self._sent) and measured_now.shape == self._measured.shape
+        rests = rests and np.abs(measured_now - self._measured).max(initial=0.0) <= STILL
         if not rests:
             self._whole = robot.time + AFTER
         if not rests or robot.time - self._since >= SELDOM:
-            self._sent, self._seen, self._since = sent, seen, robot.time
+            self._sent, self._measured, self._since = sent, measured_now, robot.time

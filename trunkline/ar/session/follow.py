@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from trunkline.ar.session.preview_process import Found, Seek
+from trunkline.ar.session.preview_process import FollowAnswer, FollowRequest
 from trunkline.ar.teleop.following import KNOT
 from trunkline.ar.teleop.messages import Targets, World
 from trunkline.ar.teleop.targets import why_not
@@ -13,11 +13,13 @@ from trunkline.ar.teleop.trajectory import JOINTS
 SILENT = 1.0  # s; a busy machine answers within 0.5
 
 
-class Seeking:
+class FollowControl:
     """`order` asks for axes; `hear` takes them, with the s since their targets. refused: why the newest targets are
     not followed, "" where they are."""
 
-    def __init__(self, order: Callable[[Seek], None], hear: Callable[[float, np.ndarray | None], None]) -> None:
+    def __init__(
+        self, order: Callable[[FollowRequest], None], hear: Callable[[float, np.ndarray | None], None]
+    ) -> None:
         self._order, self._hear = order, hear
         self._now, self._serial = 0.0, 0
         self.end()
@@ -26,7 +28,7 @@ class Seeking:
         """Nothing is followed; what is still being sought counts no more."""
         self.refused, self._begun, self._last = "", False, -np.inf
         self._times: dict[int, float] = {}  # of what is being sought
-        self._found: list[tuple[float, np.ndarray | None]] = []  # before the robot may follow
+        self._pending: list[tuple[float, np.ndarray | None]] = []  # before the robot may follow
         self._near: np.ndarray | None = None
 
     @property
@@ -47,15 +49,15 @@ class Seeking:
         self._serial, self._last = self._serial + 1, self._now
         self._times[self._serial] = self._now
         near = joints if self._near is None else self._near
-        self._order(Seek(self._serial, None if why_not(targets) else targets, near, world))
+        self._order(FollowRequest(self._serial, None if why_not(targets) else targets, near, world))
 
     def begin(self) -> None:
         """The robot follows from now on, and hears what was found so far."""
         self._begun = True
-        while self._found:
-            self._tell(*self._found.pop(0))
+        while self._pending:
+            self._tell(*self._pending.pop(0))
 
-    def found(self, answer: Found) -> None:
+    def answer(self, answer: FollowAnswer) -> None:
         """What was sought; of an older following it is nothing."""
         time = self._times.pop(answer.serial, None)
         if time is None:
@@ -66,7 +68,7 @@ class Seeking:
         if self._begun:
             self._tell(time, answer.axes)
         else:
-            self._found.append((time, answer.axes))
+            self._pending.append((time, answer.axes))
 
     def _tell(self, time: float, axes: np.ndarray | None) -> None:
         self._hear(self._now - time, axes)

@@ -9,7 +9,7 @@ import gc
 NEVER = 2**31 - 1  # collections of young objects before one of all
 
 
-class Garbage:
+class GCPolicy:
     """Of the server's process."""
 
     def __init__(self) -> None:

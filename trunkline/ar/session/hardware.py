@@ -8,7 +8,7 @@ from trunkline.ar.drivers.driver_client import ArmSettings
 from trunkline.ar.drivers.motors import MotorSettings
 from trunkline.ar.drivers.ros_settings import RosSettings
 from trunkline.ar.drivers.setpoint_filter import LIMITS, RobotLimits
-from trunkline.ar.drivers.settings import Config
+from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.ar.drivers.simulated_motors import SIMULATED
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.errors import InputError
@@ -45,10 +45,12 @@ class Hardware:
         """Of the robot, a Panda's where none is named."""
         return LIMITS["fr3" if self.robot == "fr3" else "panda"]
 
-    def kept_by(self, teleop: Teleop) -> Teleop:
+    def slow_enough(self, teleop: Teleop) -> Teleop:
         """`teleop` with plans that are slow enough for the robot: some of an FR3's limits are half of a Panda's."""
-        own, panda = self.limits, LIMITS["panda"]
-        most = min(np.min(getattr(own, what) / getattr(panda, what)) for what in ("velocity", "acceleration", "jerk"))
+        limits, panda = self.limits, LIMITS["panda"]
+        most = min(
+            np.min(getattr(limits, what) / getattr(panda, what)) for what in ("velocity", "acceleration", "jerk")
+        )
         share = min(teleop.motors.share, MARGIN * float(most))
         return replace(teleop, motors=replace(teleop.motors, share=share))
 
@@ -61,7 +63,7 @@ class Hardware:
         return f"{robot}, {motors}"
 
 
-def hardware_of(robot: str, motors: str, bus: str, interface: str, config: Config) -> Hardware | None:
+def hardware_of(robot: str, motors: str, bus: str, interface: str, config: ExecutionConfig) -> Hardware | None:
     """What the options name; None where all is simulated. interface: of python-can, "" for the usual one.
 
     Raises:

@@ -17,7 +17,7 @@ from rosbags.typesys import Stores, get_typestore
 from trunkline.compute.processes import leave_signals_to_parent
 
 POSES, STATIC = "/tf", "/tf_static"
-TWIN = "/tf_twin"  # poses that a twin drew of a real machine: nobody measured them
+TWIN = "/tf_twin"  # poses of the twin of a real robot: not measured
 JOINTS_SENT, JOINTS = "/joints/command", "/joint_states"  # the latter: ROS's name for what is measured
 TENDONS_SENT, TENDONS = "/tendons/command", "/tendons/state"
 HEADSET, PARTS = "/headset/", ("left", "right", "view")
@@ -38,8 +38,8 @@ TYPES = {
 
 
 class Record(NamedTuple):
-    """What is to be written to `topic`: text, or numbers as `Journal` has them, of a time `stamp`, s, told at `logged`,
-    s. frame: that poses are in."""
+    """What is to be written to `topic`: text, or numbers as `LogWriter` has them, of a time `stamp`, s, logged at
+    `logged`, s. frame: that poses are in."""
 
     topic: str
     stamp: float
@@ -70,7 +70,7 @@ class Subject:
 NOTHING = Subject((), (), (), np.empty(0), ("", (0.0, 0.0, 0.0)))
 
 
-class Book:
+class LogFormat:
     """Writes to `file`. `zero`: ns since 1970 at 0 s of the records' clock."""
 
     def __init__(self, file: BinaryIO, subject: Subject, zero: int) -> None:
@@ -147,25 +147,25 @@ def new_file(path: Path) -> BinaryIO:
 
 
 def run(
-    pipe, told, kept, path: Path, subject: Subject, zero: int, period: float, opened: Callable[[Path], BinaryIO]
+    pipe, fault, written, path: Path, subject: Subject, zero: int, period: float, opened: Callable[[Path], BinaryIO]
 ) -> None:  # fmt: skip
-    """The process: until nobody holds the pipe's other end, be it that the server was killed. `told`: why it cannot
-    write; `kept`: how many of the pipe's messages are in the file, from 0 on once it is open."""
+    """The process: until nobody holds the pipe's other end, be it that the server was killed. `fault`: why it cannot
+    write; `written`: how many of the pipe's messages are in the file, from 0 on once it is open."""
     leave_signals_to_parent()
     try:
         with opened(path) as file:
-            book = Book(file, subject, zero)
-            write(book, pipe, kept, period)
-            book.finish()
+            log = LogFormat(file, subject, zero)
+            write(log, pipe, written, period)
+            log.finish()
     except OSError as error:
         text = f"log: {path.name}: {(error.strerror or str(error)).lower()}; nothing is executed"
-        told.value = text.encode()[: TEXT - 1]
+        fault.value = text.encode()[: TEXT - 1]
 
 
-def write(book: Book, pipe, kept, period: float) -> None:
+def write(log: LogFormat, pipe, written, period: float) -> None:
     """All that comes, on the disk every `period` s."""
     due, heard = time.monotonic() + period, 0
-    kept.value = heard
+    written.value = heard
     while True:
         if pipe.poll(max(due - time.monotonic(), 0.0)):
             try:
@@ -173,9 +173,9 @@ def write(book: Book, pipe, kept, period: float) -> None:
             except (EOFError, OSError):
                 return
             for record in records:
-                book.write(record)
+                log.write(record)
             heard += 1
         if time.monotonic() >= due:
-            book.flush()
-            kept.value = heard
+            log.flush()
+            written.value = heard
             due = time.monotonic() + period

@@ -15,29 +15,29 @@ from trunkline.recordings.logs.joint_stream import JointStream, joint_stream
 from trunkline.recordings.logs.log import Log, read_log
 from trunkline.recordings.logs.pose_stream import PoseStream, pose_stream
 
-GIVEN = b',"given":'
+INPUT_KEY = b',"given":'
 
 
-class Step(NamedTuple):
+class LogStep(NamedTuple):
     """Of the core: `time`, s since the log's first step, `dt`, s, and the bytes of its `Input` and `Intent`."""
 
     time: float
     dt: float
-    given: bytes
+    input: bytes
     intent: bytes
 
 
 @dataclass(frozen=True)
-class Logbook:
+class LogReader:
     """`damage`: what is lost, in sentences. zero: ns since 1970 at 0 s of the events' `time`. events: in their order,
-    each with its kind as `event`. poses: of the robot's bodies; of a real machine None, as nobody sees them. twin: as a
-    twin drew them of a real machine. joints: the rigid robot's, as measured."""
+    each with its kind as `event`. poses: of the robot's bodies; None of a real robot, where they are not measured.
+    twin: poses of the twin of a real robot. joints: the rigid robot's, as measured."""
 
     path: Path
     damage: list[str]
     zero: int
     events: list[dict]
-    steps: list[Step]
+    steps: list[LogStep]
     poses: PoseStream | None
     twin: PoseStream | None
     joints: JointStream | None
@@ -49,14 +49,14 @@ class Logbook:
         Raises:
             InputError: there is none.
         """
-        found = next((event for event in self.events if event["event"] == "begin"), None)
-        if found is None:
+        event = next((event for event in self.events if event["event"] == "begin"), None)
+        if event is None:
             raise InputError(f"{self.path}: {EVENTS}: found no event 'begin', expected the log of a live session")
-        return found
+        return event
 
     @property
     def drawn(self) -> PoseStream | None:
-        """The bodies as a page draws them: as they were seen, or where nobody saw them, as a twin drew them."""
+        """The bodies as a page draws them: as measured, or else those of the twin."""
         return self.poses if self.twin is None else self.twin
 
     @property
@@ -65,7 +65,7 @@ class Logbook:
         return self.begin.get("hardware", SIMULATED)
 
 
-def read_logbook(path: Path) -> Logbook:
+def read_session_log(path: Path) -> LogReader:
     """All of it that can be trusted.
 
     Raises:
@@ -82,19 +82,19 @@ def read_logbook(path: Path) -> Logbook:
         raise InputError(f"{path}: {INPUT}: found no step of the core, expected the log of a live session")
     poses, twin = (pose_stream({None: log.topics[name]}) if name in log.topics else None for name in (POSES, TWIN))
     joints = joint_stream(log.topics[JOINTS]) if JOINTS in log.topics else None
-    return Logbook(Path(path), log.damage, zero, events, steps, poses if twin is None else None, twin, joints)
+    return LogReader(Path(path), log.damage, zero, events, steps, poses if twin is None else None, twin, joints)
 
 
-def _steps(log: Log) -> list[Step]:
+def _steps(log: Log) -> list[LogStep]:
     """A last input whose intent was lost is left out."""
-    found, since = [], None
+    steps, since = [], None
     for (heard, logged), (intent, _) in zip(_texts(log, INPUT), _texts(log, INTENT), strict=False):
-        before, there, given = heard.partition(GIVEN)
+        before, there, input = heard.partition(INPUT_KEY)
         if not there:
             raise ValueError(f"{INPUT}: found no input in {heard[:40]!r}")
         since = logged if since is None else since
-        found.append(Step(1e-9 * (logged - since), float(before.removeprefix(b'{"dt":')), given[:-1], intent))
-    return found
+        steps.append(LogStep(1e-9 * (logged - since), float(before.removeprefix(b'{"dt":')), input[:-1], intent))
+    return steps
 
 
 def _texts(log: Log, topic: str) -> list[tuple[bytes, int]]:
@@ -103,10 +103,10 @@ def _texts(log: Log, topic: str) -> list[tuple[bytes, int]]:
     Raises:
         ValueError: one is no std_msgs/String.
     """
-    found = log.topics.get(topic)
-    if found is None:
+    messages = log.topics.get(topic)
+    if messages is None:
         return []
-    return [(_text(m, topic), int(t)) for m, t in zip(found.messages, found.log_times, strict=True)]
+    return [(_text(m, topic), int(t)) for m, t in zip(messages.messages, messages.log_times, strict=True)]
 
 
 def _text(message: bytes, topic: str) -> bytes:

@@ -17,7 +17,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from pydantic import ConfigDict, TypeAdapter
 
-from trunkline.ar.session.decimation import Resting
+from trunkline.ar.session.decimation import LogDecimation
 from trunkline.ar.session.log_format import (
     BASE,
     EVENTS,
@@ -39,7 +39,7 @@ from trunkline.ar.session.log_format import (
     new_file,
     run,
 )
-from trunkline.ar.session.robot import Standing
+from trunkline.ar.session.robot import RobotState
 from trunkline.ar.teleop import messages
 from trunkline.ar.teleop.messages import Input, Intent, Pose
 from trunkline.errors import InputError
@@ -53,37 +53,37 @@ LATE = 0.5  # s beyond `period` that it may write nothing in: 1 s of a session t
 LOOKS = 0.05  # s between looks at whether it writes
 
 
-class Journal:
-    """Takes what a session of `subject` has to tell, as records for `keep`. By itself it keeps none. Times are s of
+class LogWriter:
+    """Turns what happens in a session of `subject` into records for `keep`, which does nothing here. Times are s of
     `now`."""
 
     fault = ""  # why it is not written any more, in one line
 
     def __init__(self, subject: Subject = NOTHING, now: Callable[[], float] = time.monotonic) -> None:
         self.subject, self.now = subject, now
-        self._resting = Resting()
+        self._decimation = LogDecimation()
 
     def keep(self, record: Record) -> None:
         """Take a record, without waiting."""
 
-    def step(self, dt: float, given: Input, intent: Intent) -> None:
+    def step(self, dt: float, core_input: Input, intent: Intent) -> None:
         """What the core was given and wanted, exactly."""
-        text = b'{"dt":%b,"given":%b}' % (repr(float(dt)).encode(), messages.to_json(given))
+        text = b'{"dt":%b,"given":%b}' % (repr(float(dt)).encode(), messages.to_json(core_input))
         now = self.now()
         self.keep(Record(INPUT, now, now, text))
         self.keep(Record(INTENT, now, now, messages.to_json(intent)))
 
-    def standing(self, robot: Standing) -> None:
+    def robot_state(self, robot: RobotState) -> None:
         """What the robot does; of what is measured, what is. While it rests, a few are kept, somewhat later."""
-        for kept, now in self._resting.take(robot, self.now()):
-            self._stand(kept, now)
+        for state, now in self._decimation.take(robot, self.now()):
+            self._write_state(state, now)
 
     def settle(self) -> None:
         """Keep what a robot at rest was told of last."""
-        for kept, now in self._resting.rest():
-            self._stand(kept, now)
+        for state, now in self._decimation.rest():
+            self._write_state(state, now)
 
-    def _stand(self, robot: Standing, now: float) -> None:
+    def _write_state(self, robot: RobotState, now: float) -> None:
         for topic, axes in (
             (JOINTS_SENT, robot.joints), (JOINTS, robot.measured), (TENDONS_SENT, robot.commands),
             (TENDONS, robot.lengths),
@@ -120,7 +120,7 @@ class Journal:
         self.keep(Record(EVENTS, now, now, _EVENT.dump_json({"event": kind, "time": now} | fields)))
 
 
-class JournalProcess(Journal):
+class LogWriterProcess(LogWriter):
     """One that writes to `path`, by another process."""
 
     def __init__(
@@ -129,12 +129,12 @@ class JournalProcess(Journal):
         super().__init__(subject)
         context = multiprocessing.get_context("spawn")
         theirs, self._pipe = context.Pipe(duplex=False)
-        self._told, self._lost = context.RawArray(ctypes.c_char, TEXT), ""
-        self._kept, self._sent, self._silent = context.RawValue(ctypes.c_int64, -1), 0, period + LATE
+        self._fault, self._lost = context.RawArray(ctypes.c_char, TEXT), ""
+        self._written, self._sent, self._silent = context.RawValue(ctypes.c_int64, -1), 0, period + LATE
         zero = time.time_ns() - round(1e9 * self.now())  # once: a wall clock that jumps moves nothing in the log
         self.path = path
         self._process = context.Process(
-            target=run, args=(theirs, self._told, self._kept, path, subject, zero, period, opened or new_file),
+            target=run, args=(theirs, self._fault, self._written, path, subject, zero, period, opened or new_file),
             daemon=True, name="journal",
         )  # fmt: skip
         self._process.start()
@@ -150,7 +150,7 @@ class JournalProcess(Journal):
 
     @property
     def fault(self) -> str:
-        return self._told.value.decode(errors="replace") or self._lost
+        return self._fault.value.decode(errors="replace") or self._lost
 
     def keep(self, record: Record) -> None:
         if self.fault:
@@ -163,7 +163,7 @@ class JournalProcess(Journal):
     def await_begun(self) -> None:
         """Until its process can write, or says why not: nothing is to move before."""
         until = time.monotonic() + BEGINS
-        while self._kept.value < 0 and not self.fault and self._process.is_alive():
+        while self._written.value < 0 and not self.fault and self._process.is_alive():
             if time.monotonic() > until:
                 self._lose(f"its process has not begun for {BEGINS:g} s")
             time.sleep(GATHERS)
@@ -194,11 +194,11 @@ class JournalProcess(Journal):
     def _watch(self) -> None:
         """Whether anything waits and nothing is written, until it is closed. It counts its own looks: where all of the
         machine stands still for a while, that is one."""
-        looks, before = 0, self._kept.value
+        looks, before = 0, self._written.value
         while not (self._ended.wait(LOOKS) or self._lost):
-            kept = self._kept.value
-            looks = looks + 1 if 0 <= before == kept < self._sent else 0
-            before = kept
+            written = self._written.value
+            looks = looks + 1 if 0 <= before == written < self._sent else 0
+            before = written
             if looks * LOOKS >= self._silent:
                 self._lose(f"its process does not answer for {self._silent:g} s")
 
@@ -216,6 +216,6 @@ def new_path(folder: Path) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        found = (error.strerror or str(error)).lower()
-        raise InputError(f"journal.folder: {folder}: {found}, expected a folder to write logs into") from error
+        reason = (error.strerror or str(error)).lower()
+        raise InputError(f"journal.folder: {folder}: {reason}, expected a folder to write logs into") from error
     return folder / time.strftime("%Y-%m-%dT%H-%M-%S.mcap", time.gmtime())

@@ -58,7 +58,7 @@ class Pong:
 
 
 @dataclass(frozen=True)
-class LeaseWish:
+class LeaseRequest:
     """Who controls: `ask` for it, `release` it, or `give` it `to` another client's id."""
 
     __pydantic_config__ = STRICT
@@ -68,7 +68,7 @@ class LeaseWish:
 
 
 @dataclass(frozen=True)
-class Alignment:
+class AlignmentByEye:
     """Of a client in the "room": the base stands at `pose` of its reference frame as the user sees it, which is for a
     simulated robot alone. `pose` null: its reference frame has leapt, and where the base is is not known any more."""
 
@@ -78,7 +78,7 @@ class Alignment:
 
 
 @dataclass(frozen=True)
-class Touching:
+class TouchRequest:
     """Of a client in the "room": align by touches, from the beginning. What is touched is seen in its `input`."""
 
     __pydantic_config__ = STRICT
@@ -86,7 +86,7 @@ class Touching:
 
 
 @dataclass(frozen=True)
-class Anchored:
+class AnchorPose:
     """Of a client in the "room": its anchor `id` is at `pose` of its reference frame; null: it is lost, or that frame
     has leapt, and the robot holds until it is back."""
 
@@ -97,7 +97,7 @@ class Anchored:
 
 
 @dataclass(frozen=True)
-class Shown:
+class PreviewShown:
     """The preview of the plan `digest` has been shown to its end. Only of whom controls, and not sooner than the
     preview lasts."""
 
@@ -106,7 +106,7 @@ class Shown:
     type: Literal["shown"] = "shown"
 
 
-Said = Hello | Pong | LeaseWish | Alignment | Touching | Anchored | Shown
+ClientMessage = Hello | Pong | LeaseRequest | AlignmentByEye | TouchRequest | AnchorPose | PreviewShown
 
 
 # --- from the server
@@ -174,7 +174,7 @@ AligningStep = Literal["place", "tip", "touch", "check", "lost", "done"]
 
 
 @dataclass(frozen=True)
-class Aligning:
+class AlignmentProgress:
     """To a client in the "room", how far its alignment is: the `step`, what is to be done `next` and what was `said` of
     the last, in words.
 
@@ -195,7 +195,7 @@ class Aligning:
 
 
 @dataclass(frozen=True)
-class State:
+class StateMessage:
     """What the core wants and the robot does; sent when it changes, at most ten times a second but for its `mode`.
 
     notice: one line for the user, "" for none. next: the one next action in words, for whom controls; keys: the same at
@@ -218,7 +218,7 @@ class State:
 
 
 @dataclass(frozen=True)
-class Preview:
+class PreviewMessage:
     """A plan is there: its `digest`, and the preview that follows in binary pieces: `step` s between frames, `duration`
     s in all, which a client shows at that pace. begins: s of the plan at the first frame. phases: name and s of the
     plan."""
@@ -232,7 +232,7 @@ class Preview:
 
 
 @dataclass(frozen=True)
-class Foreseen:
+class PredictionMessage:
     """What the batch of futures says of the plan `digest`, once they are simulated.
 
     probability: that the grasp holds, with its interval `low` to `high`; null where nothing is grasped. times: s of the
@@ -254,30 +254,52 @@ class Foreseen:
 
 
 @dataclass(frozen=True)
-class Around:
+class WorldMessage:
     """The world as it is believed: solids and things."""
 
     world: World
     type: Literal["world"] = "world"
 
 
-Answer = Welcome | Refusal | Ping | Clock | Lease | Aligning | State | Preview | Foreseen | Around
+ServerMessage = (
+    Welcome
+    | Refusal
+    | Ping
+    | Clock
+    | Lease
+    | AlignmentProgress
+    | StateMessage
+    | PreviewMessage
+    | PredictionMessage
+    | WorldMessage
+)
 
-SAID: tuple[type, ...] = (Hello, Pong, LeaseWish, Alignment, Touching, Anchored, Shown)
-ANSWERS: tuple[type, ...] = (Welcome, Refusal, Ping, Clock, Lease, Aligning, State, Preview, Foreseen, Around)
+CLIENT_MESSAGES: tuple[type, ...] = (Hello, Pong, LeaseRequest, AlignmentByEye, TouchRequest, AnchorPose, PreviewShown)
+SERVER_MESSAGES: tuple[type, ...] = (
+    Welcome,
+    Refusal,
+    Ping,
+    Clock,
+    Lease,
+    AlignmentProgress,
+    StateMessage,
+    PreviewMessage,
+    PredictionMessage,
+    WorldMessage,
+)
 
-_SAID: TypeAdapter[Said] = TypeAdapter(Annotated[Said, Field(discriminator="type")])
-_ANSWERS = {kind: TypeAdapter(kind) for kind in ANSWERS}
+_CLIENT_MESSAGE: TypeAdapter[ClientMessage] = TypeAdapter(Annotated[ClientMessage, Field(discriminator="type")])
+_SERVER_MESSAGES = {kind: TypeAdapter(kind) for kind in SERVER_MESSAGES}
 
 
-def hear(text: str) -> Said:
+def hear(text: str) -> ClientMessage:
     """A client's message.
 
     Raises:
         InputError: it is none.
     """
     try:
-        return _SAID.validate_json(text)
+        return _CLIENT_MESSAGE.validate_json(text)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"])) or "the whole"
@@ -286,6 +308,6 @@ def hear(text: str) -> Said:
         raise InputError("message: found what is no JSON") from error
 
 
-def tell(answer: Answer) -> str:
+def tell(answer: ServerMessage) -> str:
     """One line of JSON; what is no number is null."""
-    return _ANSWERS[type(answer)].dump_json(answer).decode()
+    return _SERVER_MESSAGES[type(answer)].dump_json(answer).decode()

@@ -10,18 +10,18 @@ from collections import deque
 from dataclasses import dataclass, field
 
 WINDOW = 3  # binary messages that may be unacknowledged
-MOST_SAID = 256  # JSON messages that may wait
+MOST_MESSAGES = 256  # JSON messages that may wait
 LATEST = ("robot", "shell")  # of these the newest wins
 
 
 @dataclass
 class Outbox:
-    """`sent`, `received`: binary messages so far. `said`: JSON that waits; `states`: of each kind the newest that
+    """`sent`, `received`: binary messages so far. `messages`: JSON that waits; `states`: of each kind the newest that
     waits."""
 
     sent: int = 0
     received: int = 0
-    said: deque[str] = field(default_factory=deque)
+    messages: deque[str] = field(default_factory=deque)
     states: dict[str, str] = field(default_factory=dict)
     frames: dict[str, bytes] = field(default_factory=dict)
     pieces: deque[bytes] = field(default_factory=deque)
@@ -30,9 +30,9 @@ class Outbox:
 
     def say(self, text: str) -> bool:
         """Whether there was room."""
-        self.said.append(text)
+        self.messages.append(text)
         self.ready.set()
-        return len(self.said) <= MOST_SAID
+        return len(self.messages) <= MOST_MESSAGES
 
     def state(self, kind: str, text: str) -> None:
         """As `say`, in place of one of this kind that still waits."""
@@ -66,16 +66,16 @@ class Outbox:
 
     def take(self) -> str | bytes | None:
         """The next to send; None where there is none."""
-        if self.said:
-            return self.said.popleft()
+        if self.messages:
+            return self.messages.popleft()
         if self.states:
             return self.states.pop(next(iter(self.states)))
-        found = self._binary() if self.open else None
-        if found is None:
+        frame = self._binary() if self.open else None
+        if frame is None:
             self.ready.clear()
         else:
             self.sent += 1
-        return found
+        return frame
 
     def _binary(self) -> bytes | None:
         """A frame and a piece in turns, so that neither waits for the other."""

@@ -1,8 +1,9 @@
 """Plans and their previews, in a process of its own: what takes longer than a frame.
 
-One order at a time; a newer one ends the one before within a quarter of a simulated second. An order is answered by
-`Planned`, then, if there is a plan, `Begun`, pieces of the nominal twin's motion, each as soon as it is simulated, and
-`Told`, what the batch of futures says; once more where the assistant has an offer.
+One order at a time; a newer order ends the one before within a quarter of a simulated second. The answers to an order
+are a `PlanAnswer`; then, if there is a plan, a `PreviewBegun`, each `PreviewPiece` of the nominal twin's motion as soon
+as it is simulated, and a `PredictionAnswer`, the result of the batch of rollouts, again where the assistant has an
+offer.
 """
 
 import itertools
@@ -24,7 +25,7 @@ from trunkline.ar.preview.package import Package, read_package
 from trunkline.ar.preview.preview_twin import at_rest, compose_twin, robot_model_of
 from trunkline.ar.preview.settings import Previewing
 from trunkline.ar.session import messages
-from trunkline.ar.session.bodies import Poses
+from trunkline.ar.session.bodies import BodyPoses
 from trunkline.ar.teleop.config import TeleoperationConfig
 from trunkline.ar.teleop.following import sought
 from trunkline.ar.teleop.messages import PlanReport, Request, Target, Targets, Thing, World
@@ -51,7 +52,7 @@ class Order:
 
 
 @dataclass(frozen=True)
-class Seek:
+class FollowRequest:
     """What `targets` ask of a robot that follows is asked for, the nearest to `joints` (7,), rad; targets None: nothing
     that it may follow."""
 
@@ -62,7 +63,7 @@ class Seek:
 
 
 @dataclass(frozen=True)
-class Found:
+class FollowAnswer:
     """Axes (7 + K,), rad and m; None for the last ones still, `refused` says why, "" where there are no targets."""
 
     serial: int
@@ -71,7 +72,7 @@ class Found:
 
 
 @dataclass(frozen=True)
-class Planned:
+class PlanAnswer:
     """What became of it; `plan` is None where it was refused."""
 
     report: PlanReport
@@ -79,15 +80,15 @@ class Planned:
 
 
 @dataclass(frozen=True)
-class Begun:
+class PreviewBegun:
     """The preview of plan request `serial` begins."""
 
     serial: int
-    preview: messages.Preview
+    preview: messages.PreviewMessage
 
 
 @dataclass(frozen=True)
-class Shown:
+class PreviewPiece:
     """Frames of the preview from the one numbered `first`, at `time` s of the plan: poses (F, N, 7), float32."""
 
     serial: int
@@ -98,11 +99,11 @@ class Shown:
 
 
 @dataclass(frozen=True)
-class Told:
+class PredictionAnswer:
     """What the batch says."""
 
     serial: int
-    foreseen: messages.Foreseen
+    foreseen: messages.PredictionMessage
 
 
 @dataclass(frozen=True)
@@ -110,26 +111,26 @@ class Ready:
     """The process has compiled what it needs, and hears orders."""
 
 
-Answer = Planned | Begun | Shown | Told | Found
+Answer = PlanAnswer | PreviewBegun | PreviewPiece | PredictionAnswer | FollowAnswer
 
 
 class Overtaken(Exception):
     """A newer order has come."""
 
 
-class Foreseer:
+class PreviewPlanner:
     """Plans and previews. `bodies`: names of those whose poses are told."""
 
     def __init__(self, planner: Planner, foresight: GraspPreviewer, bodies: tuple[str, ...]) -> None:
         self.planner, self.foresight, self.bodies = planner, foresight, bodies
-        self.known, self.previewing = foresight.robot_model, foresight.settings
-        self._kept: tuple[tuple, ComposedTwin | None] = ((), None)
+        self.robot_model, self.previewing = foresight.robot_model, foresight.settings
+        self._composed: tuple[tuple, ComposedTwin | None] = ((), None)
         self._grasped: PlanPrediction | None = None  # the last grasp: of a thing that is held, the one that was run
 
     @classmethod
     def of(
         cls, package: Package, config: TeleoperationConfig, previewing: Previewing, bodies: tuple[str, ...]
-    ) -> "Foreseer":
+    ) -> "PreviewPlanner":
         """By a package alone.
 
         Raises:
@@ -138,32 +139,32 @@ class Foreseer:
         foresight = GraspPreviewer(robot_model_of(previewing, package.files), package.grips(config), previewing)
         return cls(package.planner(config), foresight, bodies)
 
-    def answers(self, order: Order | Seek, go_on: Callable[[], None] = lambda: None) -> Iterator[Answer]:
+    def answers(self, order: Order | FollowRequest, go_on: Callable[[], None] = lambda: None) -> Iterator[Answer]:
         """All that comes of an order, each as soon as it is known. `go_on` raises where it need not be."""
-        if isinstance(order, Seek):
-            yield Found(order.serial, *sought(self.planner, order.targets, order.joints, order.world))
+        if isinstance(order, FollowRequest):
+            yield FollowAnswer(order.serial, *sought(self.planner, order.targets, order.joints, order.world))
             return
         request, serial = order.request, order.request.serial
         try:
             plan = self.planner.plan(request, order.world, order.joints, order.commands)
         except InputError as error:
-            yield Planned(PlanReport(serial, refused=str(error)))
+            yield PlanAnswer(PlanReport(serial, refused=str(error)))
             return
         digest = plan.digest()
-        yield Planned(PlanReport(serial, digest, "", plan.package, plan.world), plan)
+        yield PlanAnswer(PlanReport(serial, digest, "", plan.package, plan.world), plan)
         way = self.foresight.whole(plan)
-        held = _held(order)
-        if held is not None and self._grasped is not None:
-            twin = self.foresight.carrying(held, order.world, way, None, self._grasped)
+        held_object = _held_object(order)
+        if held_object is not None and self._grasped is not None:
+            twin = self.foresight.carrying(held_object, order.world, way, None, self._grasped)
         else:
             twin = self._twin(order.world, _beside(order), way.joints[0], way.commands[0])
         phases = tuple((name, plan.step * row) for name, row in plan.phases)
         step = twin.model.opt.timestep * max(round(FRAME / twin.model.opt.timestep), 1)
-        yield Begun(serial, messages.Preview(digest, step, way.duration, step, phases))
+        yield PreviewBegun(serial, messages.PreviewMessage(digest, step, way.duration, step, phases))
         go_on()
         yield from self._shown(serial, twin, way, go_on)
-        for found in self._foreseen(order, plan, twin, way, go_on):
-            yield Told(serial, told(digest, found))
+        for prediction in self._foreseen(order, plan, twin, way, go_on):
+            yield PredictionAnswer(serial, prediction_message(digest, prediction))
 
     def prepare(self, order: Order) -> None:
         """Compose its twin, which the next order takes, where nothing has changed."""
@@ -171,54 +172,54 @@ class Foreseer:
 
     def _twin(self, world: World, thing: Thing | None, joints: np.ndarray, commands: np.ndarray) -> ComposedTwin:
         """The last one where nothing has changed: to compile another takes longer than a piece of a preview."""
-        kept, twin = self._kept
-        if twin is not None and kept == (world.boxes, thing):
-            twin = at_rest(twin, joints, commands, self.known.robot.mount_offset)
+        composed, twin = self._composed
+        if twin is not None and composed == (world.boxes, thing):
+            twin = at_rest(twin, joints, commands, self.robot_model.robot.mount_offset)
         else:
-            twin = compose_twin(self.known, world, thing, joints, commands, self.previewing)
-        self._kept = (world.boxes, thing), twin
+            twin = compose_twin(self.robot_model, world, thing, joints, commands, self.previewing)
+        self._composed = (world.boxes, thing), twin
         return twin
 
     def _shown(
         self, serial: int, twin: ComposedTwin, way: CommandTrajectory, go_on: Callable[[], None]
     ) -> Iterator[Answer]:
-        poses, first, held = Poses(twin.model, self.bodies), 0, None
+        poses, first, piece_answer = BodyPoses(twin.model, self.bodies), 0, None
         for piece in nominal(twin, way):
-            if held is not None:
-                yield held
+            if piece_answer is not None:
+                yield piece_answer
             frames = poses.of_piece(piece)
-            held = Shown(serial, first, float(piece.time[0]), frames, False)
+            piece_answer = PreviewPiece(serial, first, float(piece.time[0]), frames, False)
             first += len(frames)
             if piece.time[-1] + 2 * FRAME < way.duration:  # not the last: it need not wait for the next
-                yield held
-                held = None
+                yield piece_answer
+                piece_answer = None
             go_on()
-        if held is not None:
-            yield Shown(serial, held.first, held.time, held.poses, True)
+        if piece_answer is not None:
+            yield PreviewPiece(serial, piece_answer.first, piece_answer.time, piece_answer.poses, True)
 
     def _foreseen(
         self, order: Order, plan: Plan, twin: ComposedTwin, way: CommandTrajectory, go_on: Callable[[], None]
     ) -> Iterator[PlanPrediction]:
         targets, serial = order.request.targets, order.request.serial
-        thing, held = order.world.thing(targets.thing) if targets.thing else None, _held(order)
-        if thing is not None and held is None:
-            for found in self.foresight.grasp(plan, targets, thing, order.world, None, serial, go_on):
-                self._grasped = found
-                yield found
-        elif held is not None and self._grasped is not None:
-            yield self.foresight.bring(plan, targets, held, order.world, None, self._grasped, serial, go_on)
+        thing, held_object = order.world.thing(targets.thing) if targets.thing else None, _held_object(order)
+        if thing is not None and held_object is None:
+            for prediction in self.foresight.grasp(plan, targets, thing, order.world, None, serial, go_on):
+                self._grasped = prediction
+                yield prediction
+        elif held_object is not None and self._grasped is not None:
+            yield self.foresight.bring(plan, targets, held_object, order.world, None, self._grasped, serial, go_on)
         else:
             yield self.foresight.free(twin, way, serial, go_on)
 
 
-def told(digest: str, found: PlanPrediction) -> messages.Foreseen:
+def prediction_message(digest: str, prediction: PlanPrediction) -> messages.PredictionMessage:
     """As clients hear it: times from the plan's beginning on."""
-    preview, stated = found.preview, found.preview.stated
+    preview, stated = prediction.preview, prediction.preview.stated
     low_high = preview.interval or (None, None)
     tips = tuple((float(x), float(y), float(z)) for x, y, z in stated.tips)
-    return messages.Foreseen(
-        digest, preview.probability, *low_high, tuple(map(float, found.begins + stated.times)), tips,
-        tuple(map(float, stated.radii)), WITHIN, len(preview.samples), found.offer,
+    return messages.PredictionMessage(
+        digest, preview.probability, *low_high, tuple(map(float, prediction.begins + stated.times)), tips,
+        tuple(map(float, stated.radii)), WITHIN, len(preview.samples), prediction.offer,
     )  # fmt: skip
 
 
@@ -229,14 +230,14 @@ def _beside(order: Order) -> Thing | None:
     return (meant or things or [None])[0]
 
 
-def _held(order: Order) -> Thing | None:
+def _held_object(order: Order) -> Thing | None:
     """The thing that is brought elsewhere, None where none is."""
     name = order.request.targets.thing
     thing = order.world.thing(name) if name else None
     return thing if thing is not None and thing.support == "held" else None
 
 
-class ForeseerProcess:
+class PreviewProcess:
     """The process, seen from the server; another one where it has ended. `heard` is called by a thread of its own with
     every answer, and with None once the process has ended."""
 
@@ -252,8 +253,8 @@ class ForeseerProcess:
         """With a pipe and a queue of its own: those of one that was killed may be locked for ever."""
         self._answers, theirs = self._context.Pipe(duplex=False)
         self._orders = self._context.Queue()
-        given = theirs, self._orders, self._newest, *self._setup
-        self._process = self._context.Process(target=self._run, args=given, daemon=True, name="foreseer")
+        arguments = theirs, self._orders, self._newest, *self._setup
+        self._process = self._context.Process(target=self._run, args=arguments, daemon=True, name="foreseer")
         self._process.start()
         theirs.close()
 
@@ -266,7 +267,7 @@ class ForeseerProcess:
         """Whether its process is there."""
         return self._process.is_alive()
 
-    def order(self, order: Order | Seek) -> None:
+    def order(self, order: Order | FollowRequest) -> None:
         """It does not wait; the order before is left."""
         with self._lock:
             self._newest.value += 1
@@ -324,29 +325,29 @@ def run(
     threadpool_limits(1)  # matrices are small; threads that wait for each other cost more than they bring
     end_with_parent()
     package = read_package(path)
-    foreseer = Foreseer.of(package, config, previewing, bodies)
-    warm(foreseer, package, world)
+    planner = PreviewPlanner.of(package, config, previewing, bodies)
+    warm(planner, package, world)
     answers.send(Ready())
-    serve(answers, orders, newest, foreseer)
+    serve(answers, orders, newest, planner)
 
 
-def warm(foreseer: Foreseer, package: Package, world: World) -> None:
+def warm(planner: PreviewPlanner, package: Package, world: World) -> None:
     """Plan and preview once for nothing: what is compiled on its first call would keep the first user waiting, and so
     would the twin of the `world`."""
-    robot, straight = foreseer.known.robot, package.straight
+    robot, straight = planner.robot_model.robot, package.straight
     joints = np.array(robot.ready)
     x, y, z = (float(value) for value in mount_pose(joints[None], robot.mount_offset)[0][0])
     targets = Targets(Target((x, y, z)), Target((x, y, z)), DOWN, 0.0, 0, 0.0)
     a, b, c = (float(value) for value in package.tip((x, y, z), targets, straight - PULL * np.eye(len(straight))[0]))
     request = Request(0, replace(targets, tip=Target((a, b, c))), "", package.digest)
     order = Order(request, World(""), joints, straight)
-    for answer in foreseer.answers(order):
-        if isinstance(answer, Shown):
+    for answer in planner.answers(order):
+        if isinstance(answer, PreviewPiece):
             break
-    foreseer.prepare(replace(order, world=world))
+    planner.prepare(replace(order, world=world))
 
 
-def serve(answers, orders, newest, foreseer: Foreseer) -> None:
+def serve(answers, orders, newest, planner: PreviewPlanner) -> None:
     """Orders in, answers out."""
     for number, order in (orders.get() for _ in itertools.count()):
 
@@ -357,11 +358,11 @@ def serve(answers, orders, newest, foreseer: Foreseer) -> None:
         with suppress(Overtaken):
             go_on()
             try:
-                for answer in foreseer.answers(order, go_on):
+                for answer in planner.answers(order, go_on):
                     answers.send(answer)
             except (InputError, ArithmeticError, ValueError) as error:  # a plan without a preview is never confirmed
                 refused = f"preview: {type(error).__name__}: {error}".splitlines()[0]
-                if isinstance(order, Seek):
-                    answers.send(Found(order.serial, None, refused))
+                if isinstance(order, FollowRequest):
+                    answers.send(FollowAnswer(order.serial, None, refused))
                 else:
-                    answers.send(Planned(PlanReport(order.request.serial, refused=refused)))
+                    answers.send(PlanAnswer(PlanReport(order.request.serial, refused=refused)))

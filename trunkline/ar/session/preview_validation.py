@@ -1,11 +1,11 @@
-"""What was foreseen in a live session against what happened, from its log alone.
+"""Predictions of a live session compared with what happened, from its log alone.
 
     python -m trunkline.ar.session.preview_validation LOG…
 
 A line for each plan that was executed: how far the tip was from the preview's, whether it ended within the spread, and
-what was said of the grasp against what came of it. The robot begins a plan some ms after it was told to; by how many,
-is where both paths are nearest, and is said. Of a real machine nobody sees the arm: the mount stands in for the tip, by
-the joints as measured, and neither spread nor grasp is judged.
+the predicted and the actual outcome of the grasp. The robot begins a plan some ms after the command; this delay is the
+one for which both paths are nearest, and is printed. On a real robot the arm is not measured: the mount, from the
+measured joints, is compared in place of the tip, and neither spread nor grasp is judged.
 """
 
 import argparse
@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from trunkline.ar.session.log_format import SIMULATED, WRIST
-from trunkline.ar.session.log_reader import Logbook, read_logbook, tip_path
+from trunkline.ar.session.log_reader import LogReader, read_session_log, tip_path
 from trunkline.errors import in_one_line
 from trunkline.kinematics.panda.kinematics import FLANGE, mount_pose
 from trunkline.kinematics.panda.shipped import JOINTS
@@ -31,11 +31,11 @@ FEWEST = 5  # poses of a path that is compared
 class Execution:
     """Of a plan, `digest`, begun at `time`, s since the session began.
 
-    end: what the robot said at last. median, worst: distance of the tip from the preview's, m, over `seconds` of it;
-    delay: s by which the robot was later; NaN where no path was kept. within: whether the tip ended within the spread;
-    None where it did not come so far. probability: of the grasp as foreseen; held: whether it came about. None where
-    nothing was to be grasped, or it was not tried to its end. seen: whether anybody saw the arm; where not, distances
-    are the mount's, and `within` and `held` are None.
+    end: last state of the robot. median, worst: distance of the tip from the preview's, m, over `seconds` of it;
+    delay: s by which the robot was later; NaN without a path. within: whether the tip ended within the spread;
+    None where it did not come so far. probability: predicted, of the grasp; success: whether the arm
+    holds the object. None where nothing was to be grasped, or the plan did not end. visible: whether the arm was
+    measured; if not, distances are the mount's, and `within` and `success` are None.
     """
 
     digest: str
@@ -47,16 +47,16 @@ class Execution:
     delay: float
     within: bool | None
     probability: float | None
-    held: bool | None
-    seen: bool = True
+    success: bool | None
+    visible: bool = True
 
 
-def executions(logbook: Logbook) -> Iterator[Execution]:
+def executions(log: LogReader) -> Iterator[Execution]:
     """In their order, of those that the robot began."""
-    events, begin = logbook.events, logbook.begin
-    seen = logbook.hardware == SIMULATED
-    rows, place = ("poses", begin["tip"]["place"]) if seen else (WRIST, (0.0, 0.0, FLANGE + begin["mount_offset"]))
-    times, path = _seen(logbook, begin["tip"]["body"], place) if seen else _measured(logbook, begin["mount_offset"])
+    events, begin = log.events, log.begin
+    visible = log.hardware == SIMULATED
+    rows, place = ("poses", begin["tip"]["place"]) if visible else (WRIST, (0.0, 0.0, FLANGE + begin["mount_offset"]))
+    times, path = _visible_path(log, begin["tip"]["body"], place) if visible else _measured(log, begin["mount_offset"])
     for index, event in enumerate(events):
         if event["event"] != "execute" or event["refused"]:
             continue
@@ -66,39 +66,39 @@ def executions(logbook: Logbook) -> Iterator[Execution]:
         preview, shown = _preview(events[:index], digest, rows, place)
         done = end == "done"
         seconds, median, worst, delay, last = _compared(times - since, path, preview, shown, until - since, done)
-        told = next((e["foreseen"] for e in reversed(events[:index]) if _is_of(e, "foreseen", digest)), None)
+        prediction = next((e["foreseen"] for e in reversed(events[:index]) if _is_of(e, "foreseen", digest)), None)
         within = None
-        if seen and told is not None and last is not None and told["spread"]:
-            within = bool(np.linalg.norm(last - np.array(told["tip"][-1])) <= told["spread"][-1])
-        probability = None if told is None else told["probability"]
-        held = _held(events[:index], later) if seen and done and probability is not None else None
+        if visible and prediction is not None and last is not None and prediction["spread"]:
+            within = bool(np.linalg.norm(last - np.array(prediction["tip"][-1])) <= prediction["spread"][-1])
+        probability = None if prediction is None else prediction["probability"]
+        success = _grasped(events[:index], later) if visible and done and probability is not None else None
         since_begin = since - begin["time"]
-        yield Execution(digest, since_begin, end, seconds, median, worst, delay, within, probability, held, seen)
+        yield Execution(digest, since_begin, end, seconds, median, worst, delay, within, probability, success, visible)
 
 
 def _is_of(event: dict, kind: str, digest: str) -> bool:
     return event["event"] == kind and event[kind]["digest"] == digest
 
 
-def _seen(logbook: Logbook, body: str, place) -> tuple[np.ndarray, np.ndarray]:
-    """Times of the journal's clock, s (T,), and the tip as it was seen (T, 3)."""
-    poses = logbook.poses
+def _visible_path(log: LogReader, body: str, place) -> tuple[np.ndarray, np.ndarray]:
+    """Times of the log's clock, s (T,), and the tip from the logged poses (T, 3)."""
+    poses = log.poses
     if poses is None or body not in poses.names or poses.quaternions is None:
         return np.empty(0), np.empty((0, 3))
     row = poses.names.index(body)
     there = poses.present[:, row]
     path = np.concatenate([poses.positions[there, row], poses.quaternions[there, row]], axis=1)
-    return 1e-9 * (poses.stamps[there] - logbook.zero), tip_path(path, place)
+    return 1e-9 * (poses.stamps[there] - log.zero), tip_path(path, place)
 
 
-def _measured(logbook: Logbook, mount_offset: float) -> tuple[np.ndarray, np.ndarray]:
-    """Times of the journal's clock, s (T,), and the mount by the joints as measured (T, 3); none where nobody does."""
-    joints = logbook.joints
+def _measured(log: LogReader, mount_offset: float) -> tuple[np.ndarray, np.ndarray]:
+    """Times of the log's clock, s (T,), and the mount from the measured joints (T, 3); none without them."""
+    joints = log.joints
     if joints is None or not set(JOINTS) <= set(joints.names):
         return np.empty(0), np.empty((0, 3))
-    found = joints.positions[:, [joints.names.index(name) for name in JOINTS]]
-    there = np.isfinite(found).all(axis=1)
-    return 1e-9 * (joints.stamps[there] - logbook.zero), mount_pose(found[there], mount_offset)[0]
+    positions = joints.positions[:, [joints.names.index(name) for name in JOINTS]]
+    there = np.isfinite(positions).all(axis=1)
+    return 1e-9 * (joints.stamps[there] - log.zero), mount_pose(positions[there], mount_offset)[0]
 
 
 def _preview(before: list[dict], digest: str, rows: str, place) -> tuple[np.ndarray, np.ndarray]:
@@ -115,18 +115,18 @@ def _preview(before: list[dict], digest: str, rows: str, place) -> tuple[np.ndar
 
 
 def _end(later: list[dict], digest: str, last: float) -> tuple[str, float]:
-    """What the robot said at the end of a plan, and when it did something else, s."""
-    said, until = "the log ends", last
+    """State of the robot at the end of a plan, and the time, s, until which that plan ran."""
+    end, until = "the log ends", last
     for event in later:
         if event["event"] == "execute":
-            return said, min(until, event["time"])
+            return end, min(until, event["time"])
         robot = event.get("robot") if event["event"] == "robot" else None
-        if robot is None or said != "the log ends":
+        if robot is None or end != "the log ends":
             continue
         if robot["mode"] in ("done", "fault") or (robot["mode"] == "idle" and robot["digest"] == digest):
-            said = str(robot["fault"] or ("held" if robot["mode"] == "idle" else robot["mode"]))
-            until = last if said == "done" else event["time"]
-    return said, until
+            end = str(robot["fault"] or ("held" if robot["mode"] == "idle" else robot["mode"]))
+            until = last if end == "done" else event["time"]
+    return end, until
 
 
 def _compared(
@@ -143,22 +143,22 @@ def _compared(
 
     if len(away(0.0)) < FEWEST or len(away(LATEST)) < FEWEST:
         return 0.0, np.nan, np.nan, np.nan, None
-    found = minimize_scalar(lambda delay: float(np.mean(away(delay) ** 2)), bounds=(0.0, LATEST), method="bounded")
-    far, delay = away(float(found.x)), float(found.x)
+    fit = minimize_scalar(lambda delay: float(np.mean(away(delay) ** 2)), bounds=(0.0, LATEST), method="bounded")
+    far, delay = away(float(fit.x)), float(fit.x)
     seconds = min(until, float(times[-1])) - delay - float(shown[0])
     arrived = done and times[-1] >= shown[-1] and until >= shown[-1]
     last = tips[np.searchsorted(times, shown[-1])] if arrived else None
     return min(seconds, float(shown[-1] - shown[0])), float(np.median(far)), float(far.max()), delay, last
 
 
-def _held(before: list[dict], later: list[dict]) -> bool:
+def _grasped(before: list[dict], later: list[dict]) -> bool:
     """Whether the arm holds something that it did not, as believed until the next plan is asked for."""
-    held = _holds(before)
+    success = _holds(before)
     for event in later:
         if event["event"] == "request":
             break
-        held = _holds([event]) if event["event"] == "world" else held
-    return held
+        success = _holds([event]) if event["event"] == "world" else success
+    return success
 
 
 def _holds(events: list[dict]) -> bool:
@@ -166,33 +166,40 @@ def _holds(events: list[dict]) -> bool:
     return any(thing["support"] == "held" for thing in world["things"])
 
 
-def lines(found: list[Execution]) -> list[str]:
+def lines(results: list[Execution]) -> list[str]:
     """For people to read."""
-    told = []
-    for one in found:
-        parts = [f"{one.time:8.1f} s  {one.digest[:12]}  {one.end}"]
-        if np.isfinite(one.median):
-            apart = f"{'tip' if one.seen else 'mount'} {1e3 * one.median:.1f} mm, at most {1e3 * one.worst:.1f} mm"
-            parts.append(f"{apart} from the preview over {one.seconds:.1f} s, {1e3 * one.delay:.0f} ms later")
-        if one.within is not None:
-            parts.append("ended within the spread" if one.within else "ended beyond the spread")
-        if one.probability is not None:
-            came = "not tried to its end" if one.held is None else "held" if one.held else "not held"
-            came = came if one.seen else "which nobody saw"
-            parts.append(f"grasp foreseen at {one.probability:.2f}, {came}")
-        told.append("; ".join(parts))
-    judged = [(one.probability, one.held) for one in found if one.probability is not None and one.held is not None]
-    ended = [one.within for one in found if one.within is not None]
-    told.append(f"{len(found)} executed")
+    report = []
+    for execution in results:
+        parts = [f"{execution.time:8.1f} s  {execution.digest[:12]}  {execution.end}"]
+        if np.isfinite(execution.median):
+            point = "tip" if execution.visible else "mount"
+            apart = f"{point} {1e3 * execution.median:.1f} mm, at most {1e3 * execution.worst:.1f} mm"
+            parts.append(
+                f"{apart} from the preview over {execution.seconds:.1f} s, {1e3 * execution.delay:.0f} ms later"
+            )
+        if execution.within is not None:
+            parts.append("ended within the spread" if execution.within else "ended beyond the spread")
+        if execution.probability is not None:
+            came = "not tried to its end" if execution.success is None else "held" if execution.success else "not held"
+            came = came if execution.visible else "which nobody saw"
+            parts.append(f"grasp foreseen at {execution.probability:.2f}, {came}")
+        report.append("; ".join(parts))
+    judged = [
+        (execution.probability, execution.success)
+        for execution in results
+        if execution.probability is not None and execution.success is not None
+    ]
+    ended = [execution.within for execution in results if execution.within is not None]
+    report.append(f"{len(results)} executed")
     if ended:
-        told[-1] += f"; {sum(ended)} of {len(ended)} tips ended within the spread"
+        report[-1] += f"; {sum(ended)} of {len(ended)} tips ended within the spread"
     if judged:
-        agreed = sum((probability >= 0.5) == held for probability, held in judged)
-        brier = sum((probability - held) ** 2 for probability, held in judged) / len(judged)
-        told[-1] += f"; outcome as foreseen in {agreed} of {len(judged)}, Brier score {brier:.3f}"
-    if not all(one.seen for one in found):
-        told.append("nobody saw the arm: its shape, its tip and its grasps are not judged")
-    return told
+        agreed = sum((probability >= 0.5) == success for probability, success in judged)
+        brier = sum((probability - success) ** 2 for probability, success in judged) / len(judged)
+        report[-1] += f"; outcome as foreseen in {agreed} of {len(judged)}, Brier score {brier:.3f}"
+    if not all(execution.visible for execution in results):
+        report.append("nobody saw the arm: its shape, its tip and its grasps are not judged")
+    return report
 
 
 @in_one_line
@@ -201,8 +208,8 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="python -m trunkline.ar.session.preview_validation", description=summary)
     parser.add_argument("logs", type=Path, nargs="+", metavar="log")
     for path in parser.parse_args(arguments).logs:
-        logbook = read_logbook(path)
-        print("\n".join([f"{path}", *(f"  {line}" for line in [*logbook.damage, *lines(list(executions(logbook)))])]))
+        log = read_session_log(path)
+        print("\n".join([f"{path}", *(f"  {line}" for line in [*log.damage, *lines(list(executions(log)))])]))
     return 0
 
 

@@ -1,6 +1,6 @@
-"""A real machine's process, and what is drawn of it: the calls are those of the simulated robot.
+"""A real robot's process, and what is drawn of it: the calls are those of the simulated robot.
 
-The machine's process turns 1000 times a second and knows no physics. What is drawn is the twin, moved in a process of
+The robot's process turns 1000 times a second and simulates nothing. What is drawn is the twin, moved in a process of
 its own by what the axes are sent: nothing measures the soft arm's shape here, nor where a thing is.
 """
 
@@ -15,16 +15,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from trunkline.ar.drivers.driver import Limb
+from trunkline.ar.drivers.driver import Driver
 from trunkline.ar.drivers.driver_client import panda
-from trunkline.ar.drivers.driver_host import hosted
+from trunkline.ar.drivers.driver_host import start_driver
 from trunkline.ar.drivers.motors import MotorsOnBus
-from trunkline.ar.drivers.realtime_priority import be_urgent
-from trunkline.ar.drivers.robot import Machine
-from trunkline.ar.drivers.time_scaling import PacedRobot
+from trunkline.ar.drivers.realtime_priority import raise_priority
+from trunkline.ar.drivers.robot import HardwareRobot
+from trunkline.ar.drivers.time_scaling import TimeScaledRobot
 from trunkline.ar.session.hardware import Hardware
-from trunkline.ar.session.robot import POSE, READY, TIME, Channel, RobotProcess, Standing
-from trunkline.ar.session.simulated import Loop, Plant, Simulation, drive
+from trunkline.ar.session.robot import POSE, READY, TIME, RobotChannel, RobotProcess, RobotState
+from trunkline.ar.session.simulated import Loop, Simulation, TwinPlant, drive
 from trunkline.ar.teleop.following import Follower, Following
 from trunkline.ar.teleop.messages import ExecutorReport
 from trunkline.ar.teleop.trajectory import MotionLimits
@@ -48,8 +48,8 @@ class Beginning:
     package: str
 
 
-class Moved(Machine):
-    """A machine as `Loop` turns it; it knows no poses."""
+class HardwarePlant(HardwareRobot):
+    """A real robot as `Loop` turns it, without poses."""
 
     def poses(self) -> np.ndarray:
         return np.empty((0, POSE))
@@ -59,7 +59,7 @@ class Moved(Machine):
 
 
 class RealRobot(RobotProcess):
-    """An `Executor` whose robot is a machine."""
+    """An `Executor` whose robot is real."""
 
     def __init__(self, hardware: Hardware, simulation: Simulation) -> None:
         begins = Beginning(simulation.joints, simulation.commands, simulation.limits, simulation.package)
@@ -68,7 +68,7 @@ class RealRobot(RobotProcess):
             raise InputError(f"motors.numbers: found {len(hardware.motors.numbers)}, expected {tendons}, one a tendon")
         super().__init__(run, (hardware, begins), tendons, 0, simulation.limits, simulation.package)
         context = multiprocessing.get_context("spawn")
-        self._drawn = Channel(context, tendons, len(simulation.bodies))
+        self._drawn = RobotChannel(context, tendons, len(simulation.bodies))
         self._twin = context.Process(
             target=draw, args=(self._drawn, self.channel, simulation), daemon=True, name="twin"
         )
@@ -82,18 +82,18 @@ class RealRobot(RobotProcess):
     def ready(self) -> bool:
         return super().ready and self._drawn.hear()[0][READY] > 0
 
-    def standing(self) -> Standing:
+    def robot_state(self) -> RobotState:
         poses = self._drawn.hear()[0][-POSE * (1 + self._drawn.bodies) :].reshape(-1, POSE)
-        return replace(super().standing(), thing=poses[0], bodies=poses[1:])
+        return replace(super().robot_state(), thing=poses[0], bodies=poses[1:])
 
     def state(self) -> ExecutorReport:
-        found, (drawn, said) = super().state(), self._drawn.hear()
+        report, (drawn, fault) = super().state(), self._drawn.hear()
         silent = time.monotonic() - drawn[TIME]
         if drawn[READY] > 0 and silent > UNSEEN:
-            said = f"silent for {silent:.2f} s"
-        if said and found.mode != "fault":
-            return ExecutorReport("fault", found.digest, f"the twin that is drawn: {said}")
-        return found
+            fault = f"silent for {silent:.2f} s"
+        if fault and report.mode != "fault":
+            return ExecutorReport("fault", report.digest, f"the twin that is drawn: {fault}")
+        return report
 
     def close(self) -> None:
         super().close()
@@ -101,7 +101,7 @@ class RealRobot(RobotProcess):
         self._twin.join()
 
 
-def run(channel: Channel, hardware: Hardware, begins: Beginning) -> None:
+def run(channel: RobotChannel, hardware: Hardware, begins: Beginning) -> None:
     """The machine's process: until its parent is gone, or it is ended."""
     leave_signals_to_parent()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
@@ -110,14 +110,14 @@ def run(channel: Channel, hardware: Hardware, begins: Beginning) -> None:
     machine = None
     try:
         arm = arm_of(hardware)
-        machine = Moved(arm, motors_of(hardware), begins.commands)
+        machine = HardwarePlant(arm, motors_of(hardware), begins.commands)
         joints = machine.begin(begins.joints, lambda: os.getppid() != parent)
         moved = machine
-        robot = PacedRobot(
+        robot = TimeScaledRobot(
             joints, begins.commands, begins.limits, begins.package, lambda q, c, _: moved.move(q, c), hardware.limits
         )  # fmt: skip
         gc.freeze()
-        be_urgent()
+        raise_priority()
         drive(Loop(channel, robot, machine), parent, lambda: moved.behind)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr, flush=True)
@@ -127,18 +127,18 @@ def run(channel: Channel, hardware: Hardware, begins: Beginning) -> None:
             machine.close()
 
 
-def arm_of(hardware: Hardware) -> Limb | None:
+def arm_of(hardware: Hardware) -> Driver | None:
     """The robot, None where none is named."""
     if hardware.robot == "ros2":
-        return hosted(hardware.ros)
+        return start_driver(hardware.ros)
     return panda(hardware.arm, hardware.robot) if hardware.robot else None
 
 
-def motors_of(hardware: Hardware) -> Limb | None:
+def motors_of(hardware: Hardware) -> Driver | None:
     """The tendons' motors, None where none are named."""
     if not hardware.bus:
         return None
-    return hosted(MotorsOnBus(hardware.motors, hardware.bus, hardware.interface))
+    return start_driver(MotorsOnBus(hardware.motors, hardware.bus, hardware.interface))
 
 
 class Pursuit:
@@ -175,7 +175,7 @@ class Pursuit:
         self._follower = Follower(limits, following, joints, commands, self._tick)
 
 
-def draw(channel: Channel, machine: Channel, simulation: Simulation) -> None:
+def draw(channel: RobotChannel, machine: RobotChannel, simulation: Simulation) -> None:
     """The twin's process: it follows what the machine's axes are sent, DELAY s later, as a robot follows targets: this
     process hears of them unevenly, and a jump from one to the next would throw the twin about. Once it rests where they
     rest, it is left alone: a preview needs the processor more."""
@@ -184,7 +184,7 @@ def draw(channel: Channel, machine: Channel, simulation: Simulation) -> None:
     os.nice(NICE)
     threadpool_limits(1)
     end_with_parent()
-    plant = Plant(simulation)
+    plant = TwinPlant(simulation)
     pursuit = Pursuit(simulation, plant.tick)
     due, poses, since = time.monotonic(), np.append(plant.thing(), plant.poses()), 0.0
     while True:
@@ -200,9 +200,9 @@ def draw(channel: Channel, machine: Channel, simulation: Simulation) -> None:
             now = np.append(plant.thing(), plant.poses())
             if np.abs(here - before).max() > LEAST or np.nanmax(np.abs(now - poses)) > STILL:
                 poses, since = now, due
-        told = np.zeros(channel.size)
-        told[TIME], told[READY] = time.monotonic(), 1.0
-        told[-POSE * (1 + channel.bodies) :] = poses
-        channel.tell(told, plant.fault)
+        numbers_out = np.zeros(channel.size)
+        numbers_out[TIME], numbers_out[READY] = time.monotonic(), 1.0
+        numbers_out[-POSE * (1 + channel.bodies) :] = poses
+        channel.tell(numbers_out, plant.fault)
         due = max(due + plant.tick, time.monotonic() - plant.tick)
         time.sleep(max(due - time.monotonic(), 0.0))

@@ -16,25 +16,25 @@ import numpy as np
 
 from trunkline.ar.session import binary
 from trunkline.ar.session.log_format import POSES, TWIN
-from trunkline.ar.session.log_reader import Logbook, read_logbook
+from trunkline.ar.session.log_reader import LogReader, read_session_log
 from trunkline.errors import InputError, in_one_line
 
 LENGTH = struct.Struct("<I")  # bytes of the message that follows
 
 
-def recorded(logbook: Logbook) -> Iterator[bytes]:
+def recorded(log: LogReader) -> Iterator[bytes]:
     """The messages, each with its length before it; no marker is there, and no flag is set.
 
     Raises:
         InputError: the log has no poses.
     """
-    poses = logbook.drawn
+    poses = log.drawn
     if poses is None or poses.quaternions is None or not len(poses.stamps):
-        raise InputError(f"{logbook.path}: {POSES}: found no poses, expected those of the robot's bodies")
+        raise InputError(f"{log.path}: {POSES}: found no poses, expected those of the robot's bodies")
     frames, bodies, _ = poses.positions.shape
     rows = np.full((frames, bodies + len(binary.MARKERS), len(binary.POSE)), np.nan)
     rows[:, :bodies] = np.concatenate([poses.positions, poses.quaternions], axis=2)
-    times = 1e-9 * (poses.stamps - logbook.zero)
+    times = 1e-9 * (poses.stamps - log.zero)
     for number, (time, row) in enumerate(zip(times, rows, strict=True), 1):
         message = binary.frame("robot", set(), len(row), number, float(time), row)
         yield LENGTH.pack(len(message)) + message
@@ -46,18 +46,18 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="python -m trunkline.ar.session.recording", description=summary)
     parser.add_argument("log", type=Path)
     parser.add_argument("recording", type=Path)
-    told = parser.parse_args(arguments)
-    logbook = read_logbook(told.log)
-    for damage in logbook.damage:
-        print(f"{told.log}: {damage}")
-    messages = list(recorded(logbook))
-    if logbook.twin is not None:
-        print(f"{told.log}: {TWIN}: its bodies are as a twin drew them: nobody saw the arm")
+    args = parser.parse_args(arguments)
+    log = read_session_log(args.log)
+    for damage in log.damage:
+        print(f"{args.log}: {damage}")
+    messages = list(recorded(log))
+    if log.twin is not None:
+        print(f"{args.log}: {TWIN}: its bodies are as a twin drew them: nobody saw the arm")
     try:
-        told.recording.write_bytes(b"".join(messages))
+        args.recording.write_bytes(b"".join(messages))
     except OSError as error:
-        raise InputError(f"{told.recording}: {(error.strerror or str(error)).lower()}, expected a file") from error
-    print(f"{told.recording}: {len(messages)} frames")
+        raise InputError(f"{args.recording}: {(error.strerror or str(error)).lower()}, expected a file") from error
+    print(f"{args.recording}: {len(messages)} frames")
     return 0
 
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from pydantic import TypeAdapter, ValidationError
 
-from trunkline.ar.session.log_reader import Logbook, Step, read_logbook
+from trunkline.ar.session.log_reader import LogReader, LogStep, read_session_log
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.messages import Input, from_json, to_json
 from trunkline.ar.teleop.reach import MapReach, Reach
@@ -32,54 +32,54 @@ class Difference(NamedTuple):
     number: int
     time: float
     field: str
-    found: object
+    replayed: object
     expected: object
 
     def __str__(self) -> str:
         where = f"step {self.number} at {self.time:.3f} s: {self.field}"
-        return f"{where}: found {self.found}, expected {self.expected} of the log"
+        return f"{where}: found {self.replayed}, expected {self.expected} of the log"
 
 
-def replay(steps: Iterable[Step], core: Teleoperation) -> Difference | None:
+def replay(steps: Iterable[LogStep], core: Teleoperation) -> Difference | None:
     """The first difference; None where every intent is the same."""
     state = core.start()
     for number, step in enumerate(steps, 1):
-        state, intent = core.step(state, from_json(Input, step.given), step.dt)
-        found = to_json(intent)
-        if found != step.intent:
-            return Difference(number, step.time, *_first(json.loads(found), json.loads(step.intent)))
+        state, intent = core.step(state, from_json(Input, step.input), step.dt)
+        replayed = to_json(intent)
+        if replayed != step.intent:
+            return Difference(number, step.time, *_first(json.loads(replayed), json.loads(step.intent)))
     return None
 
 
-def core_of(logbook: Logbook, package: str, reach: Reach) -> Teleoperation:
+def core_of(log: LogReader, package: str, reach: Reach) -> Teleoperation:
     """The core as the session had it.
 
     Raises:
         InputError: the log is of another package, or its settings are none.
     """
-    begin = logbook.begin
+    begin = log.begin
     if begin["package"] != package:
-        found = f"found digest {package[:12]}, expected {begin['package'][:12]}"
-        raise InputError(f"{logbook.path}: package: {found}, with which the session was begun")
+        reason = f"found digest {package[:12]}, expected {begin['package'][:12]}"
+        raise InputError(f"{log.path}: package: {reason}, with which the session was begun")
     try:
         settings = TypeAdapter(Teleop).validate_python(begin["settings"])
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
-        raise InputError(f"{logbook.path}: settings: {where}: {first['msg']}, of version {begin['version']}") from error
+        raise InputError(f"{log.path}: settings: {where}: {first['msg']}, of version {begin['version']}") from error
     return Teleoperation(settings, reach, package, begin["mount_offset"])
 
 
-def _first(found: object, expected: object, field: str = "") -> tuple[str, object, object]:
+def _first(replayed: object, expected: object, field: str = "") -> tuple[str, object, object]:
     """Where two values of JSON differ first, by name, and what is there."""
-    if isinstance(found, list) and isinstance(expected, list):
-        found, expected = (dict(enumerate(values)) for values in (found, expected))
-    if isinstance(found, dict) and isinstance(expected, dict):
-        for key in {**expected, **found}:
-            a, b = found.get(key, MISSING), expected.get(key, MISSING)
+    if isinstance(replayed, list) and isinstance(expected, list):
+        replayed, expected = (dict(enumerate(values)) for values in (replayed, expected))
+    if isinstance(replayed, dict) and isinstance(expected, dict):
+        for key in {**expected, **replayed}:
+            a, b = replayed.get(key, MISSING), expected.get(key, MISSING)
             if repr(a) != repr(b):
                 return _first(a, b, f"{field}.{key}".strip("."))
-    return field or "the whole", found, expected
+    return field or "the whole", replayed, expected
 
 
 @in_one_line
@@ -89,13 +89,13 @@ def main(arguments: list[str]) -> int:
     )
     parser.add_argument("log", type=Path)
     parser.add_argument("package", type=Path)
-    told = parser.parse_args(arguments)
-    logbook, files = read_logbook(told.log), unpacked.read_package(told.package)
-    core = core_of(logbook, unpacked.package_digest(files), MapReach.from_arrays(unpacked.maps_of(files)))
-    for damage in logbook.damage:
-        print(f"{told.log}: {damage}")
-    difference = replay(logbook.steps, core)
-    count, seconds = len(logbook.steps), logbook.steps[-1].time
+    args = parser.parse_args(arguments)
+    log, files = read_session_log(args.log), unpacked.read_package(args.package)
+    core = core_of(log, unpacked.package_digest(files), MapReach.from_arrays(unpacked.maps_of(files)))
+    for damage in log.damage:
+        print(f"{args.log}: {damage}")
+    difference = replay(log.steps, core)
+    count, seconds = len(log.steps), log.steps[-1].time
     print(difference or f"{count} steps in {seconds:.1f} s: the same intents, byte for byte")
     return 1 if difference else 0
 

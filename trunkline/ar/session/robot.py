@@ -30,23 +30,25 @@ LOOKS = 0.005  # s
 RESTING = 0.5  # s that braking may take before its process is ended
 TEXT = 240  # bytes of a fault
 MODES = ("idle", "running", "done", "fault")
-TIME, MODE, SERIAL, HELD, READY = range(5)  # of what the robot tells, before axes, sent and measured, thing and bodies
+TIME, MODE, SERIAL, HOLD_TIME, READY = range(
+    5
+)  # of the robot's report, before axes, sent and measured, object and bodies
 PERMIT, PERMITTED, STOPS = range(3)  # of what it is told
 POSE = 7
 
 
-def told_by(due: float, told: float) -> float:
+def next_report_time(due: float, reported: float) -> float:
     """The first s from `due` on at which a robot that told of itself at `told`, s, should have done so anew."""
-    return told + math.ceil((due - told) / TELLS) * TELLS + FRESH
+    return reported + math.ceil((due - reported) / TELLS) * TELLS + FRESH
 
 
-class Channel:
+class RobotChannel:
     """What both processes share. One writes `told` whole, with a number that is odd meanwhile; the other, `asked`."""
 
     def __init__(self, context: SpawnContext, tendons: int, bodies: int) -> None:
         self.tendons, self.bodies = tendons, bodies
         self.size = 5 + 2 * (JOINTS + tendons) + POSE * (1 + bodies)
-        self._told, self._number = context.RawArray(ctypes.c_double, self.size), context.RawValue(ctypes.c_uint64, 0)
+        self._numbers, self._number = context.RawArray(ctypes.c_double, self.size), context.RawValue(ctypes.c_uint64, 0)
         self._asked, self._fault = context.RawArray(ctypes.c_double, 3), context.RawArray(ctypes.c_char, TEXT)
         self.plans, self.wake = context.Queue(), context.Semaphore(0)
 
@@ -57,7 +59,7 @@ class Channel:
     def tell(self, numbers: np.ndarray, fault: str) -> None:
         """Of the robot's process."""
         self._number.value += 1
-        np.ctypeslib.as_array(self._told)[:] = numbers
+        np.ctypeslib.as_array(self._numbers)[:] = numbers
         self._fault.value = fault.encode(errors="replace")[: TEXT - 1]
         self._number.value += 1
 
@@ -65,7 +67,7 @@ class Channel:
         """The newest that was told whole."""
         for _ in range(1000):
             before = self._number.value
-            numbers, fault = np.ctypeslib.as_array(self._told).copy(), self._fault.value
+            numbers, fault = np.ctypeslib.as_array(self._numbers).copy(), self._fault.value
             if before % 2 == 0 and self._number.value == before:
                 return numbers, fault.decode(errors="replace")
         return numbers, fault.decode(errors="replace")  # its writer was killed within: the time in it is old
@@ -80,16 +82,16 @@ class Goal:
 
 
 @dataclass(frozen=True)
-class Standing:
+class RobotState:
     """What the robot does at `time`, s.
 
     `joints` (7,), rad, and `commands` (K,), m, as they are sent, and poses of the `thing` (7,), NaN where there is
-    none, and of the `bodies` (N, 7). held: s at which it was last commanded to hold. As measured: `measured` (7,), rad,
-    of the joints, and `lengths` (K,), m, of the cables; NaN or None where nothing measures them.
+    none, and of the `bodies` (N, 7). hold_time: s at which it was last commanded to hold. As measured: `measured`
+    (7,), rad, of the joints, and `lengths` (K,), m, of the cables; NaN or None where nothing measures them.
     """
 
     time: float
-    held: float
+    hold_time: float
     joints: np.ndarray
     commands: np.ndarray
     thing: np.ndarray
@@ -105,7 +107,7 @@ class RobotProcess:
         self, run: Callable, setup: tuple, tendons: int, bodies: int, limits: MotionLimits, package: str
     ) -> None:
         context = multiprocessing.get_context("spawn")
-        self.channel = Channel(context, tendons, bodies)
+        self.channel = RobotChannel(context, tendons, bodies)
         self._limits, self._package, self._serial, self._digest, self._begun = limits, package, 0, "", 0.0
         edges = np.cumsum([5, JOINTS, tendons, JOINTS, tendons, POSE, POSE * bodies])
         self._places = [slice(*ends) for ends in pairwise(edges)]
@@ -130,15 +132,15 @@ class RobotProcess:
         """Whether it has told anything yet."""
         return self.channel.hear()[0][READY] > 0
 
-    def standing(self) -> Standing:
+    def robot_state(self) -> RobotState:
         """The newest."""
         numbers = self.channel.hear()[0]
         joints, commands, measured, lengths, thing, bodies = (numbers[place] for place in self._places)
         bodies = bodies.reshape(self.channel.bodies, POSE)
-        return Standing(numbers[TIME], numbers[HELD], joints, commands, thing, bodies, measured, lengths)
+        return RobotState(numbers[TIME], numbers[HOLD_TIME], joints, commands, thing, bodies, measured, lengths)
 
     def check(self, plan: Plan) -> str:
-        now = self.standing()
+        now = self.robot_state()
         return SimulatedRobot(now.joints, now.commands, self._limits, self._package).check(plan)
 
     def start(self, plan: Plan, digest: str) -> str:

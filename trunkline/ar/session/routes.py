@@ -14,7 +14,7 @@ TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".s
 ABSENT = b"<!doctype html><title>Trunkline</title><p>error: the page is not built: `client/` makes it</p>\n"
 
 
-class Site:
+class Routes:
     """scene: as `scene.scene` has it. folder: of the page."""
 
     def __init__(self, origins: Origins, token: str, scene: dict, folder: Path, log: Callable[[str], None]) -> None:
@@ -64,5 +64,5 @@ class Site:
 def read_page(folder: Path) -> dict[str, bytes]:
     """Contents by name of the files that a page may have; none where there is no index.html."""
     files = [file for file in folder.glob("*") if file.suffix in TYPES and file.is_file() and not file.is_symlink()]
-    found = {file.name: file.read_bytes() for file in files}
-    return found if "index.html" in found else {}
+    contents = {file.name: file.read_bytes() for file in files}
+    return contents if "index.html" in contents else {}

@@ -33,7 +33,7 @@ def scene(model: mujoco.MjModel, bodies: tuple[str, ...], maps: dict[str, np.nda
     """
     place = {model.body(name).id: row for row, name in enumerate(bodies)}
     meshes: dict[int, int] = {}
-    geoms = [_geom(model, geom, place, meshes) for geom in range(model.ngeom) if _is_seen(model, geom, place)]
+    geoms = [_geom(model, geom, place, meshes) for geom in range(model.ngeom) if _is_drawn(model, geom, place)]
     share = min(1.0, MOST_TRIANGLES / max(sum(int(model.mesh_facenum[mesh]) for mesh in meshes), 1))
     sheets = maps.get("sheets_points")
     return {
@@ -69,7 +69,7 @@ class Shells:
         return np.tensordot(weights, self.points, axes=1).reshape(-1, 3)
 
 
-def _is_seen(model: mujoco.MjModel, geom: int, place: dict[int, int]) -> bool:
+def _is_drawn(model: mujoco.MjModel, geom: int, place: dict[int, int]) -> bool:
     body, shape = int(model.geom_bodyid[geom]), int(model.geom_type[geom])
     is_shown = model.geom_group[geom] < SHOWN and model.geom_rgba[geom, 3] > 0
     return (body == 0 or body in place) and is_shown and shape in SHAPES
@@ -111,10 +111,10 @@ def _reach(maps: dict[str, np.ndarray]) -> dict | None:
     values = np.asarray(maps["rigid"], dtype=float)
     try:
         lattice = Lattice(np.array([x, y, z]), float(maps["rigid_spacing"]), values.shape)
-        found = surface(values, lattice, SHELL_TRIANGLES, "reachability")
+        mesh = surface(values, lattice, SHELL_TRIANGLES, "reachability")
     except InputError:
         return None
-    return {"vertices": _rounded(found.vertices), "faces": [int(value) for value in found.faces.ravel()]}
+    return {"vertices": _rounded(mesh.vertices), "faces": [int(value) for value in mesh.faces.ravel()]}
 
 
 def _rounded(values: np.ndarray) -> list[float]:

@@ -15,14 +15,14 @@ from pathlib import Path
 
 from aiohttp import web
 
-from trunkline.ar.drivers.settings import Config as Execution
+from trunkline.ar.drivers.settings import ExecutionConfig as Execution
 from trunkline.ar.session.anchors import Anchors
 from trunkline.ar.session.auth import CODE_SECONDS, Origins, make_token
-from trunkline.ar.session.composition import Made, make
+from trunkline.ar.session.composition import SessionParts, make
 from trunkline.ar.session.hardware import Hardware, hardware_of
 from trunkline.ar.session.preview_process import Answer
-from trunkline.ar.session.server import PARTING, House, Server
-from trunkline.ar.session.settings import Alignment, Config
+from trunkline.ar.session.server import PARTING, Composition, Server
+from trunkline.ar.session.settings import AlignmentSettings, SessionConfig
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT, load_folder
@@ -30,7 +30,7 @@ from trunkline.pipeline.config import PROJECT, load_folder
 PAGE = Path(__file__).parent / "page"
 
 
-def alignment_for(hardware: Hardware | None, settings: Alignment) -> Alignment:
+def alignment_for(hardware: Hardware | None, settings: AlignmentSettings) -> AlignmentSettings:
     """As set; where anything real moves, never by eye."""
     return replace(settings, by_eye=False) if hardware is not None and hardware.real else settings
 
@@ -95,9 +95,9 @@ async def opened(
     address: Address,
     log: Callable[[str], None],
     hardware: Hardware | None = None,
-    config: Config | None = None,
+    config: SessionConfig | None = None,
     teleop: Teleop | None = None,
-) -> AsyncIterator[tuple[Server, Made]]:
+) -> AsyncIterator[tuple[Server, SessionParts]]:
     """A session that is ready, on the simulated robot where there is no hardware, by conf/live and conf/teleop where
     there is no `config` and `teleop`; its processes end with it.
 
@@ -109,25 +109,25 @@ async def opened(
     def heard(answer: Answer | None) -> None:
         loop.call_soon_threadsafe(lambda: [server.foreseen(answer) for server in servers])
 
-    config = config or load_folder(Config, PROJECT / "conf/live")
+    config = config or load_folder(SessionConfig, PROJECT / "conf/live")
     teleop = teleop or load_folder(Teleop, PROJECT / "conf/teleop")
     if hardware is not None:
-        teleop = hardware.kept_by(teleop)
+        teleop = hardware.slow_enough(teleop)
     alignment = alignment_for(hardware, config.alignment)
     anchors = Anchors(Path(alignment.anchors))
     made = await asyncio.to_thread(make, package, teleop, config, heard, hardware)
     try:
-        house = House(
-            made.desk, make_token(), address.origins, made.package, made.scene, made.shells, config.rate, PAGE, log,
-            alignment, anchors,
+        composition = Composition(
+            made.controller, make_token(), address.origins, made.package, made.scene, made.shells, config.rate, PAGE,
+            log, alignment, anchors,
         )  # fmt: skip
         while not (made.robot.ready and made.planning.ready.is_set()):
             if not (made.robot.alive and made.planning.alive):
                 raise InputError("a process of the session has ended before it began")
-            if made.journal.fault:
-                raise InputError(made.journal.fault)
+            if made.log_writer.fault:
+                raise InputError(made.log_writer.fault)
             await asyncio.sleep(0.05)
-        server = Server(house)
+        server = Server(composition)
         servers.append(server)
         gc.collect()
         gc.freeze()  # a collection of all that is loaded takes longer than a robot goes on without a permit
@@ -142,9 +142,9 @@ async def serve(options: argparse.Namespace, names: list[str], context: ssl.SSLC
     """Until it is interrupted or told to end: either way robot and log are closed in order."""
     task = asyncio.current_task()
     assert task is not None, "asyncio runs it"
-    for told in (signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(told) is not signal.SIG_IGN:  # `nohup` has it ignored
-            asyncio.get_running_loop().add_signal_handler(told, task.cancel)
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is not signal.SIG_IGN:  # `nohup` has it ignored
+            asyncio.get_running_loop().add_signal_handler(number, task.cancel)
     log = functools.partial(print, flush=True)
     hardware = hardware_of(
         options.robot, options.motors, options.bus, options.interface,
@@ -157,8 +157,8 @@ async def serve(options: argparse.Namespace, names: list[str], context: ssl.SSLC
     address = Address(options.port, options.host, tuple(names), context)
     expect_free(address)  # what a session needs takes long to load
     async with opened(options.package, address, log, hardware) as (server, made):
-        log(f"log: {made.journal.path}")
-        log(f"{address.url}/#token={server.house.token}")
+        log(f"log: {made.log_writer.path}")
+        log(f"{address.url}/#token={server.composition.token}")
         _pair(server, log, asyncio.get_running_loop())
         await asyncio.Event().wait()
 

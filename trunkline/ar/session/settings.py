@@ -13,7 +13,7 @@ Metres = Annotated[float, Field(ge=-5, le=5)]
 
 
 @dataclass(frozen=True)
-class Journaling:
+class LogSettings:
     """folder: for the logs. period: s of a session that may be lost where its process is killed."""
 
     folder: Annotated[str, Field(min_length=1, max_length=4096)]
@@ -21,7 +21,7 @@ class Journaling:
 
 
 @dataclass(frozen=True)
-class Alignment:
+class AlignmentSettings:
     """by_eye: whether the base may be put in place by eye. places: that are touched, `apart` m from each other at
     least. limit: m, of the expected error, and of the touch with which a session begins. level_deg: by which the
     headset's vertical may differ from the robot's. mark: what is touched, m, in the flange's frame. at: where the
@@ -38,7 +38,7 @@ class Alignment:
 
 
 @settings
-class Config:
+class SessionConfig:
     """rate: Hz. ready: of the mount at first, m. floor: its height, m. boxes: solids that stand there,
     upright. thing: what may be grasped, or None."""
 
@@ -47,6 +47,6 @@ class Config:
     floor: Metres
     boxes: tuple[Box, ...]
     thing: Thing | None
-    journal: Journaling
-    alignment: Alignment
+    journal: LogSettings
+    alignment: AlignmentSettings
     preview: Previewing

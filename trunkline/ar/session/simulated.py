@@ -21,8 +21,8 @@ from threadpoolctl import threadpool_limits
 from trunkline.ar.hybrid.compose import panda_joints
 from trunkline.ar.hybrid.rollouts import ComposedTwin
 from trunkline.ar.hybrid.torques import servo_commands
-from trunkline.ar.session.bodies import Poses
-from trunkline.ar.session.robot import DEAD_MAN, MODES, PERMIT, PERMITTED, STOPS, TELLS, Channel, Goal
+from trunkline.ar.session.bodies import BodyPoses
+from trunkline.ar.session.robot import DEAD_MAN, MODES, PERMIT, PERMITTED, STOPS, TELLS, Goal, RobotChannel
 from trunkline.ar.teleop.executor import FOLLOWS, SimulatedRobot
 from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.plan import Plan
@@ -54,12 +54,12 @@ class Simulation:
     mount_offset: float
 
 
-class Plant:
+class TwinPlant:
     """The twin moved by axes, a tick at a time."""
 
     def __init__(self, simulation: Simulation) -> None:
         model = simulation.twin.model
-        self.model, self.batch, self._own = model, batch_of(model, 1), np.zeros(1, dtype=np.int32)
+        self.model, self.batch, self._world = model, batch_of(model, 1), np.zeros(1, dtype=np.int32)
         friction = max(round(REFRESH / model.opt.timestep), 1)  # steps from one to the next new friction
         self._refresh = next((n for n in range(2, friction) if friction % n == 0), friction)  # the same, in ticks
         self._ticks, self.steps = 0, friction // self._refresh
@@ -75,7 +75,7 @@ class Plant:
             off.mjDSBL_CONTACT | off.mjDSBL_FRICTIONLOSS | off.mjDSBL_EQUALITY | off.mjDSBL_LIMIT
         )
         self._data = mujoco.MjData(self._bare)
-        self._poses, self._thing = Poses(model, simulation.bodies), Poses(model, ("object",))
+        self._poses, self._thing = BodyPoses(model, simulation.bodies), BodyPoses(model, ("object",))
         self._last = np.tile(simulation.joints, (2, 1))
         controls = np.zeros((1, model.nu))
         controls[:, self._motors] = self._commands = simulation.commands
@@ -83,7 +83,7 @@ class Plant:
         hold(self.batch, model, controls)
         self._winches, self._rub = Winches(self.batch, controls[:, self._motors]), capstan_friction_of(self.batch)
         if self._rub is not None:
-            self._rub.begin(self._own)
+            self._rub.begin(self._world)
 
     def move(self, joints: np.ndarray, commands: np.ndarray, smooth: bool = False) -> None:
         """One tick with the axes on their way to `joints` (7,), rad, and `commands` (K,), m: each step is sent where
@@ -93,10 +93,10 @@ class Plant:
         controls = np.zeros((1, self.steps, self.model.nu))
         controls[0][:, self._servos] = self._servo + share * (servo - self._servo)
         sent = (self._commands + share * (commands - self._commands))[None]
-        controls[:, :, self._motors] = self._winches.deliver(sent, self._own)
+        controls[:, :, self._motors] = self._winches.deliver(sent, self._world)
         self._servo, self._commands = servo, np.array(commands)
         if self._rub is not None and self._ticks % self._refresh == 0:
-            self._rub.refresh(self._own)
+            self._rub.refresh(self._world)
         self._ticks += 1
         self.batch.rollout(self.steps, control=controls)
 
@@ -136,7 +136,7 @@ class Plant:
         return servo_commands(self.model, joints, data.qfrc_inverse[dofs]) + self._ratio * speed
 
 
-class Moved(Protocol):
+class MovingPlant(Protocol):
     """What a process moves, a tick at a time."""
 
     @property
@@ -152,9 +152,9 @@ class Moved(Protocol):
 class Loop:
     """Plans in, motion out; what the process does at each turn. `robot` moves the `plant`."""
 
-    def __init__(self, channel: Channel, robot: SimulatedRobot, plant: Moved) -> None:
+    def __init__(self, channel: RobotChannel, robot: SimulatedRobot, plant: MovingPlant) -> None:
         self.channel, self.robot, self.plant = channel, robot, plant
-        self.serial, self.fault, self.held = 0, "", 0.0
+        self.serial, self.fault, self.hold_time = 0, "", 0.0
         self._stops, self._holds, self._listens = channel.asked[STOPS], False, 0.0
 
     @property
@@ -172,7 +172,7 @@ class Loop:
             self._stops = asked[STOPS]
             self.robot.stop()
         if stopped or (holds and not self._holds):
-            self.held = now
+            self.hold_time = now
         self._holds = holds
         if woken:
             self._listens = now + LISTENS
@@ -183,7 +183,7 @@ class Loop:
         """One tick."""
         self.robot.advance(self.plant.tick)
         if self.plant.fault and not self.fault:
-            self.fault, self.held = self.plant.fault, time.monotonic()
+            self.fault, self.hold_time = self.plant.fault, time.monotonic()
             self.robot.stop()
 
     def tell(self, now: float) -> None:
@@ -191,7 +191,7 @@ class Loop:
         state = self.robot.state()
         self.fault = self.fault or state.fault
         mode = "fault" if self.fault else state.mode
-        head = [now, MODES.index(mode), self.serial, self.held, 1.0]
+        head = [now, MODES.index(mode), self.serial, self.hold_time, 1.0]
         poses = [self.plant.thing(), self.plant.poses().ravel()]
         axes = [self.robot.joints, self.robot.commands, self.plant.measured(), self.plant.lengths()]
         self.channel.tell(np.concatenate([head, *axes, *poses]), self.fault)
@@ -222,7 +222,7 @@ def drive(loop: Loop, parent: int, behind: Callable[[], float] = lambda: BEHIND)
 
     behind: s that real time may run ahead of what is moved before it is let go, asked for after each tick.
     """
-    now = due = told = time.monotonic()
+    now = due = reported = time.monotonic()
     moved = now if loop.moves else -math.inf
     while os.getppid() == parent or now - moved < SETTLES:
         woken = loop.channel.wake.acquire(timeout=max(due - time.monotonic(), 0.0))
@@ -234,12 +234,12 @@ def drive(loop: Loop, parent: int, behind: Callable[[], float] = lambda: BEHIND)
             due += loop.plant.tick
             if now - due > behind():
                 due = now
-        if woken or now >= told + TELLS - loop.plant.tick / 2:
-            told = now
+        if woken or now >= reported + TELLS - loop.plant.tick / 2:
+            reported = now
             loop.tell(time.monotonic())
 
 
-def run(channel: Channel, simulation: Simulation) -> None:
+def run(channel: RobotChannel, simulation: Simulation) -> None:
     """The process: until its parent is gone."""
     leave_signals_to_parent()
     os.environ["TRUNKLINE_THREADS"] = "1"
@@ -247,7 +247,7 @@ def run(channel: Channel, simulation: Simulation) -> None:
         os.nice(NICE)
     threadpool_limits(1)
     parent = parent_pid()
-    plant = Plant(simulation)
+    plant = TwinPlant(simulation)
     robot = SimulatedRobot(
         simulation.joints, simulation.commands, simulation.limits, simulation.package,
         lambda joints, commands, _: plant.move(joints, commands, robot.state().digest != FOLLOWS),

@@ -28,7 +28,7 @@ BY_KEYS: dict[Mode, str] = {
 
 
 @dataclass(frozen=True)
-class Device:
+class InputDevice:
     """What a user has in hand, in words. modes: what is next. go_on: ends a stop; offered: takes the point that is.
     names: of the rigid and of the tip target; sets: how one is set, its name left open; asks: for a plan."""
 
@@ -40,11 +40,11 @@ class Device:
     asks: str
 
 
-CONTROLLERS = Device(
+CONTROLLERS = InputDevice(
     NEXT, "primary", "primary, the grip let go,", ("rigid", "tip"), "hold a grip to set the {} target",
     "pull the trigger",
 )  # fmt: skip
-KEYBOARD = Device(
+KEYBOARD = InputDevice(
     BY_KEYS, "R", "R", ("the mount’s", "the tip’s"), "drag {} marker, or move it by arrows (1: mount, 2: tip)",
     "press Enter",
 )  # fmt: skip
@@ -62,7 +62,7 @@ def next_key(mode: Mode, targets: Targets | None, holder: str, touched: tuple[bo
     return _next(KEYBOARD, mode, targets, holder, touched)
 
 
-def _next(device: Device, mode: Mode, targets: Targets | None, holder: str, touched: tuple[bool, bool]) -> str:
+def _next(device: InputDevice, mode: Mode, targets: Targets | None, holder: str, touched: tuple[bool, bool]) -> str:
     if not holder:
         then = f", then press {device.go_on}" if mode == "stopped" else "; anybody may stop the robot"
         return f"take control{then}"

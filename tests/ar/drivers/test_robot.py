@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from trunkline.ar.drivers.driver import TICK
-from trunkline.ar.drivers.robot import LEAD, Machine
+from trunkline.ar.drivers.robot import LEAD, HardwareRobot
 from trunkline.ar.session import simulated
 from trunkline.ar.session.simulated import drive
 
@@ -50,7 +50,7 @@ def test_after_it_was_late_setpoints_are_as_far_ahead_as_before(monkeypatch, by)
     """Three times, as what is left of it would add up."""
     clock = Clock({0.1: by, 0.5: by, 0.9: by})
     arm = Sent(clock)
-    machine = Machine(arm, None, STRAIGHT, clock.monotonic)
+    machine = HardwareRobot(arm, None, STRAIGHT, clock.monotonic)
     machine.begin(np.zeros(7))
     loop = SimpleNamespace(
         plant=machine, moves=False, turn=lambda *_: None, tell=lambda _: None, channel=SimpleNamespace(wake=clock),

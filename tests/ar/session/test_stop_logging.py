@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tests.ar.session.test_desk import DIGEST, PACKAGE, STRAIGHT, ToldRobot, desk_of, intent, some_plan
+from tests.ar.session.test_controller import DIGEST, PACKAGE, STRAIGHT, ToldRobot, controller_of, intent, some_plan
 from tests.ar.session.test_permits import FOLLOWING, LIMITS, Played, plan_of
 from trunkline.ar.session import messages, preview_process
-from trunkline.ar.session.robot import DEAD_MAN, HELD, MODE, MODES, READY, SERIAL, STOPS, Goal
+from trunkline.ar.session.robot import DEAD_MAN, HOLD_TIME, MODE, MODES, READY, SERIAL, STOPS, Goal
 from trunkline.ar.teleop.executor import FOLLOWS
 from trunkline.ar.teleop.messages import ExecutorReport, PlanReport
 from trunkline.ar.teleop.plan import Plan
@@ -20,45 +20,47 @@ from trunkline.ar.teleop.trajectory import gentle
 def test_a_stop_is_noted_unless_all_is_stopped_already(before, noted):
     events: list[str] = []
     robot = ToldRobot("running")
-    desk = desk_of(robot, journal=SimpleNamespace(event=events.append))
-    desk.intent = before and intent(before)
-    desk.stop()
+    controller = controller_of(robot, log_writer=SimpleNamespace(event=events.append))
+    controller.intent = before and intent(before)
+    controller.stop()
     assert (events, robot.calls) == (noted, ["stop"])
 
 
 def test_before_anything_was_started_a_robot_tells_so():
-    numbers, fault = Played().told
-    assert (numbers[SERIAL], numbers[HELD], numbers[READY], fault) == (0, 0, 1, "")
+    numbers, fault = Played().report
+    assert (numbers[SERIAL], numbers[HOLD_TIME], numbers[READY], fault) == (0, 0, 1, "")
     assert MODES[int(numbers[MODE])] == "idle"
 
 
 def test_an_answer_of_who_seeks_is_of_no_plan():
     """Whatever number it has."""
-    desk, handed = desk_of(ToldRobot()), []
-    desk._seeking = SimpleNamespace(found=handed.append)
-    answer = preview_process.Found(*[desk._asked] * len(fields(preview_process.Found)))
-    assert desk.answered(answer, 0.0) is False
+    controller, handed = controller_of(ToldRobot()), []
+    controller._follow = SimpleNamespace(answer=handed.append)
+    answer = preview_process.FollowAnswer(*[controller._asked] * len(fields(preview_process.FollowAnswer)))
+    assert controller.answered(answer, 0.0) is False
     assert handed == [answer]
 
 
 def test_what_was_planned_previewed_and_foreseen_is_noted():
     noted: list[str] = []
-    journal = SimpleNamespace(event=lambda name, **_: noted.append(name), piece=lambda *_: noted.append("piece"))
-    desk, plan = desk_of(ToldRobot(), journal=journal), some_plan()
+    log_writer = SimpleNamespace(event=lambda name, **_: noted.append(name), piece=lambda *_: noted.append("piece"))
+    controller, plan = controller_of(ToldRobot(), log_writer=log_writer), some_plan()
     for answer in (
-        preview_process.Planned(PlanReport(desk._asked, plan.digest(), "", PACKAGE, "world"), plan),
-        preview_process.Begun(desk._asked, messages.Preview(DIGEST, 0.02, 0.3, 0.02, ())),
-        preview_process.Shown(desk._asked, 0, 0.0, np.zeros((1, 1, 7)), True),
-        preview_process.Told(desk._asked, messages.Foreseen(DIGEST, None, None, None, (), (), (), 0.9, 12)),
+        preview_process.PlanAnswer(PlanReport(controller._asked, plan.digest(), "", PACKAGE, "world"), plan),
+        preview_process.PreviewBegun(controller._asked, messages.PreviewMessage(DIGEST, 0.02, 0.3, 0.02, ())),
+        preview_process.PreviewPiece(controller._asked, 0, 0.0, np.zeros((1, 1, 7)), True),
+        preview_process.PredictionAnswer(
+            controller._asked, messages.PredictionMessage(DIGEST, None, None, None, (), (), (), 0.9, 12)
+        ),
     ):
-        assert desk.answered(answer, 0.0)
+        assert controller.answered(answer, 0.0)
     assert noted == ["planned", "preview", "piece", "foreseen"]
 
 
 def test_a_robot_that_rests_needs_no_permit_and_is_held_by_none():
     played = Played()
     played.turn(0.5, permits=False)
-    assert played.told[0][HELD] == 0
+    assert played.report[0][HOLD_TIME] == 0
     assert played.begin(plan_of()).turn(0.1).mode == "running"
 
 
@@ -79,31 +81,31 @@ def test_of_several_stops_the_last_is_told():
     for _ in range(2):
         played.channel.asked[STOPS] += 1
         played.turn(2 * played.plant.tick)
-        assert played.told[0][HELD] == played.now - played.plant.tick
+        assert played.report[0][HOLD_TIME] == played.now - played.plant.tick
 
 
 def test_what_was_held_is_started_anew_and_has_not_come_to_rest_by_itself():
     robot = ToldRobot("idle")
-    desk = desk_of(robot)
-    desk.plan = some_plan()
-    goes = intent("execute", desk.plan.digest())
-    desk._drive(goes)
-    robot.report = ExecutorReport("running", desk.plan.digest())
-    desk._drive(goes)
-    desk._drive(intent("hold"))
-    robot.report = ExecutorReport("idle", desk.plan.digest())
+    controller = controller_of(robot)
+    controller.plan = some_plan()
+    goes = intent("execute", controller.plan.digest())
+    controller._drive(goes)
+    robot.report = ExecutorReport("running", controller.plan.digest())
+    controller._drive(goes)
+    controller._drive(intent("hold"))
+    robot.report = ExecutorReport("idle", controller.plan.digest())
     robot.calls.clear()
-    desk._drive(goes)
-    assert (robot.calls, desk._fault) == (["start", "permit"], "")
+    controller._drive(goes)
+    assert (robot.calls, controller._fault) == (["start", "permit"], "")
 
 
 @pytest.mark.parametrize(("motion", "fault"), [("execute", ""), ("follow", "nobody seeks")])
 def test_who_seeks_counts_as_it_follows_alone(motion, fault):
-    desk = desk_of(ToldRobot("running"))
-    desk.plan = some_plan()
-    desk._seeking = SimpleNamespace(fault="nobody seeks", begin=lambda: None)
-    desk._drive(intent(motion, desk.plan.digest() if motion == "execute" else "", motion))
-    assert desk._fault == fault
+    controller = controller_of(ToldRobot("running"))
+    controller.plan = some_plan()
+    controller._follow = SimpleNamespace(fault="nobody seeks", begin=lambda: None)
+    controller._drive(intent(motion, controller.plan.digest() if motion == "execute" else "", motion))
+    assert controller._fault == fault
 
 
 @pytest.mark.parametrize("refused", ["", "busy"])
@@ -112,11 +114,11 @@ def test_what_is_begun_is_noted_and_targets_are_sought_where_it_is_not_refused(m
     noted, sought = [], []
     robot = ToldRobot("idle")
     robot.start = robot.follow = lambda *_: refused
-    journal = SimpleNamespace(fault="", event=lambda name, **more: noted.append((name, more["refused"])))
-    desk = desk_of(robot, journal=journal)
-    desk.plan = some_plan()
-    desk._seeking = SimpleNamespace(fault="", begin=lambda: sought.append(motion))
-    desk._begin(intent(motion, desk.plan.digest() if motion == "execute" else "", motion))
+    log_writer = SimpleNamespace(fault="", event=lambda name, **more: noted.append((name, more["refused"])))
+    controller = controller_of(robot, log_writer=log_writer)
+    controller.plan = some_plan()
+    controller._follow = SimpleNamespace(fault="", begin=lambda: sought.append(motion))
+    controller._begin(intent(motion, controller.plan.digest() if motion == "execute" else "", motion))
     assert noted == [(motion, refused)]
     assert sought == (["follow"] if motion == "follow" and not refused else [])
 
@@ -124,20 +126,20 @@ def test_what_is_begun_is_noted_and_targets_are_sought_where_it_is_not_refused(m
 def test_a_fault_of_what_it_follows_is_told_and_lasts():
     played = Played()
     played.robot._report = ExecutorReport("fault", "", "no way to brake")
-    numbers, fault = played.told
+    numbers, fault = played.report
     assert (MODES[int(numbers[MODE])], fault) == ("fault", "no way to brake")
     played.robot._report = ExecutorReport("idle", "")
-    assert played.told[1] == "no way to brake"
+    assert played.report[1] == "no way to brake"
 
 
 def test_a_stop_of_what_nobody_permits_any_more_is_told_as_the_later():
     played = Played().begin(plan_of()).turn(0.05)
     played.turn(DEAD_MAN + 3 * played.plant.tick, permits=False)
-    ended = played.told[0][HELD]
+    ended = played.report[0][HOLD_TIME]
     played.channel.asked[STOPS] += 1
     played.turn(played.plant.tick, permits=False)
     assert played.mode == "running"  # it brakes still
-    assert played.told[0][HELD] == played.now > ended
+    assert played.report[0][HOLD_TIME] == played.now > ended
 
 
 def test_how_old_targets_are_is_told_with_them():

@@ -15,9 +15,9 @@ PAGE = Path(__file__).parents[3] / "client/src/index.html"
 def test_whoever_has_a_keyboard_is_told_of_no_controller(mode):
     for holder in ("", "somebody"):
         for touched in ((False, False), (True, False), (True, True)):
-            told = next_key(mode, None, holder, touched)
-            assert told
-            assert not any(word in told for word in ("trigger", "grip", "primary", "ray", "stick"))
+            action = next_key(mode, None, holder, touched)
+            assert action
+            assert not any(word in action for word in ("trigger", "grip", "primary", "ray", "stick"))
             assert next_action(mode, None, holder, True, touched)
 
 

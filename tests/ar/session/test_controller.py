@@ -15,10 +15,10 @@ from tests.support.operator import PACKAGE, Everywhere
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import messages, preview_process
 from trunkline.ar.session.binary import HAND, Received
-from trunkline.ar.session.controller import MOST_INPUTS, Desk
+from trunkline.ar.session.controller import MOST_INPUTS, SessionController
 from trunkline.ar.session.follow import SILENT
-from trunkline.ar.session.log_writer import Journal
-from trunkline.ar.session.robot import Standing
+from trunkline.ar.session.log_writer import LogWriter
+from trunkline.ar.session.robot import RobotState
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.executor import FOLLOWS, SimulatedRobot
 from trunkline.ar.teleop.messages import Box, ExecutorReport, Intent, PlanReport, Pose
@@ -59,8 +59,8 @@ class ToldRobot:
     def state(self):
         return self.report
 
-    def standing(self):
-        return Standing(0.0, 0.0, START, STRAIGHT, NOTHING, np.zeros((BODIES, 7)))
+    def robot_state(self):
+        return RobotState(0.0, 0.0, START, STRAIGHT, NOTHING, np.zeros((BODIES, 7)))
 
 
 class Ordered:
@@ -76,9 +76,9 @@ class Ordered:
         self.left += 1
 
 
-def desk_of(robot, planning=None, journal=None, world=None) -> Desk:
+def controller_of(robot, planning=None, log_writer=None, world=None) -> SessionController:
     core = Teleoperation(patient(), Everywhere(), PACKAGE, OFFSET)
-    return Desk(core, robot, planning or Ordered(), world or make_world(()), 0.1, journal)
+    return SessionController(core, robot, planning or Ordered(), world or make_world(()), 0.1, log_writer)
 
 
 def some_plan(package=PACKAGE) -> Plan:
@@ -96,167 +96,167 @@ def intent(mode: str, execute: str = "", motion: str = "") -> Intent:
 def test_only_the_plan_that_was_confirmed_is_started(plan):
     """Its digest is compared here, whatever the robot would compare."""
     robot = ToldRobot()
-    desk = desk_of(robot)
-    desk.plan = plan
-    desk._drive(intent("execute", some_plan().digest()))
+    controller = controller_of(robot)
+    controller.plan = plan
+    controller._drive(intent("execute", some_plan().digest()))
     assert robot.calls == []
-    assert desk._fault == "the plan that was confirmed is not there"
-    desk._drive(intent("execute", some_plan().digest()))
+    assert controller._fault == "the plan that was confirmed is not there"
+    controller._drive(intent("execute", some_plan().digest()))
     assert "start" not in robot.calls
     assert "permit" not in robot.calls
 
 
 def test_the_plan_that_was_confirmed_is_started_once_and_permitted_at_each_step():
     robot = ToldRobot()
-    desk = desk_of(robot)
-    desk.plan = some_plan()
+    controller = controller_of(robot)
+    controller.plan = some_plan()
     for mode in ("idle", "running", "running"):  # a start on its way reads as idle
         robot.report = ExecutorReport(mode, DIGEST)
-        desk._drive(intent("execute", some_plan().digest()))
+        controller._drive(intent("execute", some_plan().digest()))
     assert robot.calls == ["start", "permit", "permit", "permit"]
 
 
-def blocked(desk, how):
+def blocked(controller, how):
     if how == "unfit":
-        desk.align(BASE, "it is not sure enough")
+        controller.align(BASE, "it is not sure enough")
     else:
-        desk.journal.fault = "log: no space left"
+        controller.log_writer.fault = "log: no space left"
 
 
 @pytest.mark.parametrize("how", ["unfit", "log"])
 @pytest.mark.parametrize("motion", ["execute", "follow"])
 def test_where_nothing_may_be_executed_nothing_is_started_or_permitted(motion, how):
     robot = ToldRobot()
-    desk = desk_of(robot, journal=Journal())
-    desk.plan = some_plan()
-    blocked(desk, how)
+    controller = controller_of(robot, log_writer=LogWriter())
+    controller.plan = some_plan()
+    blocked(controller, how)
     execute = some_plan().digest() if motion == "execute" else ""
     for _ in range(3):
-        desk._drive(intent(motion, execute, motion))
+        controller._drive(intent(motion, execute, motion))
     assert not {"start", "follow", "permit"} & set(robot.calls)
-    assert desk._fault == desk.blocked != ""
+    assert controller._fault == controller.blocked != ""
 
 
 @pytest.mark.parametrize("how", ["unfit", "log"])
 def test_what_runs_is_stopped_as_soon_as_nothing_may_be_executed_and_permitted_no_more(how):
     robot = ToldRobot("running")
-    desk = desk_of(robot, journal=Journal())
-    desk.plan = some_plan()
-    desk._drive(intent("execute", some_plan().digest()))
-    blocked(desk, how)
+    controller = controller_of(robot, log_writer=LogWriter())
+    controller.plan = some_plan()
+    controller._drive(intent("execute", some_plan().digest()))
+    blocked(controller, how)
     robot.calls.clear()
     for _ in range(3):
-        desk._drive(intent("execute", some_plan().digest()))
+        controller._drive(intent("execute", some_plan().digest()))
     assert robot.calls == ["stop"]
 
 
 @pytest.mark.parametrize("motion", ["execute", "follow"])
 def test_a_start_that_is_refused_is_a_fault_and_nothing_is_permitted(motion):
     robot = ToldRobot(refuses="busy: another plan runs")
-    desk = desk_of(robot)
-    desk.plan = some_plan()
+    controller = controller_of(robot)
+    controller.plan = some_plan()
     execute = some_plan().digest() if motion == "execute" else ""
     for _ in range(3):
-        desk._drive(intent(motion, execute, motion))
+        controller._drive(intent(motion, execute, motion))
     assert robot.calls == ["start" if motion == "execute" else "follow"]
-    assert desk._fault == "busy: another plan runs"
+    assert controller._fault == "busy: another plan runs"
 
 
 @pytest.mark.parametrize("motion", ["execute", "follow"])
 def test_a_robot_that_has_come_to_rest_by_itself_is_a_fault_and_permitted_no_more(motion):
     robot = ToldRobot("running")
-    desk = desk_of(robot)
-    desk.plan = some_plan()
+    controller = controller_of(robot)
+    controller.plan = some_plan()
     execute = some_plan().digest() if motion == "execute" else ""
-    desk._drive(intent(motion, execute, motion))
-    desk._drive(intent(motion, execute, motion))
-    assert desk._fault == ""
+    controller._drive(intent(motion, execute, motion))
+    controller._drive(intent(motion, execute, motion))
+    assert controller._fault == ""
     robot.report = ExecutorReport("idle", DIGEST)
     robot.calls.clear()
-    desk._drive(intent(motion, execute, motion))
-    assert desk._fault == "it has come to rest by itself"
-    desk._drive(intent(motion, execute, motion))
+    controller._drive(intent(motion, execute, motion))
+    assert controller._fault == "it has come to rest by itself"
+    controller._drive(intent(motion, execute, motion))
     assert "permit" not in robot.calls
 
 
 def test_a_robot_that_is_done_or_was_never_seen_to_run_has_not_come_to_rest_by_itself():
     for mode in ("idle", "done"):
         robot = ToldRobot()
-        desk = desk_of(robot)
-        desk.plan = some_plan()
-        desk._drive(intent("execute", some_plan().digest()))
+        controller = controller_of(robot)
+        controller.plan = some_plan()
+        controller._drive(intent("execute", some_plan().digest()))
         robot.report = ExecutorReport(mode, DIGEST)
-        desk._drive(intent("execute", some_plan().digest()))
-        assert desk._fault == ""
+        controller._drive(intent("execute", some_plan().digest()))
+        assert controller._fault == ""
     robot.report = ExecutorReport("running", DIGEST)
-    desk._drive(intent("execute", some_plan().digest()))
+    controller._drive(intent("execute", some_plan().digest()))
     robot.report = ExecutorReport("done", DIGEST)
-    desk._drive(intent("execute", some_plan().digest()))
-    assert desk._fault == ""
+    controller._drive(intent("execute", some_plan().digest()))
+    assert controller._fault == ""
 
 
 @pytest.mark.parametrize("mode", ["running", "idle", "done", "fault"])
 @pytest.mark.parametrize("started", [True, False])
 def test_an_intent_to_hold_stops_what_runs_or_is_on_its_way(mode, started):
     robot = ToldRobot(mode)
-    desk = desk_of(robot)
-    desk._started = some_plan().digest() if started else ""
-    desk._drive(intent("hold"))
+    controller = controller_of(robot)
+    controller._started = some_plan().digest() if started else ""
+    controller._drive(intent("hold"))
     assert robot.calls == (["stop"] if mode == "running" or started else [])
 
 
 def test_a_fault_lasts_while_it_is_stopped_and_ends_with_it():
-    desk = desk_of(ToldRobot())
-    desk._fault = "reflex"
-    desk._drive(intent("stopped"))
-    assert desk._fault == "reflex"
-    desk._drive(intent("hold"))
-    assert desk._fault == ""
+    controller = controller_of(ToldRobot())
+    controller._fault = "reflex"
+    controller._drive(intent("stopped"))
+    assert controller._fault == "reflex"
+    controller._drive(intent("hold"))
+    assert controller._fault == ""
 
 
 def test_an_older_fault_is_not_replaced_by_a_newer_one():
     robot = ToldRobot("running")
-    desk = desk_of(robot)
-    desk.plan = some_plan()
-    desk._drive(intent("execute", some_plan().digest()))
+    controller = controller_of(robot)
+    controller.plan = some_plan()
+    controller._drive(intent("execute", some_plan().digest()))
     robot.report = ExecutorReport("idle", DIGEST)
-    desk._drive(intent("execute", some_plan().digest()))
-    blocked(desk, "unfit")
-    desk._drive(intent("execute", some_plan().digest()))
-    assert desk._fault == "it has come to rest by itself"
+    controller._drive(intent("execute", some_plan().digest()))
+    blocked(controller, "unfit")
+    controller._drive(intent("execute", some_plan().digest()))
+    assert controller._fault == "it has come to rest by itself"
 
 
 @pytest.mark.parametrize("silent", [SILENT - 0.01, SILENT + 0.01])
 def test_as_it_follows_a_process_that_plans_has_to_answer(silent):
     robot = ToldRobot("running")
-    desk = desk_of(robot)
-    desk._drive(intent("follow", motion="follow"))
-    desk._seeking.seek(None, START, desk.world)
-    desk._seeking.advance(silent)
+    controller = controller_of(robot)
+    controller._drive(intent("follow", motion="follow"))
+    controller._follow.seek(None, START, controller.world)
+    controller._follow.advance(silent)
     robot.calls.clear()
-    desk._drive(intent("follow", motion="follow"))
+    controller._drive(intent("follow", motion="follow"))
     assert robot.calls == (["permit"] if silent < SILENT else ["stop"])
-    assert desk._fault == ("" if silent < SILENT else "the process that plans has not answered for 1.01 s")
+    assert controller._fault == ("" if silent < SILENT else "the process that plans has not answered for 1.01 s")
 
 
 @pytest.mark.parametrize("alignment", [None, BASE])
 def test_whoever_takes_over_finds_a_robot_that_was_told_to_stop_and_nothing_of_what_was_heard(alignment):
     robot = ToldRobot("running")
-    desk = desk_of(robot)
-    desk.hear(received(1.0))
-    desk.control(alignment, "not sure")
+    controller = controller_of(robot)
+    controller.hear(received(1.0))
+    controller.control(alignment, "not sure")
     assert robot.calls == ["stop"]
-    assert not desk._heard
-    assert (desk.alignment, desk.unfit) == (alignment, "not sure")
-    assert desk.hear(received(0.5)) == ""  # another clock
+    assert not controller._heard
+    assert (controller.alignment, controller.unfit) == (alignment, "not sure")
+    assert controller.hear(received(0.5)) == ""  # another clock
 
 
 def test_a_stop_is_told_to_the_robot_at_once_and_to_the_core_at_its_next_step_whoever_controls():
     robot = ToldRobot("running")
-    desk = desk_of(robot)
-    desk.stop()
+    controller = controller_of(robot)
+    controller.stop()
     assert robot.calls == ["stop"]
-    assert desk.tick(DT).mode == "stopped"
+    assert controller.tick(DT).mode == "stopped"
 
 
 # --- what is heard
@@ -274,32 +274,34 @@ def received(stamp, left=None, right=None, flags=TRACKED) -> Received:
 
 @pytest.mark.parametrize(("stamp", "counts"), [(1.0, False), (0.9, False), (1.0 + 1e-9, True)])
 def test_an_input_that_was_heard_before_does_not_count(stamp, counts):
-    desk = desk_of(ToldRobot())
-    assert desk.hear(received(1.0)) == ""
-    assert (desk.hear(received(stamp)) == "") == counts
-    desk.tick(DT)
-    assert desk.hear(received(max(stamp, 1.0))) != ""  # nor a tick later
+    controller = controller_of(ToldRobot())
+    assert controller.hear(received(1.0)) == ""
+    assert (controller.hear(received(stamp)) == "") == counts
+    controller.tick(DT)
+    assert controller.hear(received(max(stamp, 1.0))) != ""  # nor a tick later
 
 
 def test_of_more_inputs_than_a_tick_takes_the_oldest_are_left_out():
-    desk = desk_of(ToldRobot())
+    controller = controller_of(ToldRobot())
     for number in range(MOST_INPUTS + 3):
-        desk.hear(received(1.0 + number))
-    assert [heard.stamp for heard in desk._heard] == [1.0 + number for number in range(3, MOST_INPUTS + 3)]
+        controller.hear(received(1.0 + number))
+    assert [heard.stamp for heard in controller._heard] == [1.0 + number for number in range(3, MOST_INPUTS + 3)]
 
 
 # --- what has been shown
 
 
-def previewed(**changes) -> Desk:
+def previewed(**changes) -> SessionController:
     """A desk at whose preview a client looks since 10 s."""
-    desk = desk_of(ToldRobot())
-    desk.intent = replace(intent("preview"), preview=DIGEST)
-    desk.preview, desk._since = messages.Preview(DIGEST, 0.02, PREVIEW, 0.02, ()), 10.0
-    desk.pieces = [preview_process.Shown(1, 0, 0.0, np.zeros((1, BODIES, 7)), last) for last in (False, True)]
+    controller = controller_of(ToldRobot())
+    controller.intent = replace(intent("preview"), preview=DIGEST)
+    controller.preview, controller._since = messages.PreviewMessage(DIGEST, 0.02, PREVIEW, 0.02, ()), 10.0
+    controller.pieces = [
+        preview_process.PreviewPiece(1, 0, 0.0, np.zeros((1, BODIES, 7)), last) for last in (False, True)
+    ]
     for name, value in changes.items():
-        setattr(desk, name, value)
-    return desk
+        setattr(controller, name, value)
+    return controller
 
 
 SHOWN = [
@@ -308,41 +310,48 @@ SHOWN = [
     ({}, "e" * 64, PREVIEW, f"shown: found digest 'eeeeeeeeeeee', expected {DIGEST[:12]}"),
     ({}, "", PREVIEW, f"shown: found digest '', expected {DIGEST[:12]}"),
     ({"pieces": []}, DIGEST, PREVIEW, "shown: its preview is not simulated to its end yet"),
-    ({"pieces": [preview_process.Shown(1, 0, 0.0, np.zeros((1, BODIES, 7)), False)]}, DIGEST, PREVIEW,
+    ({"pieces": [preview_process.PreviewPiece(1, 0, 0.0, np.zeros((1, BODIES, 7)), False)]}, DIGEST, PREVIEW,
      "shown: its preview is not simulated to its end yet"),
     ({"intent": None}, DIGEST, PREVIEW, "shown: no plan is previewed"),
     ({"intent": intent("aim")}, "", PREVIEW, "shown: no plan is previewed"),
     ({"preview": None}, DIGEST, PREVIEW, "shown: no plan is previewed"),
-    ({"preview": messages.Preview("e" * 64, 0.02, PREVIEW, 0.02, ())}, DIGEST, PREVIEW, "shown: no plan is previewed"),
+    ({"preview": messages.PreviewMessage("e" * 64, 0.02, PREVIEW, 0.02, ())}, DIGEST, PREVIEW,
+     "shown: no plan is previewed"),
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("changes", "digest", "after", "said"), SHOWN)
-def test_what_counts_as_shown_to_its_end(changes, digest, after, said):
-    desk = previewed(**changes)
-    assert desk.shown(digest, 10.0 + after) == said
-    assert desk._shown == ("" if said else DIGEST)
+@pytest.mark.parametrize(("changes", "digest", "after", "reason"), SHOWN)
+def test_what_counts_as_shown_to_its_end(changes, digest, after, reason):
+    controller = previewed(**changes)
+    assert controller.shown(digest, 10.0 + after) == reason
+    assert controller._shown == ("" if reason else DIGEST)
 
 
 @pytest.mark.parametrize(("serial", "counts"), [(2, False), (3, True), (4, False)])
 def test_only_an_answer_to_what_was_asked_for_last_counts(serial, counts):
-    desk = desk_of(ToldRobot())
-    desk._asked = 3
-    plan, told = some_plan(), messages.Foreseen(DIGEST, None, None, None, (), (), (), 0.9, 12)
+    controller = controller_of(ToldRobot())
+    controller._asked = 3
+    plan, prediction = some_plan(), messages.PredictionMessage(DIGEST, None, None, None, (), (), (), 0.9, 12)
     answers = [
-        preview_process.Planned(PlanReport(serial, plan.digest(), "", PACKAGE, "world"), plan),
-        preview_process.Begun(serial, messages.Preview(DIGEST, 0.02, PREVIEW, 0.02, ())),
-        preview_process.Shown(serial, 0, 0.0, np.zeros((1, BODIES, 7)), True), preview_process.Told(serial, told),
+        preview_process.PlanAnswer(PlanReport(serial, plan.digest(), "", PACKAGE, "world"), plan),
+        preview_process.PreviewBegun(serial, messages.PreviewMessage(DIGEST, 0.02, PREVIEW, 0.02, ())),
+        preview_process.PreviewPiece(serial, 0, 0.0, np.zeros((1, BODIES, 7)), True),
+        preview_process.PredictionAnswer(serial, prediction),
     ]  # fmt: skip
-    assert [desk.answered(answer, 0.0) for answer in answers] == [counts] * 4
-    assert [desk.plan is plan, desk.preview is not None, bool(desk.pieces), desk.foreseen is told] == [counts] * 4
+    assert [controller.answered(answer, 0.0) for answer in answers] == [counts] * 4
+    assert [
+        controller.plan is plan,
+        controller.preview is not None,
+        bool(controller.pieces),
+        controller.foreseen is prediction,
+    ] == [counts] * 4
 
 
 def test_a_process_that_plans_and_has_ended_is_a_refusal():
-    desk = desk_of(ToldRobot())
-    desk._asked = 3
-    assert not desk.answered(None, 0.0)
-    assert (desk.report.serial, desk.report.refused) == (3, "the process that plans has ended")
+    controller = controller_of(ToldRobot())
+    controller._asked = 3
+    assert not controller.answered(None, 0.0)
+    assert (controller.report.serial, controller.report.refused) == (3, "the process that plans has ended")
 
 
 # --- a whole session, tick by tick
@@ -365,41 +374,41 @@ class PlayedRobot(SimulatedRobot):
         self.stops += 1
         super().stop()
 
-    def standing(self):
-        return Standing(0.0, 0.0, self.joints, self.commands, NOTHING, np.zeros((BODIES, 7)))
+    def robot_state(self):
+        return RobotState(0.0, 0.0, self.joints, self.commands, NOTHING, np.zeros((BODIES, 7)))
 
 
 class Played:
-    """Desk, core, planner and robot, and a client that controls, whose clock is ours. `left`, `right`: its buttons."""
+    """Controller, core, planner, robot and a client that controls, on our clock. `left`, `right`: its buttons."""
 
     def __init__(self):
         self.now, self.robot, self.planning = 100.0, PlayedRobot(), PlainPlanning()
-        self.desk = desk_of(self.robot, self.planning, Journal())
-        self.planning.heard = lambda answer: self.desk.answered(answer, self.now)
-        self.desk.control(BASE)
+        self.controller = controller_of(self.robot, self.planning, LogWriter())
+        self.planning.heard = lambda answer: self.controller.answered(answer, self.now)
+        self.controller.control(BASE)
         self.left, self.right, self.flags = {}, {}, TRACKED
 
     def tick(self, heard=True) -> Intent:
         self.now += DT
         if heard:
-            assert self.desk.hear(received(self.now, self.left, self.right, self.flags)) == ""
+            assert self.controller.hear(received(self.now, self.left, self.right, self.flags)) == ""
         self.robot.advance(DT)
-        return self.desk.tick(DT)
+        return self.controller.tick(DT)
 
     def wait(self, seconds, **how) -> Intent:
         for _ in range(round(seconds / DT)):
-            found = self.tick(**how)
-        return found
+            intent = self.tick(**how)
+        return intent
 
     def until(self, happens, seconds=20.0) -> Intent:
         for _ in range(round(seconds / DT)):
-            found = self.tick()
-            if happens(found):
-                return found
-        raise AssertionError(f"it did not happen: {found.mode}, {found.notice}")
+            intent = self.tick()
+            if happens(intent):
+                return intent
+        raise AssertionError(f"it did not happen: {intent.mode}, {intent.notice}")
 
     def aimed(self) -> "Played":
-        self.until(lambda told: told.mode == "aim")
+        self.until(lambda intent: intent.mode == "aim")
         self.left, self.right = {"grip": 1.0}, {"grip": 1.0}
         self.wait(0.8)
         return self
@@ -408,13 +417,13 @@ class Played:
         """A plan that was previewed and confirmed, and runs for a while."""
         self.aimed()
         self.right = {"grip": 1.0, "trigger": 1.0}
-        self.until(lambda told: told.mode == "preview")
+        self.until(lambda intent: intent.mode == "preview")
         self.right = {"grip": 1.0}
         self.wait(PREVIEW + 0.1)
-        assert self.desk.shown(self.desk.intent.preview, self.now) == ""
-        self.until(lambda told: told.mode == "ready")
+        assert self.controller.shown(self.controller.intent.preview, self.now) == ""
+        self.until(lambda intent: intent.mode == "ready")
         self.right = {"grip": 1.0, "trigger": 1.0}
-        self.until(lambda told: told.mode == "execute")
+        self.until(lambda intent: intent.mode == "execute")
         self.right = {"grip": 1.0}
         self.wait(0.3)
         assert self.robot.state().mode == "running"
@@ -438,7 +447,7 @@ def session():
 
 def test_from_hands_to_a_robot_that_has_arrived(session):
     session.executing()
-    session.until(lambda told: told.mode == "aim")
+    session.until(lambda intent: intent.mode == "aim")
     np.testing.assert_allclose(session.robot.joints, session.planning.plans[0].joints[-1], atol=1e-9)
     assert session.robot.state().mode == "done"
     assert session.robot.stops == 1  # as control began
@@ -466,7 +475,7 @@ def rested(session):
 
 def handed_over(session):
     """To somebody who is aligned alike and holds the same buttons: the core sees nothing of it."""
-    session.desk.control(BASE)
+    session.controller.control(BASE)
     session.wait(0.3)
 
 
@@ -477,21 +486,23 @@ def faulty(session):
 
 
 WAYS = {
-    "a stop": (lambda s: s.desk.stop(), "stopped", "stopped; primary button goes on"),
+    "a stop": (lambda s: s.controller.stop(), "stopped", "stopped; primary button goes on"),
     "a secondary button": (lambda s: s.left.update(secondary=1.0), "stopped", "stopped; primary button goes on"),
     "grips let go": (let_go, "hold", "grips let go; holding"),
     "silence": (lambda s: s.wait(0.6, heard=False), "hold", "client silent for 0.6"),
     "controllers lost": (untracked, "hold", "left controller: not tracked; holding"),
     "hidden": (hidden, "hold", "left controller: not tracked; holding"),
-    "nobody controls": (lambda s: s.desk.control(None), "hold", "base is not aligned; holding"),
+    "nobody controls": (lambda s: s.controller.control(None), "hold", "base is not aligned; holding"),
     "somebody else controls": (handed_over, "stopped", "robot: it has come to rest by itself; stopped"),
-    "alignment lost": (lambda s: s.desk.align(None, ""), "hold", "base is not aligned; holding"),
-    "aligned anew": (lambda s: s.desk.align(Pose((0.0, 0.0, 0.1), IDENTITY), ""), "hold",
+    "alignment lost": (lambda s: s.controller.align(None, ""), "hold", "base is not aligned; holding"),
+    "aligned anew": (lambda s: s.controller.align(Pose((0.0, 0.0, 0.1), IDENTITY), ""), "hold",
                      "base alignment changed; the plan is void"),
-    "not sure any more": (lambda s: s.desk.align(BASE, "it is not sure"), "stopped", "robot: it is not sure; stopped"),
-    "the log is full": (lambda s: setattr(s.desk.journal, "fault", "log: full"), "stopped",
+    "not sure any more": (lambda s: s.controller.align(BASE, "it is not sure"), "stopped",
+                          "robot: it is not sure; stopped"),
+    "the log is full": (lambda s: setattr(s.controller.log_writer, "fault", "log: full"), "stopped",
                         "robot: log: full; stopped"),
-    "the world changed": (lambda s: setattr(s.desk, "world", make_world((Box("b", (9.0,) * 3, (9.1,) * 3),))), "hold",
+    "the world changed": (lambda s: setattr(s.controller, "world", make_world((Box("b", (9.0,) * 3, (9.1,) * 3),))),
+                          "hold",
                           "world changed; the plan is void"),
     "it rested by itself": (rested, "stopped", "robot: it has come to rest by itself; stopped"),
     "a fault of the robot": (faulty, "stopped", "robot: reflex; stopped"),
@@ -503,11 +514,11 @@ def test_a_robot_under_way_is_told_to_hold_and_does_not_go_on(session, way):
     cause, mode, notice = WAYS[way]
     session.executing()
     cause(session)
-    seen = [session.tick() for _ in range(3)]
-    assert seen[-1].mode == mode
-    assert seen[-1].motion == "hold"
+    intents = [session.tick() for _ in range(3)]
+    assert intents[-1].mode == mode
+    assert intents[-1].motion == "hold"
     assert session.robot.stops >= (1 if way in ("it rested by itself", "a fault of the robot") else 2)
-    assert any(told.notice.startswith(notice) for told in seen)
+    assert any(intent.notice.startswith(notice) for intent in intents)
     before = session.robot.permits
     session.assert_it_stays()
     assert session.robot.permits == before
@@ -516,16 +527,16 @@ def test_a_robot_under_way_is_told_to_hold_and_does_not_go_on(session, way):
 def test_as_it_follows_it_goes_after_the_targets_and_holds_as_soon_as_nobody_answers(session):
     session.aimed()
     session.right = {"grip": 1.0, "stick_pressed": 1.0}
-    session.until(lambda told: told.motion == "follow")
+    session.until(lambda intent: intent.motion == "follow")
     session.right = {"grip": 1.0}
     session.wait(1.0)
     assert session.robot.state() == ExecutorReport("running", FOLLOWS)
     session.planning.heard = lambda answer: None
     session.wait(SILENT - 0.2)
-    assert session.desk.intent.motion == "follow"
-    told = session.wait(0.5)
-    assert (told.mode, told.motion) == ("stopped", "hold")
-    assert "the process that plans has not answered for 1.0" in session.desk.state.notice
+    assert session.controller.intent.motion == "follow"
+    intent = session.wait(0.5)
+    assert (intent.mode, intent.motion) == ("stopped", "hold")
+    assert "the process that plans has not answered for 1.0" in session.controller.state.notice
     session.wait(0.5)
     rests = session.robot.joints.copy()
     session.wait(0.5)

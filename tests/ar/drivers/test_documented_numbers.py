@@ -20,10 +20,10 @@ from trunkline.ar.drivers import (
     winch,
 )
 from trunkline.ar.drivers import robot as machine
-from trunkline.ar.drivers.settings import Config
-from trunkline.ar.drivers.winch import ReelSettings
+from trunkline.ar.drivers.settings import ExecutionConfig
+from trunkline.ar.drivers.winch import WinchSettings
 from trunkline.ar.session import auth, client, clock, follow, lease, log_writer, real, robot, server
-from trunkline.ar.session.settings import Config as Live
+from trunkline.ar.session.settings import SessionConfig as Live
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.executor import BRAKE
 from trunkline.kinematics.panda.limits import ACCELERATION, VELOCITY
@@ -31,10 +31,10 @@ from trunkline.pipeline.config import PROJECT, load_folder
 
 ROOT = Path(__file__).parents[3]
 PAGE = "docs/hardware.md"
-SET, TELEOP = load_folder(Config, PROJECT / "conf/execution"), load_folder(Teleop, PROJECT / "conf/teleop")
+SET, TELEOP = load_folder(ExecutionConfig, PROJECT / "conf/execution"), load_folder(Teleop, PROJECT / "conf/teleop")
 LIVE, CORE = load_folder(Live, PROJECT / "conf/live"), TELEOP.core
 ms, mm, Hz = 1e-3, 1e-3, 1.0
-FASTEST_CROSSOVER = next(part.le for part in ReelSettings.__annotations__["crossover"].__metadata__[0].metadata
+FASTEST_CROSSOVER = next(part.le for part in WinchSettings.__annotations__["crossover"].__metadata__[0].metadata
                          if hasattr(part, "le"))  # fmt: skip
 PLANNED = TELEOP.motors.share * VELOCITY[1]  # rad/s
 DELAYED = machine.LEAD + (machine.SMOOTH - 1) * driver.TICK  # s that limbs are behind a plan
@@ -126,9 +126,9 @@ def test_no_figure_with_a_unit_is_left_out(page):
     spans = [match.span() for sentence, _ in FIGURES[page] for match in re.finditer(sentence, text)]
     spans += [(at, at + len(words)) for words in OTHERS[page] for at in (text.find(words),) if at >= 0]
     left = [
-        text[max(found.start() - 40, 0) : found.end() + 10]
-        for found in re.finditer(rf"\d[\d.]*\s{UNITS}", text)
-        if not any(low <= found.start() < high for low, high in spans)
+        text[max(match.start() - 40, 0) : match.end() + 10]
+        for match in re.finditer(rf"\d[\d.]*\s{UNITS}", text)
+        if not any(low <= match.start() < high for low, high in spans)
     ]
     assert left == []
 

@@ -6,7 +6,7 @@ import pytest
 from tests.support.motors import TICK, PlayedMotors, Workbench, homed
 from trunkline.ar.drivers.driver import SILENT
 from trunkline.ar.drivers.motors import HOMING
-from trunkline.ar.drivers.tendon_driver import Cables
+from trunkline.ar.drivers.tendon_driver import TendonDriver
 
 LEAD = 0.03  # s
 
@@ -16,7 +16,7 @@ class Played:
 
     def __init__(self, bench):
         self.bench = bench
-        self.cables = Cables(PlayedMotors(bench), bench.now)
+        self.cables = TendonDriver(PlayedMotors(bench), bench.now)
 
     def play(self, seconds, way=None, turns=True):
         """Sent `way(t)`, m, of all cables, LEAD s ahead, t from 0 on; nothing without it. turns: whether they do."""
@@ -24,7 +24,7 @@ class Played:
         for _ in range(round(seconds / TICK)):
             self.bench.now += TICK
             now = self.bench.now
-            for frame in self.bench.bank.advance(now):
+            for frame in self.bench.simulated.advance(now):
                 self.bench.hear(frame)
             if way is not None:
                 self.cables.send(now + LEAD, np.full(3, way(now - begun)))
@@ -46,11 +46,11 @@ def test_where_setpoints_end_they_hold_and_follow_no_more():
     played.play(0.5, lambda t: 0.03 * t)
     played.play(LEAD + SILENT)
     assert played.cables.fault.startswith("heard no setpoint for 5")
-    held = played.cables.sent
-    np.testing.assert_allclose(held, 0.015, atol=1e-6)
+    pulls = played.cables.sent
+    np.testing.assert_allclose(pulls, 0.015, atol=1e-6)
     played.play(0.3, lambda t: 0.05)
-    np.testing.assert_array_equal(played.cables.sent, held)
-    np.testing.assert_allclose(played.bench.pulls, held, atol=5e-4)
+    np.testing.assert_array_equal(played.cables.sent, pulls)
+    np.testing.assert_allclose(played.bench.pulls, pulls, atol=5e-4)
     assert all(played.bench.currents)
 
 

@@ -7,8 +7,16 @@ import pytest
 
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session.binary import HAND, Received
-from trunkline.ar.session.controller_input import BUTTONS, PRESSED, _controller, buttons, controllers, held, stops
-from trunkline.ar.session.preview_process import Order, _held
+from trunkline.ar.session.controller_input import (
+    BUTTONS,
+    PRESSED,
+    _controller,
+    buttons,
+    controller_pose,
+    controllers,
+    stops,
+)
+from trunkline.ar.session.preview_process import Order, _held_object
 from trunkline.ar.teleop.messages import Thing
 
 NEAR = 1e-6
@@ -31,8 +39,10 @@ def received(left=None, right=None, flags=BOTH):
     ("value", "is_held"), [(0.0, False), (PRESSED - NEAR, False), (PRESSED, True), (1.0, True), (np.nan, False)]
 )
 def test_a_button_is_held_from_half_its_way_on_and_no_other_with_it(name, value, is_held):
-    found = _controller(row(**{name: value}), True)
-    assert {button: getattr(found, button) for button in BUTTONS} == dict.fromkeys(BUTTONS, False) | {name: is_held}
+    controller = _controller(row(**{name: value}), True)
+    assert {button: getattr(controller, button) for button in BUTTONS} == dict.fromkeys(BUTTONS, False) | {
+        name: is_held
+    }
     assert (buttons(received(row(**{name: value}))) != buttons(received())) == is_held
 
 
@@ -56,16 +66,16 @@ def test_no_other_button_does(name):
      (("visible",), False, False), (("left_tracked", "right_tracked"), False, False), ((), False, False)],
 )  # fmt: skip
 def test_a_hand_is_tracked_where_its_controller_is_and_the_page_is_seen(flags, left, right):
-    given = received(flags=flags)
-    assert [hand.tracked for hand in controllers(given)] == [left, right]
-    assert [held(given, side) is not None for side in ("left", "right")] == [left, right]
+    message = received(flags=flags)
+    assert [hand.tracked for hand in controllers(message)] == [left, right]
+    assert [controller_pose(message, side) is not None for side in ("left", "right")] == [left, right]
 
 
 @pytest.mark.parametrize("name", HAND[:7])
 def test_what_is_no_pose_is_left_for_the_core_to_refuse_and_touches_nothing(name):
-    given = received(row(**{name: np.nan}))
-    assert held(given, "left") is None
-    assert controllers(given)[0].tracked
+    message = received(row(**{name: np.nan}))
+    assert controller_pose(message, "left") is None
+    assert controllers(message)[0].tracked
 
 
 @pytest.mark.parametrize(
@@ -76,4 +86,4 @@ def test_a_thing_is_brought_where_it_is_meant_and_in_the_arm(support, named, is_
     thing = Thing("the cup", "cylinder", 0.05, 0.1, 0.1, CUP.position, support=support)
     targets = SimpleNamespace(thing="the cup" if named else "")
     order = Order(SimpleNamespace(targets=targets), make_world((), (thing,)), np.zeros(7), np.zeros(3))
-    assert (_held(order) is not None) == is_held
+    assert (_held_object(order) is not None) == is_held

@@ -21,8 +21,8 @@ from trunkline.ar.preview.grasp_preview import GraspPreviewer
 from trunkline.ar.preview.preview_twin import RobotModel
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import preview_process
-from trunkline.ar.session.preview_process import Foreseer, Order, Overtaken
-from trunkline.ar.session.settings import Config
+from trunkline.ar.session.preview_process import Order, Overtaken, PreviewPlanner
+from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.teleop.grasping import Grasping
 from trunkline.ar.teleop.messages import Box, Target, Thing
 from trunkline.ar.teleop.object_shapes import below_grip
@@ -35,10 +35,10 @@ FUTURES = 3
 
 
 @cache
-def made() -> Foreseer:
+def made() -> PreviewPlanner:
     s, spec = simulation(), small_spec()
     live, robot = (
-        load_folder(Config, PROJECT / "conf/live"),
+        load_folder(SessionConfig, PROJECT / "conf/live"),
         load_folder(HybridModelSettings, PROJECT / "conf/hybrid").robot,
     )
     grips = {"hanging": SideGrip(config().hanging, read_geometry(spec))}
@@ -46,8 +46,8 @@ def made() -> Foreseer:
     grasping = Grasping(rigid, OFFSET, s.commands, grips, config().handling)
     bends = lambda poses: {k: v - 0.5 + s.commands if k != "tip" else v for k, v in NETWORK.ask(poses).items()}  # noqa: E731
     planner = Planner(rigid, replace(NETWORK, ask=bends), s.commands, LIMITS, OFFSET, step=0.01, grasping=grasping)
-    known = RobotModel(spec, Posterior(contact=Contact()), robot)
-    return Foreseer(planner, GraspPreviewer(known, grips, replace(live.preview, futures=FUTURES)), s.bodies)
+    robot_model = RobotModel(spec, Posterior(contact=Contact()), robot)
+    return PreviewPlanner(planner, GraspPreviewer(robot_model, grips, replace(live.preview, futures=FUTURES)), s.bodies)
 
 
 def order(serial=1, thing="", tip=TIP) -> Order:
@@ -59,14 +59,16 @@ def order(serial=1, thing="", tip=TIP) -> Order:
 
 def test_a_plan_then_its_preview_in_pieces_then_the_batch():
     answers = list(made().answers(order(7)))
-    planned, begun, *pieces, told = answers
-    assert [type(one) for one in (planned, begun, told)] == [
-        preview_process.Planned,
-        preview_process.Begun,
-        preview_process.Told,
+    planned, begun, *pieces, prediction = answers
+    assert [type(answer) for answer in (planned, begun, prediction)] == [
+        preview_process.PlanAnswer,
+        preview_process.PreviewBegun,
+        preview_process.PredictionAnswer,
     ]
-    assert planned.report.digest == planned.plan.digest() == begun.preview.digest == told.foreseen.digest
-    assert {one.report.serial if isinstance(one, preview_process.Planned) else one.serial for one in answers} == {7}
+    assert planned.report.digest == planned.plan.digest() == begun.preview.digest == prediction.foreseen.digest
+    assert {
+        answer.report.serial if isinstance(answer, preview_process.PlanAnswer) else answer.serial for answer in answers
+    } == {7}
     assert [piece.last for piece in pieces] == [False] * (len(pieces) - 1) + [True]
     frames = np.cumsum([0] + [len(piece.poses) for piece in pieces])
     assert [piece.first for piece in pieces] == list(frames[:-1])
@@ -76,60 +78,67 @@ def test_a_plan_then_its_preview_in_pieces_then_the_batch():
     assert np.isfinite(poses).all()
     mount = simulation().bodies.index("base")
     assert np.linalg.norm(poses[-1, mount, :3] - np.array(MOUNT)) < 0.03
-    assert (told.foreseen.futures, told.foreseen.probability) == (FUTURES, None)
-    assert len(told.foreseen.times) == len(told.foreseen.tip) == len(told.foreseen.spread)
+    assert (prediction.foreseen.futures, prediction.foreseen.probability) == (FUTURES, None)
+    assert len(prediction.foreseen.times) == len(prediction.foreseen.tip) == len(prediction.foreseen.spread)
 
 
 def test_the_first_plan_in_a_world_that_was_prepared_for_composes_no_twin(monkeypatch):
-    once = Foreseer(made().planner, made().foresight, made().bodies)
+    once = PreviewPlanner(made().planner, made().foresight, made().bodies)
     once.prepare(order())
     composed = []
-    monkeypatch.setattr(preview_process, "compose_twin", lambda *given: composed.append(given))
+    monkeypatch.setattr(preview_process, "compose_twin", lambda *args: composed.append(args))
     assert isinstance(
-        next(one for one in once.answers(order(2)) if isinstance(one, preview_process.Shown)), preview_process.Shown
+        next(answer for answer in once.answers(order(2)) if isinstance(answer, preview_process.PreviewPiece)),
+        preview_process.PreviewPiece,
     )
     assert not composed
 
 
 def test_of_a_grasp_the_batch_tells_how_surely_it_holds():
-    planned, *_, told = made().answers(order(8, "the cylinder"))
+    planned, *_, prediction = made().answers(order(8, "the cylinder"))
     assert planned.report.refused == ""
-    assert 0 <= told.foreseen.probability <= 1
-    assert told.foreseen.low <= told.foreseen.probability <= told.foreseen.high
+    assert 0 <= prediction.foreseen.probability <= 1
+    assert prediction.foreseen.low <= prediction.foreseen.probability <= prediction.foreseen.high
     curl = planned.plan.step * dict(planned.plan.phases)["curl"]
-    assert curl < told.foreseen.times[0] < curl + 0.1
+    assert curl < prediction.foreseen.times[0] < curl + 0.1
 
 
 def test_what_is_held_is_seen_in_the_arm_and_brought_to_rest_or_not():
     """As the grasp before it left it; without one, nobody knows how the arm holds it."""
     made_once, grasped = made(), order(8, "the cylinder")
     list(made_once.answers(grasped))
-    held = replace(grasped.world.things[0], support="held")
+    held_object = replace(grasped.world.things[0], support="held")
     lower, tip = ((x, y, z - 0.2) for x, y, z in (MOUNT, TIP))
     targets = replace(grasped.request.targets, rigid=Target(lower), tip=Target(tip))
-    floor = Box("the floor", (-3.0, -3.0, -1.0), (3.0, 3.0, tip[2] - below_grip(held) - 0.02))
+    floor = Box("the floor", (-3.0, -3.0, -1.0), (3.0, 3.0, tip[2] - below_grip(held_object) - 0.02))
     planner = made_once.planner
     plan = planner.plan(grasped.request, grasped.world, grasped.joints, grasped.commands)
     brought = Order(
-        replace(grasped.request, targets=targets), make_world((floor,), (held,)), plan.joints[-1], plan.commands[-1]
+        replace(grasped.request, targets=targets),
+        make_world((floor,), (held_object,)),
+        plan.joints[-1],
+        plan.commands[-1],
     )
-    planned, _, *pieces, told = made_once.answers(brought)
+    planned, _, *pieces, prediction = made_once.answers(brought)
     assert planned.report.refused == ""
     assert [name for name, _ in planned.plan.phases] == ["transfer", "release"]
-    assert told.foreseen.probability is not None
-    assert told.foreseen.low <= told.foreseen.probability <= told.foreseen.high
-    *_, blind = Foreseer(planner, made_once.foresight, made_once.bodies).answers(brought)
+    assert prediction.foreseen.probability is not None
+    assert prediction.foreseen.low <= prediction.foreseen.probability <= prediction.foreseen.high
+    *_, blind = PreviewPlanner(planner, made_once.foresight, made_once.bodies).answers(brought)
     assert blind.foreseen.probability is None
 
 
 def test_the_assistants_offer_comes_after_what_the_batch_tells():
-    known, bodies = made().foresight, made().bodies
-    helpful = replace(known, settings=replace(known.settings, futures=2, assistant=1, sure=1.0, lifted=0.9))
-    answers = list(Foreseer(made().planner, helpful, bodies).answers(order(8, "the cylinder")))
-    tolds = [one for one in answers if isinstance(one, preview_process.Told)]
-    assert [one.foreseen.probability for one in tolds] == [0.0, 0.0]  # nothing is lifted by so much, wherever
-    assert tolds[0].foreseen.offer is None
-    assert answers[-2:] == tolds
+    foresight, bodies = made().foresight, made().bodies
+    helpful = replace(foresight, settings=replace(foresight.settings, futures=2, assistant=1, sure=1.0, lifted=0.9))
+    answers = list(PreviewPlanner(made().planner, helpful, bodies).answers(order(8, "the cylinder")))
+    predictions = [answer for answer in answers if isinstance(answer, preview_process.PredictionAnswer)]
+    assert [answer.foreseen.probability for answer in predictions] == [
+        0.0,
+        0.0,
+    ]  # nothing is lifted by so much, wherever
+    assert predictions[0].foreseen.offer is None
+    assert answers[-2:] == predictions
 
 
 def answering(answers, orders, newest):
@@ -142,12 +151,12 @@ def answering(answers, orders, newest):
 
 def test_another_process_plans_where_one_has_ended():
     heard = queue.Queue()
-    process = preview_process.ForeseerProcess(answering, (), heard.put)
+    process = preview_process.PreviewProcess(answering, (), heard.put)
     try:
         first = process.pid
-        for given, told in [(5, 5), (0, None), (6, 6)]:
-            process.order(given)
-            assert heard.get(timeout=60) == told
+        for request, reply in [(5, 5), (0, None), (6, 6)]:
+            process.order(request)
+            assert heard.get(timeout=60) == reply
         assert process.pid != first
     finally:
         process.close()
@@ -155,7 +164,7 @@ def test_another_process_plans_where_one_has_ended():
 
 def test_a_process_that_cannot_begin_is_not_begun_again():
     heard = queue.Queue()
-    process = preview_process.ForeseerProcess(os._exit, (), heard.put)
+    process = preview_process.PreviewProcess(os._exit, (), heard.put)
     assert heard.get(timeout=60) is None
     time.sleep(0.2)
     assert not process.alive
@@ -175,25 +184,25 @@ def test_a_newer_order_ends_the_one_before_within_a_piece():
     class Pipe:
         def send(self, answer):
             sent.append(answer)
-            if sum(isinstance(one, preview_process.Shown) for one in sent) == 2:
+            if sum(isinstance(answer, preview_process.PreviewPiece) for answer in sent) == 2:
                 newest.value = 2
 
-    given = [(1, order(1)), (2, order(2, tip=(0.5, 0.1, -0.6)))]
-    orders = SimpleNamespace(get=lambda: given.pop(0))
+    waiting = [(1, order(1)), (2, order(2, tip=(0.5, 0.1, -0.6)))]
+    orders = SimpleNamespace(get=lambda: waiting.pop(0))
     with pytest.raises(IndexError):  # there is no third
         preview_process.serve(Pipe(), orders, newest, made())
-    assert sum(isinstance(one, preview_process.Shown) for one in sent) == 2
-    assert isinstance(sent[-1], preview_process.Planned)
+    assert sum(isinstance(answer, preview_process.PreviewPiece) for answer in sent) == 2
+    assert isinstance(sent[-1], preview_process.PlanAnswer)
     assert sent[-1].report.serial == 2
 
 
 def test_what_breaks_a_preview_refuses_its_plan_and_not_the_next():
-    class Broken(Foreseer):
-        def _shown(self, *given):
+    class Broken(PreviewPlanner):
+        def _shown(self, *args):
             raise ValueError("two\nlines")
 
-    broken, sent, given = Broken(made().planner, made().foresight, made().bodies), [], [(1, order(1))]
-    orders = SimpleNamespace(get=lambda: given.pop(0))
+    broken, sent, waiting = Broken(made().planner, made().foresight, made().bodies), [], [(1, order(1))]
+    orders = SimpleNamespace(get=lambda: waiting.pop(0))
     with pytest.raises(IndexError):
         preview_process.serve(SimpleNamespace(send=sent.append), orders, SimpleNamespace(value=1), broken)
     assert sent[-1].report.refused == "preview: ValueError: two"
@@ -204,7 +213,7 @@ def test_an_order_that_is_left_goes_no_further():
         raise Overtaken
 
     answers = made().answers(order(1), go_on)
-    assert isinstance(next(answers), preview_process.Planned)
-    assert isinstance(next(answers), preview_process.Begun)
+    assert isinstance(next(answers), preview_process.PlanAnswer)
+    assert isinstance(next(answers), preview_process.PreviewBegun)
     with pytest.raises(Overtaken):
         next(answers)

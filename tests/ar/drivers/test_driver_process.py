@@ -13,13 +13,13 @@ import pytest
 from tests.support.waiting import SOON, until
 from trunkline.ar.drivers import driver_process
 from trunkline.ar.drivers.driver_client import ArmSettings, panda
-from trunkline.ar.drivers.driver_frames import Line, Setpoint, Told
+from trunkline.ar.drivers.driver_frames import DriverState, FrameSocket, Setpoint
 from trunkline.ar.drivers.setpoint_filter import LIMITS
 from trunkline.errors import InputError
 
 SETTINGS = ArmSettings(python="", address="nowhere", astray=0.1)
 ROOT = Path(__file__).parents[3]
-DT, LEAD, READY = 0.001, 0.03, driver_process.Fake.READY
+DT, LEAD, READY = 0.001, 0.03, driver_process.FakeDevice.READY
 
 
 class Played:
@@ -27,9 +27,9 @@ class Played:
 
     def __init__(self, monkeypatch, robot="panda"):
         ours, theirs = socket.socketpair()
-        self.line, self.theirs, self.now, self.told = Line(ours, Told.size(7)), theirs, 100.0, []
+        self.line, self.theirs, self.now, self.states = FrameSocket(ours, DriverState.size(7)), theirs, 100.0, []
         monkeypatch.setattr(driver_process, "time", SimpleNamespace(monotonic=lambda: self.now))
-        self.adapter, self.joints, self.ended = driver_process.Adapter(robot, theirs), list(READY), False
+        self.adapter, self.joints, self.ended = driver_process.DriverProcess(robot, theirs), list(READY), False
 
     def play(self, seconds, way=None):
         """Sent `way(t)`, (7,), rad, LEAD s ahead; nothing without it."""
@@ -40,14 +40,14 @@ class Played:
                 self.line.send(Setpoint(self.now + LEAD, tuple(way(self.now - begun))).pack())
             self.joints, self.ended = self.adapter.cycle(self.joints, self.joints, DT, None)
             if self.line.open:
-                self.told += [Told.unpack(frame) for frame in self.line.heard()]
+                self.states += [DriverState.unpack(frame) for frame in self.line.heard()]
             if self.ended:
                 break
         return self
 
     @property
     def fault(self):
-        return self.told[-1].fault
+        return self.states[-1].fault
 
 
 @pytest.fixture
@@ -66,9 +66,9 @@ def test_it_plays_what_it_is_sent_and_tells_of_the_robot_as_often_as_it_should(p
     played.play(0.5, turning)
     assert played.fault == ""
     np.testing.assert_allclose(played.joints, turning(0.5 - LEAD), atol=1e-3)
-    times = [told.time for told in played.told]
+    times = [state.time for state in played.states]
     np.testing.assert_allclose(np.diff(times), driver_process.TELL * DT)
-    np.testing.assert_allclose(played.told[-1].sent, played.joints, atol=driver_process.TELL * DT)
+    np.testing.assert_allclose(played.states[-1].sent, played.joints, atol=driver_process.TELL * DT)
 
 
 def test_where_setpoints_end_it_brakes_and_says_so(played):
@@ -118,9 +118,9 @@ def test_an_fr3_is_held_against_its_own_limits(monkeypatch):
 def test_why_control_has_ended_is_told_last(played):
     played.play(0.1)
     played.adapter.fail("ControlException: reflex")
-    (told,) = (Told.unpack(frame) for frame in played.line.heard())
-    assert told.fault == "ControlException: reflex"
-    assert told.sent == tuple(played.joints)
+    (state,) = (DriverState.unpack(frame) for frame in played.line.heard())
+    assert state.fault == "ControlException: reflex"
+    assert state.sent == tuple(played.joints)
 
 
 # --- as a process
@@ -128,24 +128,24 @@ def test_why_control_has_ended_is_told_last(played):
 
 @pytest.fixture
 def arm():
-    found = panda(SETTINGS, "fake")
-    until(lambda: found.ready or found.fault, lambda: found.turn(time.monotonic()))
-    assert found.fault == ""
-    yield found
-    found.close()
+    client = panda(SETTINGS, "fake")
+    until(lambda: client.ready or client.fault, lambda: client.turn(time.monotonic()))
+    assert client.fault == ""
+    yield client
+    client.close()
 
 
 @pytest.mark.realtime
 def test_it_brakes_when_setpoints_end(arm):
     for ahead in (0.02, 0.04):
-        arm.send(time.monotonic() + ahead, np.array(driver_process.Fake.READY))
+        arm.send(time.monotonic() + ahead, np.array(driver_process.FakeDevice.READY))
     until(lambda: arm.fault, lambda: arm.turn(time.monotonic()))
     assert arm.fault.startswith("setpoints have run out")
 
 
 @pytest.mark.realtime
 def test_it_refuses_what_starts_elsewhere(arm):
-    arm.send(time.monotonic() + 0.03, np.array(driver_process.Fake.READY) + 0.1)
+    arm.send(time.monotonic() + 0.03, np.array(driver_process.FakeDevice.READY) + 0.1)
     until(lambda: arm.fault, lambda: arm.turn(time.monotonic()))
     assert arm.fault.startswith("setpoint: starts 0.1 rad from where the robot is")
 
@@ -157,7 +157,7 @@ def test_it_gives_the_robot_back_once_nobody_speaks_to_it(arm):
 
 
 @pytest.mark.realtime
-def test_an_adapter_that_is_killed_is_a_fault(arm):
+def test_a_driver_process_that_is_killed_is_a_fault(arm):
     arm.process.kill()
     arm.process.wait(SOON)
     arm.turn(time.monotonic())
@@ -202,7 +202,7 @@ class Library:
             self.q, self.motion_finished = q, False
 
     class State:
-        q, q_d, dq_d, ddq_d = driver_process.Fake.READY, driver_process.Fake.READY, (0.0,) * 7, (0.5,) * 7
+        q, q_d, dq_d, ddq_d = driver_process.FakeDevice.READY, driver_process.FakeDevice.READY, (0.0,) * 7, (0.5,) * 7
 
     class Duration:
         def to_sec(self):
@@ -243,4 +243,4 @@ def test_both_libraries_are_called_in_their_own_way(device, rates):
     made.control(cycle)
     assert [command.motion_finished for command in made._robot.sent] == [False, False, True]
     assert made._robot.sent[1].q == [0.2] * 7
-    assert counted[0] == (driver_process.Fake.READY, driver_process.Fake.READY, 0.001, rates)
+    assert counted[0] == (driver_process.FakeDevice.READY, driver_process.FakeDevice.READY, 0.001, rates)

@@ -12,7 +12,7 @@ from tests.ar.session.test_session import asked, grips
 from tests.ar.teleop.test_plan import START
 from tests.ar.teleop.test_plan import TIP as TARGET
 from tests.support.live import Hands, controlling, hand, laid, live
-from tests.support.touches import PLACES, TRUE, UP, at_reach, directions, noisy_places
+from tests.support.touches import PLACES, TRUE, UP, at_reach, directions, observed
 from trunkline.ar.session.alignment import (
     DWELL,
     POSES,
@@ -29,7 +29,7 @@ from trunkline.ar.session.alignment import (
     tilt,
     tip_of,
 )
-from trunkline.ar.session.alignment_procedure import UNTRACKED, Aligner, Held
+from trunkline.ar.session.alignment_procedure import UNTRACKED, AlignmentProcedure, ControllerPose
 from trunkline.ar.session.anchors import MOST, Anchor, Anchors
 from trunkline.ar.session.controller import HERE
 from trunkline.ar.teleop.messages import Pose
@@ -42,48 +42,48 @@ MARK = live().alignment.mark
 
 
 def test_exact_touches_give_the_pose_back():
-    touched = noisy_places(PLACES, np.random.default_rng(0), 0.0)
-    found = fit(touched, PLACES)
-    np.testing.assert_allclose(found.position, TRUE.position, atol=1e-12)
-    np.testing.assert_allclose(in_base(found, touched), PLACES, atol=1e-12)
-    assert residuals(found, touched, PLACES).max() < 1e-12
-    assert tilt(found) < 1e-6
+    touched = observed(PLACES, np.random.default_rng(0), 0.0)
+    pose = fit(touched, PLACES)
+    np.testing.assert_allclose(pose.position, TRUE.position, atol=1e-12)
+    np.testing.assert_allclose(in_base(pose, touched), PLACES, atol=1e-12)
+    assert residuals(pose, touched, PLACES).max() < 1e-12
+    assert tilt(pose) < 1e-6
     assert suspect(touched, PLACES) is None
 
 
 def test_six_places_of_a_millimetre_are_within_three_at_reach_and_told_so():
     """The goal is a 95th percentile of 3 mm at 0.9 m from the base, for touches of 1 mm along each axis."""
-    rng, off, told = np.random.default_rng(1), [], []
+    rng, off, expected_errors = np.random.default_rng(1), [], []
     for _ in range(400):
-        touched = noisy_places(PLACES, rng, 1e-3)
-        found = fit(touched, PLACES)
+        touched = observed(PLACES, rng, 1e-3)
+        pose = fit(touched, PLACES)
         point = at_reach(rng)
-        off.append(np.linalg.norm(in_base(found, in_base(inverse(TRUE), point)) - point))
-        told.append(expected_error(found, touched, PLACES, point))
+        off.append(np.linalg.norm(in_base(pose, in_base(inverse(TRUE), point)) - point))
+        expected_errors.append(expected_error(pose, touched, PLACES, point))
     assert np.quantile(off, 0.95) < 3e-3
-    assert np.sqrt(np.mean(np.square(told)) / np.mean(np.square(off))) == pytest.approx(1.0, abs=0.1)
+    assert np.sqrt(np.mean(np.square(expected_errors)) / np.mean(np.square(off))) == pytest.approx(1.0, abs=0.1)
 
 
 def test_a_touch_that_is_ten_millimetres_off_is_named_and_a_good_one_is_not():
     rng, right, alarms = np.random.default_rng(2), 0, 0
     for number in range(200):
-        touched = noisy_places(PLACES, rng, 1e-3)
+        touched = observed(PLACES, rng, 1e-3)
         alarms += suspect(touched, PLACES) is not None
         bad = number % len(PLACES)
         touched[bad] += 0.01 * directions(1, rng)[0]
-        found = suspect(touched, PLACES)
-        right += found is not None and found.index == bad
+        outlier = suspect(touched, PLACES)
+        right += outlier is not None and outlier.index == bad
     assert right >= 190
     assert alarms <= 4
 
 
 def test_too_few_touches_and_those_in_a_plane_are_refused_by_name():
-    touched = noisy_places(PLACES, np.random.default_rng(3), 1e-3)
+    touched = observed(PLACES, np.random.default_rng(3), 1e-3)
     with pytest.raises(InputError, match="touches: found 3, expected at least 4"):
         fit(touched[:3], PLACES[:3])
     flat = PLACES * [1.0, 1.0, 0.0] + [0.0, 0.0, 0.3]
     with pytest.raises(InputError, match="found all within 0 mm of a plane"):
-        fit(noisy_places(flat, np.random.default_rng(4), 1e-3), flat)
+        fit(observed(flat, np.random.default_rng(4), 1e-3), flat)
     assert suspect(touched[:3], PLACES[:3]) is None
     nowhere = np.array([*PLACES[:-1], [0.1, np.nan, np.inf]])
     for reference, base in ((touched, nowhere), (nowhere, PLACES)):
@@ -166,19 +166,19 @@ def joints(rng):
 class Person:
     """Who touches, with a headset of noise `sigma`; the controller's tip is at TIP."""
 
-    def __init__(self, aligner, seed=0, sigma=3e-4, pose=TRUE):
-        self.aligner, self.rng, self.sigma, self.pose = aligner, np.random.default_rng(seed), sigma, pose
+    def __init__(self, procedure, seed=0, sigma=3e-4, pose=TRUE):
+        self.procedure, self.rng, self.sigma, self.pose = procedure, np.random.default_rng(seed), sigma, pose
         self.time = 0.0
 
-    def hear(self, held, mark=None):
+    def hear(self, controller, mark=None):
         self.time += 1 / 72
-        self.aligner.hear(self.time, held, mark)
+        self.procedure.hear(self.time, controller, mark)
 
     def pivot(self):
         for position, quaternion in zip(*turned(400, 30, self.rng), strict=True):
-            if self.aligner.step != "tip":
+            if self.procedure.step != "tip":
                 return
-            self.hear(Held(tuple(position), tuple(quaternion)), np.zeros(3))
+            self.hear(ControllerPose(tuple(position), tuple(quaternion)), np.zeros(3))
 
     def touch(self, mark, off=0.0):
         """Rests with the tip at `mark` of the base, `off` m beside it."""
@@ -186,110 +186,110 @@ class Person:
         turn = Rotation.from_rotvec(0.3 * self.rng.normal(size=3))
         for _ in range(60):
             shaky = point + self.rng.normal(scale=self.sigma, size=3)
-            self.hear(Held(tuple(shaky - turn.apply(TIP)), tuple(wxyz_from_rotation(turn))), mark)
+            self.hear(ControllerPose(tuple(shaky - turn.apply(TIP)), tuple(wxyz_from_rotation(turn))), mark)
         for _ in range(5):
-            self.hear(Held(tuple(point + 0.1), tuple(wxyz_from_rotation(turn))), mark)
+            self.hear(ControllerPose(tuple(point + 0.1), tuple(wxyz_from_rotation(turn))), mark)
 
     def align(self, bad=None):
-        self.aligner.touch()
+        self.procedure.touch()
         self.pivot()
         for number, mark in enumerate(PLACES):
             self.touch(mark, 0.03 if number == bad else 0.0)
 
 
-def aligner(known=None, **changes):
-    return Aligner(replace(live().alignment, **changes), known)
+def procedure(stored=None, **changes):
+    return AlignmentProcedure(replace(live().alignment, **changes), stored)
 
 
 def test_the_base_is_aligned_by_six_touches_and_its_error_is_told_before_anything_moves():
-    found = aligner()
-    assert (found.alignment, found.told().step) == (None, "place")
-    person = Person(found)
+    aligned = procedure()
+    assert (aligned.alignment, aligned.progress().step) == (None, "place")
+    person = Person(aligned)
     person.align()
-    told = found.told()
-    assert (told.step, told.fasten, found.unfit) == ("done", True, "")
-    assert told.expected < 2e-3
-    assert told.said.startswith("Aligned; expected error ")
-    np.testing.assert_allclose(in_base(found.alignment, in_base(inverse(TRUE), PLACES)), PLACES, atol=2e-3)
+    progress = aligned.progress()
+    assert (progress.step, progress.fasten, aligned.unfit) == ("done", True, "")
+    assert progress.expected < 2e-3
+    assert progress.said.startswith("Aligned; expected error ")
+    np.testing.assert_allclose(in_base(aligned.alignment, in_base(inverse(TRUE), PLACES)), PLACES, atol=2e-3)
 
 
 def test_a_bad_touch_is_named_and_touched_again():
-    found = aligner()
-    person = Person(found)
+    aligned = procedure()
+    person = Person(aligned)
     person.align(bad=2)
-    assert found.told().said.startswith("Touch 3 is ")
-    assert (found.step, found.alignment) == ("touch", None)
-    assert found.told().next.startswith("Hold the tip still on the flange’s mark, touch 6 of 6.")
+    assert aligned.progress().said.startswith("Touch 3 is ")
+    assert (aligned.step, aligned.alignment) == ("touch", None)
+    assert aligned.progress().next.startswith("Hold the tip still on the flange’s mark, touch 6 of 6.")
     person.touch(PLACES[2])
-    assert found.step == "done"
-    assert found.expected < 2e-3
+    assert aligned.step == "done"
+    assert aligned.expected < 2e-3
 
 
 def test_touches_near_each_other_in_a_plane_or_of_a_guessed_place_do_not_count():
-    found = aligner()
-    person = Person(found)
-    found.touch()
+    aligned = procedure()
+    person = Person(aligned)
+    aligned.touch()
     person.pivot()
     person.touch(PLACES[0])
     person.touch(PLACES[0] + 0.01)
-    assert found.told().said == "Move the robot further before the next touch."
+    assert aligned.progress().said == "Move the robot further before the next touch."
     person.hear(None, PLACES[1])
-    assert found.told().said == UNTRACKED
-    flat = aligner()
+    assert aligned.progress().said == UNTRACKED
+    flat = procedure()
     person = Person(flat)
     flat.touch()
     person.pivot()
     for x, y in ((0.3, 0.3), (0.3, -0.3), (0.6, 0.3), (0.6, -0.3), (0.45, 0.0), (0.45, 0.5)):
         person.touch(np.array([x, y, 0.3]))
-    assert "of a plane, expected 30 mm" in flat.told().said
+    assert "of a plane, expected 30 mm" in flat.progress().said
     assert (flat.step, flat.alignment) == ("touch", None)
 
 
 def test_a_tip_that_is_turned_too_little_is_said_and_then_found():
-    found = aligner()
-    person = Person(found)
-    found.touch()
+    aligned = procedure()
+    person = Person(aligned)
+    aligned.touch()
     for position, quaternion in zip(*turned(300, 5, person.rng), strict=True):
-        person.hear(Held(tuple(position), tuple(quaternion)))
-    assert (found.step, "of turn about one axis" in found.said) == ("tip", True)
+        person.hear(ControllerPose(tuple(position), tuple(quaternion)))
+    assert (aligned.step, "of turn about one axis" in aligned.message) == ("tip", True)
     person.pivot()
-    assert found.step == "touch"
+    assert aligned.step == "touch"
 
 
 def test_a_headset_that_is_not_level_is_refused():
-    found = aligner()
-    Person(found, pose=pose_of(np.zeros(3), Rotation.from_euler("x", 3, degrees=True) * UP)).align()
-    assert (found.step, found.alignment) == ("touch", None)
-    assert found.said.startswith("The headset’s vertical is 3.0° off the robot’s")
+    aligned = procedure()
+    Person(aligned, pose=pose_of(np.zeros(3), Rotation.from_euler("x", 3, degrees=True) * UP)).align()
+    assert (aligned.step, aligned.alignment) == ("touch", None)
+    assert aligned.message.startswith("The headset’s vertical is 3.0° off the robot’s")
 
 
 def test_above_the_limit_it_is_aligned_and_nothing_may_be_executed():
-    found = aligner(limit=1e-6)
-    Person(found).align()
-    assert found.step == "done"
-    assert found.unfit.startswith("alignment: expected error ")
-    assert found.unfit.endswith("more than 0.0 mm: align anew; nothing is executed")
-    assert not found.told().fasten
-    found.anchored("room", SEEN, None)
-    assert found.anchor is None
+    aligned = procedure(limit=1e-6)
+    Person(aligned).align()
+    assert aligned.step == "done"
+    assert aligned.unfit.startswith("alignment: expected error ")
+    assert aligned.unfit.endswith("more than 0.0 mm: align anew; nothing is executed")
+    assert not aligned.progress().fasten
+    aligned.anchored("room", SEEN, None)
+    assert aligned.anchor is None
 
 
 def test_by_eye_is_for_a_simulated_robot_alone():
     place = Pose((0.0, 0.5, -1.0), (1.0, 0.0, 0.0, 0.0))
-    found = aligner()
-    assert found.by_eye(place) == ""
-    assert (found.step, found.told().place, found.told().expected) == ("done", place, None)
+    aligned = procedure()
+    assert aligned.by_eye(place) == ""
+    assert (aligned.step, aligned.progress().place, aligned.progress().expected) == ("done", place, None)
     for other in (Pose((0.0, 0.5, float("nan")), (1.0, 0.0, 0.0, 0.0)), Pose((0.0, 0.5, 0.0), (2.0, 0.0, 0.0, 0.0))):
-        found = aligner()
-        assert found.by_eye(other) == "alignment: found what is no pose"
-        assert found.alignment is None
-    kept = Anchor("room", place, None, None, "2026-01-01T00:00:00+00:00")
-    found = aligner(kept, by_eye=False)
-    assert found.told().anchor == ""
-    found.anchored("room", SEEN, kept)
-    assert found.step == "place"  # nor what was put there by eye another day
-    assert found.by_eye(place) == "alignment: by eye is for a simulated robot alone; touch it"
-    assert found.alignment is None
+        aligned = procedure()
+        assert aligned.by_eye(other) == "alignment: found what is no pose"
+        assert aligned.alignment is None
+    stored = Anchor("room", place, None, None, "2026-01-01T00:00:00+00:00")
+    aligned = procedure(stored, by_eye=False)
+    assert aligned.progress().anchor == ""
+    aligned.anchored("room", SEEN, stored)
+    assert aligned.step == "place"  # nor what was put there by eye another day
+    assert aligned.by_eye(place) == "alignment: by eye is for a simulated robot alone; touch it"
+    assert aligned.alignment is None
 
 
 # --- anchors
@@ -300,11 +300,11 @@ LEAPT = pose_of(np.array([-0.3, 0.1, 0.8]), Rotation.from_euler("y", -100, degre
 
 def anchored():
     """An aligner that is done, its anchor seen, and the anchor that is kept."""
-    found = aligner()
-    Person(found).align()
-    assert found.anchored("room", SEEN, None) == ""
-    assert not found.told().fasten
-    return found, found.anchor
+    aligned = procedure()
+    Person(aligned).align()
+    assert aligned.anchored("room", SEEN, None) == ""
+    assert not aligned.progress().fasten
+    return aligned, aligned.anchor
 
 
 def near(a, b, by=1e-4):
@@ -312,82 +312,82 @@ def near(a, b, by=1e-4):
 
 
 def test_an_anchor_carries_the_base_along_when_the_headset_is_recentred():
-    found, anchor = anchored()
-    before = found.alignment
-    found.anchored("room", None, anchor)
-    assert (found.step, found.alignment) == ("lost", None)
+    aligned, anchor = anchored()
+    before = aligned.alignment
+    aligned.anchored("room", None, anchor)
+    assert (aligned.step, aligned.alignment) == ("lost", None)
     moved = after(LEAPT, SEEN)  # the same anchor in a frame that has leapt
-    found.anchored("room", moved, anchor)
-    assert found.step == "done"
-    near(after(found.alignment, LEAPT), before)
+    aligned.anchored("room", moved, anchor)
+    assert aligned.step == "done"
+    near(after(aligned.alignment, LEAPT), before)
 
 
 def test_a_lost_anchor_holds_the_robot_until_it_is_back_at_the_same_place():
-    found, anchor = anchored()
-    before = found.alignment
+    aligned, anchor = anchored()
+    before = aligned.alignment
     for _ in range(2):
-        found.anchored("room", None, anchor)
-    assert found.alignment is None
-    assert found.told().next.startswith("The headset has lost the robot’s place")
-    found.anchored("another", SEEN, None)
-    assert found.alignment is None
-    found.anchored("room", SEEN, anchor)
-    near(found.alignment, before)
+        aligned.anchored("room", None, anchor)
+    assert aligned.alignment is None
+    assert aligned.progress().next.startswith("The headset has lost the robot’s place")
+    aligned.anchored("another", SEEN, None)
+    assert aligned.alignment is None
+    aligned.anchored("room", SEEN, anchor)
+    near(aligned.alignment, before)
 
 
 def test_an_anchor_that_creeps_by_little_voids_no_plan():
-    found, anchor = anchored()
-    before = found.alignment
+    aligned, anchor = anchored()
+    before = aligned.alignment
     crept = replace(SEEN, position=(SEEN.position[0] + 1e-3, *SEEN.position[1:]))
-    found.anchored("room", crept, anchor)
-    assert found.alignment == before
-    found.anchored("room", replace(SEEN, position=(SEEN.position[0] + 5e-3, *SEEN.position[1:])), anchor)
-    assert found.alignment != before
+    aligned.anchored("room", crept, anchor)
+    assert aligned.alignment == before
+    aligned.anchored("room", replace(SEEN, position=(SEEN.position[0] + 5e-3, *SEEN.position[1:])), anchor)
+    assert aligned.alignment != before
 
 
 def test_the_next_session_begins_with_one_touch_at_a_known_place():
     _, anchor = anchored()
-    found = aligner(anchor)
-    assert found.told().anchor == "room"
-    found.anchored("room", SEEN, anchor)
-    assert (found.step, found.alignment) == ("check", None)
-    person = Person(found, seed=1)
+    aligned = procedure(anchor)
+    assert aligned.progress().anchor == "room"
+    aligned.anchored("room", SEEN, anchor)
+    assert (aligned.step, aligned.alignment) == ("check", None)
+    person = Person(aligned, seed=1)
     person.touch(PLACES[1])
-    assert found.step == "done"
-    assert found.told().said.startswith("The base is within ")
-    assert found.expected < 2e-3
+    assert aligned.step == "done"
+    assert aligned.progress().said.startswith("The base is within ")
+    assert aligned.expected < 2e-3
 
 
 def test_a_touch_that_is_off_says_so_and_asks_to_align_again():
     _, anchor = anchored()
-    found = aligner(anchor)
-    found.anchored("room", SEEN, anchor)
-    Person(found, seed=1).touch(PLACES[1], 0.02)
-    assert (found.step, found.alignment, found.told().anchor) == ("touch", None, "")
-    assert "off, more than 10.0 mm: align again" in found.said
+    aligned = procedure(anchor)
+    aligned.anchored("room", SEEN, anchor)
+    Person(aligned, seed=1).touch(PLACES[1], 0.02)
+    assert (aligned.step, aligned.alignment, aligned.progress().anchor) == ("touch", None, "")
+    assert "off, more than 10.0 mm: align again" in aligned.message
 
 
 def test_an_anchor_without_a_tip_asks_for_the_tip_first():
     _, anchor = anchored()
-    found = aligner(replace(anchor, tip=None))
-    found.anchored("room", SEEN, replace(anchor, tip=None))
-    person = Person(found, seed=1)
-    assert found.step == "tip"
+    aligned = procedure(replace(anchor, tip=None))
+    aligned.anchored("room", SEEN, replace(anchor, tip=None))
+    person = Person(aligned, seed=1)
+    assert aligned.step == "tip"
     person.pivot()
-    assert found.step == "check"
-    found.anchored("room", None, anchor)
-    assert found.step == "lost"
-    found.anchored("room", SEEN, anchor)
-    assert (found.step, found.alignment) == ("check", None)  # not done: nothing was touched yet
+    assert aligned.step == "check"
+    aligned.anchored("room", None, anchor)
+    assert aligned.step == "lost"
+    aligned.anchored("room", SEEN, anchor)
+    assert (aligned.step, aligned.alignment) == ("check", None)  # not done: nothing was touched yet
 
 
 def test_who_comes_again_is_aligned_once_its_anchor_is_seen_and_without_one_anew():
-    found, anchor = anchored()
-    found.lose()
-    assert found.alignment is None
-    found.anchored("room", SEEN, anchor)
-    assert found.step == "done"
-    other = aligner()
+    aligned, anchor = anchored()
+    aligned.lose()
+    assert aligned.alignment is None
+    aligned.anchored("room", SEEN, anchor)
+    assert aligned.step == "done"
+    other = procedure()
     Person(other).align()
     other.lose()
     assert (other.step, other.alignment) == ("place", None)
@@ -400,11 +400,11 @@ def test_anchors_are_kept_in_a_file_the_oldest_go_and_a_damaged_one_is_named(tmp
     for number in range(MOST + 2):
         anchors.keep(replace(first, id=f"room {number}"))
     anchors.save()
-    found = Anchors(path)
-    assert len(found.kept) == MOST
-    assert found.newest == f"room {MOST + 1}"
-    assert found.find("room 0") is None
-    assert found.find("room 2") == replace(first, id="room 2")
+    anchors = Anchors(path)
+    assert len(anchors.stored) == MOST
+    assert anchors.newest == f"room {MOST + 1}"
+    assert anchors.find("room 0") is None
+    assert anchors.find("room 2") == replace(first, id="room 2")
     path.write_text('[{"id": 3}]')
     with pytest.raises(InputError, match="anchors.json: 0"):
         Anchors(path)
@@ -423,11 +423,11 @@ async def guided(here, guest):
         if any(np.linalg.norm(mark - other) < 0.2 for other in touched):
             continue
         touched.append(mark)
-        said, point = guest.aligning["said"], in_base(inverse(TRUE), mark) - TIP
+        message, point = guest.aligning["said"], in_base(inverse(TRUE), mark) - TIP
         guest.right = hand(point)
         for _ in range(500):
             await asyncio.sleep(0.01)
-            if guest.aligning["said"] != said or guest.aligning["step"] != "touch":
+            if guest.aligning["said"] != message or guest.aligning["step"] != "touch":
                 break
         guest.right = hand(point + 0.2)
         await asyncio.sleep(0.05)
@@ -438,7 +438,7 @@ class Headset(Hands):
 
     @property
     def aligning(self):
-        return next(told for told in reversed(self.messages) if told["type"] == "aligning")
+        return next(message for message in reversed(self.messages) if message["type"] == "aligning")
 
 
 @pytest.mark.realtime
@@ -467,7 +467,7 @@ def test_a_headset_is_aligned_over_the_network_and_its_anchor_brings_it_back(tmp
             done = await guest.hears("aligning", step="done")
             assert done["fasten"]
             assert done["expected"] < 1e-3
-            near(here.desk.alignment, TRUE, 2e-3)
+            near(here.controller.alignment, TRUE, 2e-3)
             await guest.hears("state", mode="aim")
             pose = {"position": list(SEEN.position), "quaternion": list(SEEN.quaternion)}
             await guest.say(type="anchor", id="room", pose=pose)
@@ -475,7 +475,7 @@ def test_a_headset_is_aligned_over_the_network_and_its_anchor_brings_it_back(tmp
             await guest.say(type="anchor", id="room", pose=None)
             await guest.hears("aligning", step="lost")
             await guest.hears("state", mode="hold")
-            assert here.desk.alignment is None
+            assert here.controller.alignment is None
             await guest.say(type="anchor", id="room", pose=pose)
             await guest.hears("state", mode="aim")
             guest.sending.cancel()
@@ -494,16 +494,16 @@ def test_an_alignment_that_is_not_good_enough_executes_nothing():
     async def session():
         async with laid() as here:
             guest = await controlling(here)
-            here.desk.align(HERE, "alignment: expected error 14.0 mm, more than 10.0 mm: nothing is executed")
+            here.controller.align(HERE, "alignment: expected error 14.0 mm, more than 10.0 mm: nothing is executed")
             state = await asked(here, guest)
             assert "expected error 14.0 mm" in state["notice"]
             await asyncio.sleep(0.4)
             await guest.say(type="shown", digest=state["preview"])
             await guest.hears("state", mode="ready")
-            kept = here.robot.robot.joints.copy()
+            joints = here.robot.robot.joints.copy()
             guest.right = grips(TARGET, trigger=1.0)
             assert "expected error 14.0 mm" in (await guest.hears("state", mode="stopped"))["notice"]
-            np.testing.assert_array_equal(here.robot.robot.joints, kept)
+            np.testing.assert_array_equal(here.robot.robot.joints, joints)
 
     asyncio.run(session())
 
@@ -516,7 +516,7 @@ def test_a_browser_is_asked_for_none_of_it():
             for message in ({"type": "touch"}, {"type": "anchor", "id": "a", "pose": None}):
                 await guest.say(**message)
             await guest.refused("alignment: your poses are in the base frame")
-            assert not any(told["type"] == "aligning" for told in guest.messages)
+            assert not any(message["type"] == "aligning" for message in guest.messages)
 
     asyncio.run(session())
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from trunkline.ar.drivers.driver import SILENT
-from trunkline.ar.drivers.driver_frames import Line, Setpoint, Told
-from trunkline.ar.drivers.setpoint_filter import LIMITS, Stream
+from trunkline.ar.drivers.driver_frames import DriverState, FrameSocket, Setpoint
+from trunkline.ar.drivers.setpoint_filter import LIMITS, SetpointFilter
 
 READY = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])
 DT, LEAD, BEGINS, SECONDS = 0.001, 0.03, 0.1, 2.0
@@ -25,7 +25,7 @@ def way(time, turn=0.5):
 
 def play(seconds, heard=lambda now: True, at=way, dt=lambda now: DT, robot=PANDA, stream=None):
     """Setpoints every ms, stamped LEAD ahead, those for which `heard`; what the robot was sent, (T, 7)."""
-    stream, sent, now = stream or Stream(READY, robot), [], 0.0
+    stream, sent, now = stream or SetpointFilter(READY, robot), [], 0.0
     for step in range(round(seconds / DT)):
         now = step * DT
         if heard(now):
@@ -36,11 +36,11 @@ def play(seconds, heard=lambda now: True, at=way, dt=lambda now: DT, robot=PANDA
 
 def shares(sent, robot=PANDA):
     """Largest velocity, acceleration and jerk, as shares of the robot's."""
-    found, rates = [], sent
+    played, rates = [], sent
     for most in (robot.velocity, robot.acceleration, robot.jerk):
         rates = np.diff(rates, axis=0) / DT
-        found.append(float((np.abs(rates) / most).max()))
-    return found
+        played.append(float((np.abs(rates) / most).max()))
+    return played
 
 
 def test_setpoints_are_followed_when_they_are_due():
@@ -62,7 +62,7 @@ def test_a_robot_whose_time_is_too_slow_is_a_fault_once_it_moves():
 
 def test_setpoints_that_come_late_but_before_they_are_due_change_nothing():
     """As a busy machine sends them: nothing for 20 ms, then all at once."""
-    stream, waiting, sent = Stream(READY, PANDA), [], []
+    stream, waiting, sent = SetpointFilter(READY, PANDA), [], []
     for step in range(2500):
         now = step * DT
         waiting.append(Setpoint(now + LEAD, tuple(way(now + LEAD))))
@@ -96,7 +96,7 @@ def test_setpoints_that_come_again_do_not_move_it():
 
 
 def test_silence_counts_though_setpoints_far_ahead_were_sent():
-    stream = Stream(READY, PANDA)
+    stream = SetpointFilter(READY, PANDA)
     for step in range(1000):
         stream.hear(Setpoint(step * DT, tuple(READY)), 0.0)
     for step in range(round(SILENT / DT) + 2):
@@ -168,7 +168,7 @@ class LossyRobot:
 
 def lossy(tells, at=way):
     """Where an FR3 went that lost commands, (T, 7), and the stream; `tells`: where it went meanwhile."""
-    stream, made, went, missed = Stream(READY, LIMITS["fr3"]), LossyRobot(), [], 0
+    stream, made, went, missed = SetpointFilter(READY, LIMITS["fr3"]), LossyRobot(), [], 0
     for step in range(3000):
         now = step * DT
         stream.hear(Setpoint(now + LEAD, tuple(at(now + LEAD))), now)
@@ -177,7 +177,7 @@ def lossy(tells, at=way):
             missed += 1
         else:
             if tells:
-                stream.found(made.place, made.speed, made.gain)
+                stream.synchronize(made.place, made.speed, made.gain)
             made.hear(stream.cycle(now, (1 + missed) * DT))
             missed = 0
         went.append(made.place)
@@ -205,27 +205,27 @@ def test_it_brakes_from_where_lost_commands_left_it():
 def test_frames_come_back():
     setpoint = Setpoint(12.5, tuple(READY))
     assert Setpoint.unpack(setpoint.pack()) == setpoint
-    told = Told(1.0, tuple(READY), tuple(READY + 1), "reflex: é")
-    assert Told.unpack(told.pack()) == told
-    assert len(Told(1.0, (0.0,) * 3, (0.0,) * 3, "é" * 200).pack()) == Told.size(3)
+    state = DriverState(1.0, tuple(READY), tuple(READY + 1), "reflex: é")
+    assert DriverState.unpack(state.pack()) == state
+    assert len(DriverState(1.0, (0.0,) * 3, (0.0,) * 3, "é" * 200).pack()) == DriverState.size(3)
 
 
 @pytest.fixture
 def line():
     ours, theirs = socket.socketpair()
     theirs.settimeout(5.0)
-    yield Line(ours, Setpoint.size(7)), theirs
+    yield FrameSocket(ours, Setpoint.size(7)), theirs
     ours.close()
     theirs.close()
 
 
 def test_frames_are_cut_however_they_come(line):
     ours, theirs = line
-    data, found = b"".join(Setpoint(n, tuple(READY)).pack() for n in range(9)), []
+    data, frames = b"".join(Setpoint(n, tuple(READY)).pack() for n in range(9)), []
     for begin in range(0, len(data), 50):
         theirs.send(data[begin : begin + 50])
-        found += ours.heard()
-    assert [Setpoint.unpack(frame).due for frame in found] == list(range(9))
+        frames += ours.heard()
+    assert [Setpoint.unpack(frame).due for frame in frames] == list(range(9))
     assert ours.open
     theirs.close()
     assert ours.heard() == []
@@ -243,5 +243,5 @@ def test_frames_that_are_missed_are_missed_whole(line):
         got += theirs.recv(3000)
         with contextlib.suppress(BlockingIOError):
             ours.send(next(frames))
-    found = {bytes(got[n : n + 3000]) for n in range(0, len(got) - 2999, 3000)}
-    assert all(len(set(frame)) == 1 for frame in found)
+    blocks = {bytes(got[n : n + 3000]) for n in range(0, len(got) - 2999, 3000)}
+    assert all(len(set(frame)) == 1 for frame in blocks)

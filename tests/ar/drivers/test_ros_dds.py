@@ -19,10 +19,10 @@ from tests.support.waiting import SOON, until
 from trunkline.ar.drivers import ros_arm
 from trunkline.ar.drivers.ros_arm import RosArm
 from trunkline.ar.drivers.ros_messages import Header, JointState, JointTrajectory, Time, trajectory
-from trunkline.ar.drivers.settings import Config
+from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.pipeline.config import PROJECT, load_folder
 
-SETTINGS = replace(load_folder(Config, PROJECT / "conf/execution").ros, domain=77)
+SETTINGS = replace(load_folder(ExecutionConfig, PROJECT / "conf/execution").ros, domain=77)
 LOOPBACK = '<General><Interfaces><NetworkInterface name="lo" multicast="true"/></Interfaces></General>'
 READY = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])
 THREADS = """
@@ -54,8 +54,8 @@ def test_what_ros_says_of_joints_is_read():
     store = get_typestore(Stores.ROS2_JAZZY)
     types = store.types
     header = types["std_msgs/msg/Header"](types["builtin_interfaces/msg/Time"](5, 6), "base")
-    said = types["sensor_msgs/msg/JointState"](header, ["a", "b"], np.array([0.1, -0.2]), np.array([]), np.array([]))
-    read = JointState.deserialize(bytes(store.serialize_cdr(said, "sensor_msgs/msg/JointState")))
+    state = types["sensor_msgs/msg/JointState"](header, ["a", "b"], np.array([0.1, -0.2]), np.array([]), np.array([]))
+    read = JointState.deserialize(bytes(store.serialize_cdr(state, "sensor_msgs/msg/JointState")))
     assert (list(read.name), list(read.position), read.header.stamp) == (["a", "b"], [0.1, -0.2], Time(5, 6))
 
 
@@ -138,7 +138,7 @@ def test_one_thread_receives_so_that_a_process_ends():
     """With one for each socket each reads until it has sent itself a packet, which never comes where a firewall drops
     it (eclipse-cyclonedds/cyclonedds, issue 1916). One for all is woken by a pipe: the default since pull request 1920.
     """
-    own = os.environ | {"CYCLONEDDS_URI": f"<CycloneDDS><Domain>{LOOPBACK}</Domain></CycloneDDS>"}
+    environment = os.environ | {"CYCLONEDDS_URI": f"<CycloneDDS><Domain>{LOOPBACK}</Domain></CycloneDDS>"}
     command = [sys.executable, "-c", THREADS]
-    done = subprocess.run(command, env=own, capture_output=True, text=True, timeout=60, check=True)
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=True)
     assert [name for name in done.stdout.split() if name.startswith("recv")] == ["recv"]

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.ar.session.test_journal import NAMES, REAL, SUBJECT, ZERO
+from tests.ar.session.test_log import NAMES, REAL, SUBJECT, ZERO
 from tests.ar.teleop.test_plan import OFFSET, START, STRAIGHT
 from tests.support.operator import Operator
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import messages
-from trunkline.ar.session.log_format import Book
-from trunkline.ar.session.log_reader import read_logbook
-from trunkline.ar.session.log_writer import Journal
-from trunkline.ar.session.preview_validation import Execution, _end, _held, _holds, executions, lines, main
-from trunkline.ar.session.robot import Standing
+from trunkline.ar.session.log_format import LogFormat
+from trunkline.ar.session.log_reader import read_session_log
+from trunkline.ar.session.log_writer import LogWriter
+from trunkline.ar.session.preview_validation import Execution, _end, _grasped, _holds, executions, lines, main
+from trunkline.ar.session.robot import RobotState
 from trunkline.ar.teleop.messages import ExecutorReport, Intent, Thing
 from trunkline.kinematics.panda.kinematics import joint_frames, mount_pose
 
@@ -44,114 +44,118 @@ def wrist(time):
     return np.concatenate([frame.p.T, turns.as_quat(scalar_first=True)], axis=1)
 
 
-class Clocked(Journal):
+class Clocked(LogWriter):
     def __init__(self, file, **hardware):
         self.time, subject = 99.0, replace(SUBJECT, **hardware)
         super().__init__(subject, lambda: self.time)
-        self.book = Book(file, subject, ZERO)
+        self.book = LogFormat(file, subject, ZERO)
 
     def keep(self, record):
         self.book.write(record)
 
 
-def recorded(path, probability=0.8, held=True, end=None, spread=0.01, measured=False, **hardware):
+def recorded(path, probability=0.8, grasped=True, end=None, spread=0.01, measured=False, **hardware):
     """A log of one execution; `end`: s after which it was stopped; `measured`: whether the joints are."""
     with open(path, "wb") as file:
-        journal, operator = Clocked(file, **hardware), Operator()
+        log_writer, operator = Clocked(file, **hardware), Operator()
         tip = {"body": SUBJECT.tip[0], "place": SUBJECT.tip[1]}
-        journal.event("begin", package="p", tip=tip, mount_offset=OFFSET, **hardware)
-        journal.event("world", world=make_world((), (CUP,)))
-        preview = messages.Preview(DIGEST, STEP, LASTS, STEP, (("approach", 0.0),))
-        journal.event("preview", preview=preview)
+        log_writer.event("begin", package="p", tip=tip, mount_offset=OFFSET, **hardware)
+        log_writer.event("world", world=make_world((), (CUP,)))
+        preview = messages.PreviewMessage(DIGEST, STEP, LASTS, STEP, (("approach", 0.0),))
+        log_writer.event("preview", preview=preview)
         times = np.arange(1, round(LASTS / STEP) + 1) * STEP
         for first in range(0, len(times), 20):
             piece = place(times[first : first + 20])
             rows = [wrist(times[first : first + 20]), piece, piece]
-            journal.piece(first, float(times[first]), np.stack(rows, axis=1))
+            log_writer.piece(first, float(times[first]), np.stack(rows, axis=1))
         tip = place(times[-1])[:3] + [0.0, 0.0, 0.1]
-        journal.event("foreseen", foreseen=messages.Foreseen(
+        log_writer.event("foreseen", foreseen=messages.PredictionMessage(
             DIGEST, probability, 0.6, 0.9, (LASTS,), (tuple(tip),), (spread,), 0.9, 12))  # fmt: skip
-        journal.time = BEGIN
-        journal.event("execute", digest=DIGEST, refused="")
-        journal.event("robot", robot=ExecutorReport("running", DIGEST))
+        log_writer.time = BEGIN
+        log_writer.event("execute", digest=DIGEST, refused="")
+        log_writer.event("robot", robot=ExecutorReport("running", DIGEST))
         for time in np.arange(0.0, LASTS + 0.5, 1 / 72):
-            journal.time = BEGIN + time
+            log_writer.time = BEGIN + time
             if end is not None and time >= end:
-                journal.event("robot", robot=ExecutorReport("idle", DIGEST))
+                log_writer.event("robot", robot=ExecutorReport("idle", DIGEST))
                 break
             poses = np.stack([place(time - DELAY)] * len(NAMES)) + [0.0, 0.0, OFF, 0.0, 0.0, 0.0, 0.0]
             sensed = joints(time - DELAY) + OFF_JOINT if measured else None
-            journal.standing(Standing(journal.time, 0.0, START, STRAIGHT, poses[0], poses, sensed))
+            log_writer.robot_state(RobotState(log_writer.time, 0.0, START, STRAIGHT, poses[0], poses, sensed))
             intent: Intent = operator.step()
-            journal.step(1 / 60, operator.given, intent)
+            log_writer.step(1 / 60, operator.given, intent)
         if end is None:
-            journal.event("robot", robot=ExecutorReport("done", DIGEST))
-            if held:
+            log_writer.event("robot", robot=ExecutorReport("done", DIGEST))
+            if grasped:
                 thing = Thing("the cup", "cylinder", 0.05, 0.1, 0.1, (0.6, 0.0, 0.4), support="held")
-                journal.event("world", world=make_world((), (thing,)))
-        journal.settle()
-        journal.book.finish()
+                log_writer.event("world", world=make_world((), (thing,)))
+        log_writer.settle()
+        log_writer.book.finish()
     return path
 
 
 def test_the_tip_is_compared_with_the_preview_whenever_the_robot_began(tmp_path):
-    (found,) = executions(read_logbook(recorded(tmp_path / "run.mcap")))
-    assert found.delay == pytest.approx(DELAY, abs=2e-3)
-    assert found.median == pytest.approx(OFF, abs=2e-4)
-    assert found.worst == pytest.approx(OFF, abs=5e-4)
-    assert found.seconds == pytest.approx(LASTS - STEP, abs=0.05)
-    assert (found.end, found.within, found.probability, found.held) == ("done", True, 0.8, True)
-    assert found.time == pytest.approx(1.0)
+    (execution,) = executions(read_session_log(recorded(tmp_path / "run.mcap")))
+    assert execution.delay == pytest.approx(DELAY, abs=2e-3)
+    assert execution.median == pytest.approx(OFF, abs=2e-4)
+    assert execution.worst == pytest.approx(OFF, abs=5e-4)
+    assert execution.seconds == pytest.approx(LASTS - STEP, abs=0.05)
+    assert (execution.end, execution.within, execution.probability, execution.success) == ("done", True, 0.8, True)
+    assert execution.time == pytest.approx(1.0)
 
 
 def test_what_did_not_come_about_counts_against_what_was_foreseen(tmp_path):
-    found = [next(executions(read_logbook(recorded(tmp_path / f"{n}.mcap", 0.8, n > 0, spread=1e-3)))) for n in (0, 1)]
-    assert [one.held for one in found] == [False, True]
-    assert [one.within for one in found] == [False, False]  # the tip is 2 mm off, foreseen within 1
-    assert lines(found)[-1] == (
+    results = [
+        next(executions(read_session_log(recorded(tmp_path / f"{n}.mcap", 0.8, n > 0, spread=1e-3)))) for n in (0, 1)
+    ]
+    assert [execution.success for execution in results] == [False, True]
+    assert [execution.within for execution in results] == [False, False]  # the tip is 2 mm off, foreseen within 1
+    assert lines(results)[-1] == (
         "2 executed; 0 of 2 tips ended within the spread; outcome as foreseen in 1 of 2, Brier score 0.340"
     )
 
 
 def test_of_a_plan_that_was_stopped_its_part_is_compared_and_no_outcome(tmp_path, capsys):
     path = recorded(tmp_path / "run.mcap", end=1.0)
-    (found,) = executions(read_logbook(path))
-    assert (found.end, found.within, found.held) == ("held", None, None)
-    assert found.seconds == pytest.approx(1.0 - DELAY - STEP, abs=0.05)
-    assert found.median == pytest.approx(OFF, abs=2e-4)
+    (execution,) = executions(read_session_log(path))
+    assert (execution.end, execution.within, execution.success) == ("held", None, None)
+    assert execution.seconds == pytest.approx(1.0 - DELAY - STEP, abs=0.05)
+    assert execution.median == pytest.approx(OFF, abs=2e-4)
     assert main([str(path)]) == 0
-    said = capsys.readouterr().out
-    assert "tip 2.0 mm, at most 2.0 mm from the preview over 0.9 s, 40 ms later" in said
-    assert "grasp foreseen at 0.80, not tried to its end" in said
+    output = capsys.readouterr().out
+    assert "tip 2.0 mm, at most 2.0 mm from the preview over 0.9 s, 40 ms later" in output
+    assert "grasp foreseen at 0.80, not tried to its end" in output
 
 
 def test_of_a_real_machine_the_mount_is_compared_and_nobody_saw_the_arm(tmp_path, capsys):
     """A twin did and held what was foreseen."""
     path = recorded(tmp_path / "run.mcap", measured=True, hardware=REAL)
-    (found,) = executions(read_logbook(path))
-    assert (found.end, found.within, found.held, found.seen) == ("done", None, None, False)
+    (execution,) = executions(read_session_log(path))
+    assert (execution.end, execution.within, execution.success, execution.visible) == ("done", None, None, False)
     away = np.linalg.norm(np.diff(mount_pose(np.stack([START, START + OFF_JOINT]), OFFSET)[0], axis=0))
-    assert found.delay == pytest.approx(DELAY, abs=2e-3)
-    assert [found.median, found.worst] == pytest.approx([away] * 2, rel=0.1)
-    assert found.seconds == pytest.approx(LASTS - STEP, abs=0.05)
+    assert execution.delay == pytest.approx(DELAY, abs=2e-3)
+    assert [execution.median, execution.worst] == pytest.approx([away] * 2, rel=0.1)
+    assert execution.seconds == pytest.approx(LASTS - STEP, abs=0.05)
     assert main([str(path)]) == 0
-    said = capsys.readouterr().out
-    assert "; mount " in said
-    assert "tip 2.0 mm" not in said
-    assert "grasp foreseen at 0.80, which nobody saw" in said
-    assert "1 executed\n  nobody saw the arm: its shape, its tip and its grasps are not judged\n" in said
-    assert "Brier" not in said
+    output = capsys.readouterr().out
+    assert "; mount " in output
+    assert "tip 2.0 mm" not in output
+    assert "grasp foreseen at 0.80, which nobody saw" in output
+    assert "1 executed\n  nobody saw the arm: its shape, its tip and its grasps are not judged\n" in output
+    assert "Brier" not in output
 
 
 def test_of_motors_alone_nothing_is_compared(tmp_path):
-    (found,) = executions(read_logbook(recorded(tmp_path / "run.mcap", hardware="no real robot, motors 1, 2, 3")))
-    assert (found.end, found.seconds, found.within, found.held) == ("done", 0.0, None, None)
-    assert np.isnan([found.median, found.worst, found.delay]).all()
+    (execution,) = executions(
+        read_session_log(recorded(tmp_path / "run.mcap", hardware="no real robot, motors 1, 2, 3"))
+    )
+    assert (execution.end, execution.seconds, execution.within, execution.success) == ("done", 0.0, None, None)
+    assert np.isnan([execution.median, execution.worst, execution.delay]).all()
 
 
 def test_where_nothing_was_executed_nothing_is_said(tmp_path):
     path = recorded(tmp_path / "run.mcap")
-    book = read_logbook(path)
+    book = read_session_log(path)
     refused = [event | {"refused": "busy"} if event["event"] == "execute" else event for event in book.events]
     book.events[:] = refused
     assert list(executions(book)) == []
@@ -187,7 +191,7 @@ HELD = [
 
 @pytest.mark.parametrize(("before", "later", "expected"), HELD)
 def test_what_came_of_a_grasp(before, later, expected):
-    assert _held(before, later) == expected
+    assert _grasped(before, later) == expected
 
 
 @pytest.mark.parametrize(
@@ -199,12 +203,12 @@ def test_whether_the_arm_holds_anything(events, expected):
     assert _holds(events) == expected
 
 
-def executed(probability, held, within=None, seen=True):
-    return Execution(DIGEST, 1.0, "done", 0.0, np.nan, np.nan, np.nan, within, probability, held, seen)
+def executed(probability, grasped, within=None, visible=True):
+    return Execution(DIGEST, 1.0, "done", 0.0, np.nan, np.nan, np.nan, within, probability, grasped, visible)
 
 
 @pytest.mark.parametrize(
-    ("probability", "held", "said"),
+    ("probability", "grasped", "verdict"),
     [
         (1.0, True, "outcome as foreseen in 1 of 1, Brier score 0.000"),
         (1.0, False, "outcome as foreseen in 0 of 1, Brier score 1.000"),
@@ -218,10 +222,10 @@ def executed(probability, held, within=None, seen=True):
         (0.9, None, ""),
     ],
 )
-def test_whether_the_outcome_agreed_with_what_was_foreseen(probability, held, said):
+def test_whether_the_outcome_agreed_with_what_was_foreseen(probability, grasped, verdict):
     """An execution that nothing was foreseen of, or that was not tried to its end, is not judged, beside others."""
-    last = lines([executed(probability, held), executed(None, None), executed(0.7, None)])[-1]
-    assert last == "3 executed" + ("; " + said if said else "")
+    last = lines([executed(probability, grasped), executed(None, None), executed(0.7, None)])[-1]
+    assert last == "3 executed" + ("; " + verdict if verdict else "")
 
 
 def test_scores_are_of_all_that_are_judged():

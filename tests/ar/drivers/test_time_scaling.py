@@ -5,7 +5,7 @@ import pytest
 
 from tests.support.operator import config
 from trunkline.ar.drivers.setpoint_filter import LIMITS
-from trunkline.ar.drivers.time_scaling import PacedRobot, Smoother
+from trunkline.ar.drivers.time_scaling import Smoother, TimeScaledRobot
 from trunkline.ar.teleop.executor import BRAKE
 from trunkline.ar.teleop.following import KNOT, Following
 from trunkline.ar.teleop.plan import Plan
@@ -27,7 +27,7 @@ def planned(turn):
 def stopped(plan, after):
     """Rows sent of `plan`, stopped `after` s, until it rests, (T, 10), smoothed."""
     smoother, rows = Smoother(START, 10), []
-    robot = PacedRobot(READY, START[7:], PLANNED, "package", lambda q, c, _: rows.append(np.append(q, c)), PANDA)
+    robot = TimeScaledRobot(READY, START[7:], PLANNED, "package", lambda q, c, _: rows.append(np.append(q, c)), PANDA)
     assert robot.start(plan, plan.digest()) == ""
     while robot.state().mode == "running":
         robot.advance(TICK)
@@ -60,9 +60,9 @@ def test_a_plan_that_another_robot_could_not_run_is_refused():
     """An FR3's joint 6 reaches less far in than a Panda's."""
     turn = np.eye(10)[5] * (0.4 - START[5])
     plan, still = planned(turn), lambda q, c, _: None
-    assert PacedRobot(READY, START[7:], PLANNED, "package", still, PANDA).check(plan) == ""
-    found = PacedRobot(READY, START[7:], PLANNED, "package", still, FR3).start(plan, plan.digest())
-    assert found == "plan: joint 6 leaves this robot's range at 0.400 rad"
+    assert TimeScaledRobot(READY, START[7:], PLANNED, "package", still, PANDA).check(plan) == ""
+    reason = TimeScaledRobot(READY, START[7:], PLANNED, "package", still, FR3).start(plan, plan.digest())
+    assert reason == "plan: joint 6 leaves this robot's range at 0.400 rad"
 
 
 def test_without_a_stop_the_plan_is_run_to_its_end():
@@ -74,7 +74,7 @@ def test_without_a_stop_the_plan_is_run_to_its_end():
 def following(axes, seconds, ends=np.inf):
     """Rows sent as it follows `axes`, a function of time, which is heard every KNOT s; stopped after `ends` s."""
     smoother, rows = Smoother(START, 10), []
-    robot = PacedRobot(READY, START[7:], PLANNED, "package", lambda q, c, _: rows.append(np.append(q, c)), FR3)
+    robot = TimeScaledRobot(READY, START[7:], PLANNED, "package", lambda q, c, _: rows.append(np.append(q, c)), FR3)
     assert robot.follow(Following(DELAY, 0.0, OFFSET), TICK) == ""
     for tick in range(round(seconds / TICK)):
         now = tick * TICK
@@ -115,7 +115,7 @@ def test_it_stays_at_the_last_targets_that_its_range_has():
 
 def test_a_smoothed_step_becomes_a_way_of_continuous_acceleration():
     smoother = Smoother(np.zeros(1), 10)
-    found = np.array([smoother.next(np.array([max(0.0, n * TICK)]))[0] for n in range(-5, 60)])
-    gain = np.diff(found, 2) / TICK**2
+    values = np.array([smoother.next(np.array([max(0.0, n * TICK)]))[0] for n in range(-5, 60)])
+    gain = np.diff(values, 2) / TICK**2
     assert np.abs(np.diff(gain)).max() / TICK <= 1 / (10 * TICK) ** 2 * 1.01  # jerk of a speed that jumps by 1
-    np.testing.assert_allclose(found[-1], (59 - 9) * TICK)
+    np.testing.assert_allclose(values[-1], (59 - 9) * TICK)

@@ -25,17 +25,22 @@ def packed(kind="input", flags=0, count=2, received=7, stamp=1.25, hands=None):
 def test_an_input_is_128_bytes_and_read_back():
     message = packed(flags=0b101)
     assert len(message) == binary.INPUT_BYTES == 128
-    found = binary.read(message)
-    assert (found.kind, found.flags, found.received, found.stamp) == ("input", {"left_tracked", "visible"}, 7, 1.25)
-    np.testing.assert_array_equal(found.hands, np.arange(28.0).reshape(2, 14))
+    received = binary.read(message)
+    assert (received.kind, received.flags, received.received, received.stamp) == (
+        "input",
+        {"left_tracked", "visible"},
+        7,
+        1.25,
+    )
+    np.testing.assert_array_equal(received.hands, np.arange(28.0).reshape(2, 14))
 
 
 def test_a_view_is_one_pose():
     row = np.arange(7, dtype="<f4")
-    found = binary.read(struct.pack("<BBHId", 19, 1, 1, 3, 0.5) + row.tobytes())
-    assert (found.kind, found.flags, found.received, found.stamp) == ("view", {"tracked"}, 3, 0.5)
-    np.testing.assert_array_equal(found.view, row)
-    assert found.hands.shape == (0, 14)
+    received = binary.read(struct.pack("<BBHId", 19, 1, 1, 3, 0.5) + row.tobytes())
+    assert (received.kind, received.flags, received.received, received.stamp) == ("view", {"tracked"}, 3, 0.5)
+    np.testing.assert_array_equal(received.view, row)
+    assert received.hands.shape == (0, 14)
 
 
 def test_a_frame_has_16_bytes_and_28_a_body():
@@ -51,18 +56,18 @@ def test_a_frame_has_16_bytes_and_28_a_body():
     packed("ack", count=1), packed("stop", count=0) + bytes(4),
 ])  # fmt: skip
 def test_what_is_no_message_is_refused_in_one_line(message):
-    with pytest.raises(InputError) as found:
+    with pytest.raises(InputError) as refusal:
         binary.read(message)
-    assert "\n" not in str(found.value)
+    assert "\n" not in str(refusal.value)
 
 
 @given(st.binary(max_size=200))
 def test_no_bytes_break_the_reader(message):
     try:
-        found = binary.read(message)
+        received = binary.read(message)
     except InputError:
         return
-    assert found.kind in binary.FROM_CLIENT
+    assert received.kind in binary.FROM_CLIENT
 
 
 @given(st.one_of(st.text(max_size=200), st.recursive(st.none() | st.booleans() | st.floats() | st.text(), st.lists)
@@ -73,15 +78,15 @@ def test_no_text_breaks_the_reader(text):
 
 
 def test_what_is_said_is_heard_and_what_is_not_in_the_table_is_refused():
-    said = messages.hear('{"type": "hello", "version": 1, "token": "t", "name": "a\\u001b[31mb"}')
-    assert said == messages.Hello(1, token="t", name="a[31mb")
+    hello = messages.hear('{"type": "hello", "version": 1, "token": "t", "name": "a\\u001b[31mb"}')
+    assert hello == messages.Hello(1, token="t", name="a[31mb")
     for text in (
         '{"type": "hello", "version": 1, "more": 1}', '{"type": "execute", "digest": "d"}', "[" * 100_000,
         '{"type": "pong", "number": 1, "stamp": NaN}', '{"type": "shown"}', '{"type": "shown", "digest": 3}',
     ):  # fmt: skip
-        with pytest.raises(InputError) as found:
+        with pytest.raises(InputError) as refusal:
             messages.hear(text)
-        assert "\n" not in str(found.value)
+        assert "\n" not in str(refusal.value)
 
 
 def test_every_number_of_a_message_is_its_own():

@@ -30,13 +30,13 @@ def frame(number: int, angle: int = 100, size: int = 8, error: bool = False) -> 
     ],
 )
 def test_the_newest_whole_frame_of_each_motor_is_heard(frames, heard):
-    waiting, found = iter(frames), []
+    waiting, newest = iter(frames), []
     bus = SimpleNamespace(recv=lambda _: next(waiting, None), send=lambda _: None, set_filters=lambda _: None)
     driver = BusMotors(motor_settings(), bus)  # type: ignore[arg-type]
-    hear = lambda feedback, _: found.append((feedback.number, feedback.angle))  # noqa: E731
+    hear = lambda feedback, _: newest.append((feedback.number, feedback.angle))  # noqa: E731
     driver.motors = SimpleNamespace(fault="", hear=hear, currents=lambda *_: {})  # type: ignore[assignment]
     driver.turn([0.0], [0.0])
-    assert (found, driver.fault) == (heard, "")
+    assert (newest, driver.fault) == (heard, "")
 
 
 def test_currents_go_out_in_standard_frames():
@@ -46,8 +46,8 @@ def test_currents_go_out_in_standard_frames():
     driver.motors = SimpleNamespace(fault="", currents=lambda *_: {FIRST: 0.5})  # type: ignore[assignment]
     driver.turn([0.0], [0.0])
     expected = list(command_frames({FIRST: 0.5}))
-    assert [(one.arbitration_id, bytes(one.data)) for one in sent] == expected
-    assert not any(one.is_extended_id for one in sent)
+    assert [(message.arbitration_id, bytes(message.data)) for message in sent] == expected
+    assert not any(message.is_extended_id for message in sent)
 
 
 def test_the_first_fault_of_a_bus_is_the_one_that_is_named():

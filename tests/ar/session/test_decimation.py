@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from tests.ar.session.test_journal import SUBJECT, Written
+from tests.ar.session.test_log import SUBJECT, Written
 from tests.ar.teleop.test_plan import START, STRAIGHT
-from trunkline.ar.session.decimation import AFTER, BEFORE, SELDOM, STILL, Resting
+from trunkline.ar.session.decimation import AFTER, BEFORE, SELDOM, STILL, LogDecimation
 from trunkline.ar.session.log_format import JOINTS_SENT, POSES
-from trunkline.ar.session.robot import Standing
+from trunkline.ar.session.robot import RobotState
 from trunkline.recordings.logs.joint_stream import joint_stream
 from trunkline.recordings.logs.log import read_log
 
@@ -21,35 +21,35 @@ def at(time, noise, speed):
     poses = np.tile([0.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0], (3, 1))
     poses[:, 0] = speed * np.clip(time - MOVES, 0.0, STOPS - MOVES)
     poses[0] = np.nan  # a thing that is not there
-    return Standing(time, 0.0, START, STRAIGHT, NOTHING, poses + noise, NOTHING, None)
+    return RobotState(time, 0.0, START, STRAIGHT, NOTHING, poses + noise, NOTHING, None)
 
 
-def told(speed):
+def moving_states(speed):
     noises = 1e-8 * np.random.default_rng(0).standard_normal((len(TIMES), 3, 7))
     return [at(time, noise, speed) for time, noise in zip(TIMES, noises, strict=True)]
 
 
-def kept(standings):
-    resting = Resting()
-    found = [one for robot in standings for one in resting.take(robot, robot.time + 1.0)]
-    return found + resting.rest()
+def retained(robot_states):
+    resting = LogDecimation()
+    rows = [row for robot in robot_states for row in resting.take(robot, robot.time + 1.0)]
+    return rows + resting.rest()
 
 
 @pytest.mark.parametrize("speed", [0.5, 2e-3, 1e-3, 2e-4])
 def test_what_is_left_out_lies_between_what_is_kept(speed):
-    standings = told(speed)
-    found = kept(standings)
-    times = np.array([robot.time for robot, _ in found])
+    robot_states = moving_states(speed)
+    rows = retained(robot_states)
+    times = np.array([robot.time for robot, _ in rows])
     assert (np.diff(times) > 0).all()
     assert np.diff(times).max() < SELDOM + 1.5 / RATE
-    assert [late - robot.time for robot, late in found] == pytest.approx([1.0] * len(found))
+    assert [late - robot.time for robot, late in rows] == pytest.approx([1.0] * len(rows))
     for axis in range(7):
-        between = np.interp(TIMES, times, [robot.bodies[1, axis] for robot, _ in found])
-        assert np.abs(between - [robot.bodies[1, axis] for robot in standings]).max() <= STILL
+        between = np.interp(TIMES, times, [robot.bodies[1, axis] for robot, _ in rows])
+        assert np.abs(between - [robot.bodies[1, axis] for robot in robot_states]).max() <= STILL
 
 
 def test_a_motion_is_kept_whole_with_the_rest_around_it_and_later_rest_seldom():
-    times = np.array([robot.time for robot, _ in kept(told(0.5))])
+    times = np.array([robot.time for robot, _ in retained(moving_states(0.5))])
     whole = (TIMES > MOVES - BEFORE + 1.5 / RATE) & (TIMES < STOPS + AFTER - 1.5 / RATE)
     assert np.isin(TIMES[whole], times).all()
     later = times[times > STOPS + AFTER + 1 / RATE]
@@ -57,23 +57,23 @@ def test_a_motion_is_kept_whole_with_the_rest_around_it_and_later_rest_seldom():
 
 
 def test_what_is_sent_moves_a_robot_however_little_and_what_appears_does():
-    rests = told(0.0)[: round(RATE * MOVES)]
+    rests = moving_states(0.0)[: round(RATE * MOVES)]
     for change in ({"joints": START + 1e-12}, {"commands": STRAIGHT - 1e-12}, {"measured": START},
                    {"bodies": np.nan_to_num(rests[0].bodies)}, {}):  # fmt: skip
-        resting = Resting()
+        resting = LogDecimation()
         for robot in rests:
             resting.take(robot, robot.time)
         last = rests[-1]
         fields = {name: getattr(last, name) for name in ("joints", "commands", "thing", "bodies", "measured")} | change
-        found = resting.take(Standing(MOVES, 0.0, **fields), MOVES)
-        assert bool(found and found[-1][0].time == MOVES) == bool(change), change
+        rows = resting.take(RobotState(MOVES, 0.0, **fields), MOVES)
+        assert bool(rows and rows[-1][0].time == MOVES) == bool(change), change
 
 
 def test_a_log_of_a_robot_at_rest_has_few_of_its_poses_and_its_last_ones(tmp_path):
-    journal = Written(tmp_path / "run.mcap", SUBJECT)
-    for robot in told(0.0):
-        journal.standing(robot)
-    journal.close()
+    log_writer = Written(tmp_path / "run.mcap", SUBJECT)
+    for robot in moving_states(0.0):
+        log_writer.robot_state(robot)
+    log_writer.close()
     log = read_log(tmp_path / "run.mcap")
     for topic in (POSES, JOINTS_SENT):
         assert len(log.topics[topic].messages) < RATE * AFTER + (LASTS - AFTER) / SELDOM + RATE * BEFORE + 2
