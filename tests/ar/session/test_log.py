@@ -176,7 +176,7 @@ def told_of(path, truth, **hardware):
         )
         for part in ("left", "right", "view"):
             log_writer.headset(part, at, base, False)
-        log_writer.step(1 / 120, operator.given, intent)
+        log_writer.step(1 / 120, operator.message, intent)
     log_writer.close()
 
 
@@ -319,7 +319,7 @@ def test_poses_that_are_no_newer_are_not_told_twice_and_what_is_not_there_is_lef
     for at in (1.0, 1.0, 0.9, 1.1):
         log_writer.robot_state(RobotState(at, 0.0, START, STRAIGHT, poses[0], poses))
     operator = Operator()
-    log_writer.step(0.1, operator.given, operator.step())
+    log_writer.step(0.1, operator.message, operator.step())
     log_writer.close()
     poses = read_session_log(tmp_path / "run.mcap").poses
     assert poses.names == NAMES[1:]

@@ -83,7 +83,7 @@ def recorded(path, probability=0.8, grasped=True, end=None, spread=0.01, measure
             sensed = joints(time - DELAY) + OFF_JOINT if measured else None
             log_writer.robot_state(RobotState(log_writer.time, 0.0, START, STRAIGHT, poses[0], poses, sensed))
             intent: Intent = operator.step()
-            log_writer.step(1 / 60, operator.given, intent)
+            log_writer.step(1 / 60, operator.message, intent)
         if end is None:
             log_writer.event("robot", robot=ExecutorReport("done", DIGEST))
             if grasped:

@@ -44,7 +44,7 @@ def written(path, **hardware):
         if not number:
             log_writer.event("begin")
         log_writer.robot_state(RobotState(at, 0.0, START, STRAIGHT, np.full(7, np.nan), moved(at)))
-        log_writer.step(1 / RATE, operator.given, intent)
+        log_writer.step(1 / RATE, operator.message, intent)
     log_writer.close()
     return path
 
@@ -93,7 +93,7 @@ def test_of_a_real_machine_its_twin_is_shown_and_called_so(log, tmp_path, capsys
 def test_a_log_without_poses_is_refused_by_name(tmp_path):
     log_writer = Written(tmp_path / "run.mcap")
     intent = (operator := Operator()).step()
-    log_writer.step(1 / RATE, operator.given, intent)
+    log_writer.step(1 / RATE, operator.message, intent)
     log_writer.close()
     with pytest.raises(InputError, match="run.mcap: /tf: found no poses"):
         list(recording.recorded(read_session_log(tmp_path / "run.mcap")))

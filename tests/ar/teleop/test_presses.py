@@ -42,10 +42,10 @@ def press(rng: np.random.Generator, moving: bool) -> tuple[float, float]:
         pose = {"quaternion": _wxyz(turn), "grip": True, "trigger": bool(time == 0)}
         intent = operator.step(left=pose, right={"grip": True})
     assert intent.request is not None
-    reference = operator.given.alignment
+    reference = operator.message.alignment
     assert reference is not None
     into = rotation_from_wxyz(np.array(reference.quaternion))
-    start = np.array(reference.position) + into.apply(operator.given.left.position)
+    start = np.array(reference.position) + into.apply(operator.message.left.position)
     meant, last = (start + into.apply(LENGTH * turn.apply([0.0, 0.0, -1.0])) for turn in (_meant(moving), turns[-1]))
     taken = np.array(intent.request.targets.rigid.position)
     return float(np.linalg.norm(taken - meant)), float(np.linalg.norm(last - meant))

@@ -30,9 +30,8 @@ LOOKS = 0.005  # s
 RESTING = 0.5  # s that braking may take before its process is ended
 TEXT = 240  # bytes of a fault
 MODES = ("idle", "running", "done", "fault")
-TIME, MODE, SERIAL, HOLD_TIME, READY = range(
-    5
-)  # of the robot's report, before axes, sent and measured, object and bodies
+# First numbers of the robot's report; axes, sent and measured, object and bodies follow.
+TIME, MODE, SERIAL, HOLD_TIME, READY = range(5)
 PERMIT, PERMITTED, STOPS = range(3)  # of what it is told
 POSE = 7
 
