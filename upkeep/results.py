@@ -221,12 +221,12 @@ def not_in_history(root: Path) -> list[str]:
         history = git(root, "rev-list", "HEAD").split()
     except (FileNotFoundError, subprocess.CalledProcessError):
         raise InputError(f"{root.resolve()}: found no Git repository, expected the whole history") from None
-    known, lines = {commit[:7] for commit in history}, []
+    in_history, lines = {commit[:7] for commit in history}, []
     for file in sorted((root / FOLDER).glob("*.json")):
         commits = {json.loads(file.read_text(encoding="utf-8"))["commit"]}
         if file.with_suffix(".csv").is_file():
             with file.with_suffix(".csv").open(newline="", encoding="utf-8") as table:
                 commits |= {row["commit"] for row in csv.DictReader(table) if row.get("commit")}
         clean = sorted(commit.removesuffix(" with changes") for commit in commits)
-        lines += [f"{file.stem}: commit {commit}" for commit in clean if commit[:7] not in known]
+        lines += [f"{file.stem}: commit {commit}" for commit in clean if commit[:7] not in in_history]
     return lines
