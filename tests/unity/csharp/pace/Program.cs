@@ -1,4 +1,4 @@
-// Prints what Pace and KeepUp say, for tests/unity/test_pace.py.
+// Prints what Pace and KeepUp say, for tests/unity/test_time_steps.py.
 
 using System;
 using System.Globalization;
