@@ -294,12 +294,12 @@ def test_an_edit_reruns_exactly_what_depends_on_it(pipeline, stages, name):
 @pytest.mark.parametrize(
     ("file", "first"),
     [
-        ("trunkline/recordings/preparation/motive.py", []),
+        ("trunkline/recordings/preparation/motive.py", ["ingest"]),
         ("trunkline/report/figures/identification.py", []),
         ("upkeep/gate.py", []),
         ("docs/identification.md", []),
         ("trunkline/recordings/cleaning/label_swaps.py", ["ingest"]),
-        ("trunkline/recordings/filtering/filter.py", ["filter"]),
+        ("trunkline/recordings/filtering/filter.py", ["ingest"]),
         ("trunkline/identification/fit/search.py", ["identify_stiffness", "identify_damping", "identify_control"]),
         ("trunkline/kinematics/dataset/sampling.py", ["report", "fk_dataset", "train_ik", "reachability"]),
         ("trunkline/kinematics/ik/network.py", ["train_ik"]),

@@ -103,10 +103,10 @@ def tried(dropped=0.0, further=0.0) -> Tried:
      (0.0, np.nan, False)],
 )  # fmt: skip
 def test_what_counts_as_held_in_a_trial(dropped, further, held):
-    assert tried(dropped, further).held(sag=0.08, slip=0.02).tolist() == [held]
+    assert tried(dropped, further).success(sag=0.08, slip=0.02).tolist() == [held]
 
 
 def test_at_a_border_itself_nothing_is_held_in_a_trial_either():
     path, distance = np.zeros((2, 5, 3)), np.zeros((2, 5))
     path[0, -1, 2], distance[1, -1] = -0.5, 0.25
-    assert Tried(path, distance, 2, np.zeros((2, 3)), np.zeros((2, 1))).held(0.5, 0.25).tolist() == [False, False]
+    assert Tried(path, distance, 2, np.zeros((2, 3)), np.zeros((2, 1))).success(0.5, 0.25).tolist() == [False, False]

@@ -339,12 +339,12 @@ def test_no_stage_reads_the_truth():
     on holds it, nor does the session."""
     naming = [
         path.relative_to(ROOT).as_posix()
-        for folder in ("trunkline", "stages", "demo", "studies", "benchmarks", "qualification", "conf")
+        for folder in ("trunkline", "upkeep", "stages", "demo", "studies", "benchmarks", "qualification", "conf")
         for path in (ROOT / folder).rglob("*.*")
         if path.suffix in (".py", ".yaml") and "truth.json" in path.read_text(encoding="utf-8")
     ]
     assert sorted(naming) == ["demo/dvc.yaml", "demo/record.py", "upkeep/truth_table.py"]
-    importing = [p.name for p in (ROOT / "trunkline").rglob("*.py") if "truth_table import" in p.read_text()]
+    importing = [p.name for p in (ROOT / "upkeep").rglob("*.py") if "truth_table import" in p.read_text()]
     assert importing == ["readme.py"]
     stages = yaml.safe_load((ROOT / "dvc.yaml").read_text())["stages"]
     for name, stage in stages.items():
