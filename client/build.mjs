@@ -12,7 +12,7 @@ import { fileURLToPath } from "node:url";
 import { build } from "esbuild";
 
 const here = dirname(fileURLToPath(import.meta.url));
-const room = (name, file) => join(here, "..", "trunkline", name, "page", file);
+const page = (name, file) => join(here, "..", "trunkline", name, "page", file);
 
 /** The bytes of a script with all that it imports. */
 async function bundled(entry) {
@@ -35,11 +35,11 @@ async function bundled(entry) {
 /** What is built, bytes by path. */
 async function built() {
   return {
-    [room("live", "app.js")]: await bundled("src/main.js"),
-    [room("live", "index.html")]: readFileSync(join(here, "src", "index.html")),
-    [room("live", "icon.svg")]: readFileSync(join(here, "src", "icon.svg")),
-    [room("certificate", "viewer.js")]: await bundled("src/certificate/viewer.js"),
-    [room("certificate", "page.css")]: readFileSync(join(here, "src", "certificate", "page.css")),
+    [page("ar/session", "app.js")]: await bundled("src/main.js"),
+    [page("ar/session", "index.html")]: readFileSync(join(here, "src", "index.html")),
+    [page("ar/session", "icon.svg")]: readFileSync(join(here, "src", "icon.svg")),
+    [page("report/certificate", "viewer.js")]: await bundled("src/certificate/viewer.js"),
+    [page("report/certificate", "page.css")]: readFileSync(join(here, "src", "certificate", "page.css")),
   };
 }
 
