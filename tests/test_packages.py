@@ -1,12 +1,13 @@
 """The packages of trunkline/ in the order of the data: an earlier one never imports a later one, and within a package
 its folders import each other one way."""
 
-import ast
 import re
 from pathlib import Path
 
-import networkx
 import pytest
+
+from upkeep.imports import circles, folder_of, imported_names, package_graph
+from upkeep.sources import parse, python_in, read_checkout
 
 ROOT = Path(__file__).parents[1]
 
@@ -15,31 +16,14 @@ TABLE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").partition("<!-- p
 PACKAGES = re.findall(r"^\| `(\w+)` \|", TABLE.partition("<!-- /packages -->")[0], re.MULTILINE)
 GROUND = {file.stem for file in (ROOT / "trunkline").glob("*.py")}
 OUTSIDE = {"stages", "demo", "studies", "benchmarks", "qualification", "examples", "rehearsal", "upkeep", "tests"}
-
-
-def _modules_imported(file: Path) -> set[str]:
-    """Dotted names that a file imports anywhere in it, those of the tree alone."""
-    imported = set()
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom) and node.module:
-            imported |= {f"{node.module}.{alias.name}" for alias in node.names}
-        elif isinstance(node, ast.Import):
-            imported |= {alias.name for alias in node.names}
-    return {name for name in imported if name.split(".")[0] in {"trunkline", *OUTSIDE}}
+TOP = {"trunkline", *OUTSIDE}
 
 
 def _packages_imported(file: Path) -> set[str]:
     """Packages of trunkline/, files of it and folders beside it that a file imports."""
-    names = [name.split(".") for name in _modules_imported(file)]
-    return {parts[1] if parts[0] == "trunkline" else parts[0] for parts in names}
-
-
-def _folder(module: str) -> str:
-    """`a/b` of a module `trunkline.a.b.c`, or `a` of one without folders in between."""
-    parts = module.split(".")[1:]
-    while parts and not (ROOT / "trunkline" / "/".join(parts)).is_dir():
-        parts.pop()
-    return "/".join(parts)
+    names = imported_names(file.relative_to(ROOT).as_posix(), parse(file.read_text(encoding="utf-8")))
+    modules = [module.split(".") for bound in names.values() for module in bound]
+    return {parts[1] if parts[0] == "trunkline" else parts[0] for parts in modules if parts[0] in TOP}
 
 
 def test_every_package_has_its_place():
@@ -60,14 +44,7 @@ def test_the_ground_imports_no_package():
 
 
 def test_no_folders_import_each_other_in_a_circle():
-    arrows = networkx.DiGraph()
-    for file in (ROOT / "trunkline").rglob("*.py"):
-        place = file.parent.relative_to(ROOT / "trunkline").as_posix()
-        for module in _modules_imported(file):
-            there = _folder(module) if module.startswith("trunkline.") else ""
-            if place != "." and there and there != place:
-                arrows.add_edge(place, there)
-    assert [sorted(circle) for circle in networkx.strongly_connected_components(arrows) if len(circle) > 1] == []
+    assert circles(package_graph(python_in(read_checkout(ROOT), "trunkline"), folder_of)) == []
 
 
 def test_nothing_imports_a_stage():

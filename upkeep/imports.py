@@ -5,6 +5,7 @@ directly in trunkline/; the files of trunkline/ itself are one package, the grou
 """
 
 import ast
+from collections.abc import Callable
 
 import networkx as nx
 
@@ -48,14 +49,20 @@ def package_of(path: str) -> str:
     return parts[1] if len(parts) > 2 else GROUND
 
 
-def package_graph(library: Sources) -> nx.DiGraph:
-    """Packages, with an arrow from each to every other that a file of it imports."""
+def folder_of(path: str) -> str:
+    """The innermost folder of a file below trunkline/, from there, or the ground."""
+    return "/".join(path.split("/")[1:-1]) or GROUND
+
+
+def package_graph(library: Sources, place: Callable[[str], str] = package_of) -> nx.DiGraph:
+    """Packages, or whatever else is the `place` of a file, with an arrow from each to every other that a file of it
+    imports."""
     graph = nx.DiGraph()
-    graph.add_nodes_from(map(package_of, library))
+    graph.add_nodes_from(map(place, library))
     for path, text in library.items():
         for names in imported_names(path, parse(text)).values():
-            files = [place[0] for name in names if (place := locate(name, library))]
-            graph.add_edges_from((package_of(path), package_of(file)) for file in files)
+            files = [located[0] for name in names if (located := locate(name, library))]
+            graph.add_edges_from((place(path), place(file)) for file in files)
     graph.remove_edges_from(list(nx.selfloop_edges(graph)))
     return graph
 
