@@ -119,7 +119,7 @@ def measure(
         split=truth.split,
         level=truth.level,
         load=truth.load,
-        bodies=(BASE, *truth.segments),
+        bodies=(BASE, *truth.markers),
         frames=frame_number + numbers,
         stamps=_nanoseconds(epoch, time + jitter),
         logged=_logged(epoch, time, settings, rng),
@@ -138,8 +138,8 @@ def measure(
 def _in_mocap_frame(
     truth: Truth, time: np.ndarray, settings: InstrumentSettings
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Exact poses of the base and the segments at `time` (F,): (F, B, 3) and (F, B, 4)."""
-    bodies = 1 + len(truth.segments)
+    """Exact poses of the base and the markers at `time` (F,): (F, B, 3) and (F, B, 4)."""
+    bodies = 1 + len(truth.markers)
     positions = np.empty((len(truth.time), bodies, 3))
     quaternions = np.empty((len(truth.time), bodies, 4))
     positions[:, 0], quaternions[:, 0] = truth.base_position, truth.base_quaternion

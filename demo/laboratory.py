@@ -174,7 +174,7 @@ class Laboratory:
             time=np.arange(len(positions)) / SAMPLE_RATE,
             base_position=origin,
             base_quaternion=wxyz_from_rotation(mount),
-            segments=tuple(unit_name(unit) for unit in self.tracked),
+            markers=tuple(unit_name(unit) for unit in self.tracked),
             positions=origin + mount.apply(positions.reshape(-1, 3)).reshape(positions.shape),
             quaternions=wxyz_from_rotation(mount * local).reshape(*positions.shape[:2], 4),
             tendons=(),

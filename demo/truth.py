@@ -9,12 +9,12 @@ from trunkline.recordings.trials.recording import TrialRecording
 
 @dataclass(kw_only=True)
 class Truth(TrialRecording):
-    """One trial of T instants, S segments, K tendons and Tc commands. The world is z-up, in metres.
+    """One trial of T instants, S markers, K tendons and Tc commands. The world is z-up, in metres.
 
     time: (T,) s, uniform at 480 Hz or more, from 0.
     begin: s, when the arm is let go or the first command leaves; 0 for a static trial.
     base_position (3,), base_quaternion (4,) wxyz: pose of the base in the world, constant in a trial.
-    positions (T, S, 3), quaternions (T, S, 4) wxyz: the segments in the world.
+    positions (T, S, 3), quaternions (T, S, 4) wxyz: the markers in the world.
     command_time (Tc,) s, commands (Tc, K): m of pull, as sent. tendon_positions (T, K): m of pull, as wound.
     """
 

@@ -9,13 +9,13 @@ from pydantic import Field
 
 from trunkline.compute.progress import progress
 from trunkline.errors import existing
-from trunkline.identification.evaluation.error_tables import segment_table, trial_table
+from trunkline.identification.evaluation.error_tables import marker_table, trial_table
 from trunkline.identification.results.scoring import Compared, score
 from trunkline.pipeline.inputs import read_spec
 from trunkline.pipeline.stage import output_folder, run_stage, write_metrics
 from trunkline.recordings.trials.splits import IDENTIFY, TEST
 from trunkline.recordings.trials.trial import read_trials, sessions_of
-from trunkline.report.figures.scoring import segment_figure, trial_figure
+from trunkline.report.figures.scoring import marker_figure, trial_figure
 from trunkline.report.figures.style import save_figure
 from trunkline.settings import settings
 
@@ -43,7 +43,7 @@ def main(config: Config) -> None:
             compared = Compared(**json.loads(existing(folder / "parameters.json").read_text())["compared"])
             models = {"cad": cad, "initial": initial, "identified": identified}
             metrics[stage], predictions = score(models, trials, compared, config.floor_poses)
-            of_trials[stage], along[stage] = trial_table(predictions), segment_table(predictions, trials[0].segments)
+            of_trials[stage], along[stage] = trial_table(predictions), marker_table(predictions, trials[0].markers)
             if not metrics[stage]:
                 print(f"score: {stage}: found no {' or '.join(compared.experiments)} with split {TEST}, expected one")
             initial, unscored = identified, unscored - set(compared.experiments)
@@ -52,11 +52,11 @@ def main(config: Config) -> None:
         print(f"score: {', '.join(sorted(unscored))}: no stage's `reported` has it, so nothing of it is scored")
     with output_folder(ARTIFACTS / "score") as folder:
         write_metrics(folder, metrics)
-        for name, tables in (("trials", of_trials), ("segments", along)):
+        for name, tables in (("trials", of_trials), ("markers", along)):
             whole = pd.concat([table.assign(stage=stage) for stage, table in tables.items()])
             whole.to_csv(folder / f"{name}.csv", index=False, float_format="%.6g")
         save_figure(trial_figure(of_trials), folder / "errors.png")
-        save_figure(segment_figure(along), folder / "segments.png")
+        save_figure(marker_figure(along), folder / "markers.png")
 
 
 if __name__ == "__main__":

@@ -194,7 +194,7 @@ def cells(choice: Choice, is_quick: bool, known: dict[str, Chain]) -> dict[str, 
     """Of a row, by their heads."""
     found = chain(choice, is_quick, known)
     unseen = [e for e in found.experiments if e.split == VALIDATE]
-    replayed = replay(found.model, unseen, found.fit.segments)
+    replayed = replay(found.model, unseen, found.fit.markers)
     table = scores(replayed, unseen, found.fit.loss, found.fit.weights)[VALIDATE]["by_experiment"]
     errors = {f"{error}, {kind}s (mm)": table[kind][key] for error, key in ERRORS.items() for kind in KINDS}
     stages = [stage.removeprefix("identify_") for stage in STAGES]

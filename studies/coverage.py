@@ -18,7 +18,7 @@ import numpy as np
 from scipy.stats import t as student
 from threadpoolctl import threadpool_limits
 
-from tests.support.matched_plant import FRAME, curl, motion, segments_of, small_model, static_pull, tilt
+from tests.support.matched_plant import FRAME, curl, markers_of, motion, small_model, static_pull, tilt
 from tests.support.noisy_trials import WEIGHTS, Stage, measured, releases, with_values
 from trunkline.compute.progress import progress
 from trunkline.errors import in_one_line
@@ -157,7 +157,7 @@ def cover(name: str, is_matched: bool, repetitions: int) -> Coverage:
             drawn = {key: expected[key] * RANGE ** rng.uniform(-1, 1) for key in scaled}
             begin = with_values(model, drawn)
             experiments = [prepare(measured(trial, rng), begin, frames) for trial in clean]
-            problem = Problem(begin, experiments, segments_of(begin), bounds, "positions", WEIGHTS)
+            problem = Problem(begin, experiments, markers_of(begin), bounds, "positions", WEIGHTS)
             rough = search(problem, ROUGH, repetition, lambda best: None)
             end = descend(problem, rough.vector, *POLISH, lambda best: None)
             assert end.linear is not None, "least squares ends on its own linearisation"

@@ -160,10 +160,10 @@ def validated(title: str, link: Chain, trials: list[Trial], cad: mujoco.MjModel)
     """
     pairs = [(trial, e) for trial, e in zip(trials, link.experiments, strict=True) if e.split == VALIDATE]
     seen, unseen = [trial for trial, _ in pairs], [e for _, e in pairs]
-    replayed, own = replay(link.model, unseen, link.fit.segments), own_starts(unseen, seen, link.model, cad)
+    replayed, own = replay(link.model, unseen, link.fit.markers), own_starts(unseen, seen, link.model, cad)
     beside = (
         Prediction(hanging_still(unseen, replayed, link.experiments), unseen),
-        Prediction(replay(cad, own, link.fit.segments), own),
+        Prediction(replay(cad, own, link.fit.markers), own),
         noise_floor(seen, unseen, link.model, replayed),
     )
     others = [prediction.scores()[VALIDATE]["by_experiment"] for prediction in beside]

@@ -88,7 +88,7 @@ def error(case: Case, takes: list[RawTrial]) -> tuple[float, float, float, float
     model, experiments, fit = set_up(config, trials, arm(case))
     with contextlib.redirect_stdout(io.StringIO()):
         found = identify("", model, experiments, fit)
-    table = scores(replay(found.models["identified"], experiments, fit.segments), experiments, fit.loss, fit.weights)
+    table = scores(replay(found.models["identified"], experiments, fit.markers), experiments, fit.loss, fit.weights)
     unseen = table[VALIDATE]
     return table[IDENTIFY]["e_position_mm"], unseen["e_position_mm"], unseen["e_tip_mm"], unseen["e_tip_pct"]
 

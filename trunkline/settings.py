@@ -56,6 +56,23 @@ def _size(node: yaml.Node | None, sizes: dict[int, int]) -> int:
     return sizes[id(node)]
 
 
+def rename_keys(values: dict, renamed: dict[str, str], where: str) -> None:
+    """Give keys of an earlier release the names that they have now, in place, and print a line for each.
+
+    Args:
+        renamed: the old name of a key to the new one. where: begins the line.
+
+    Raises:
+        InputError: a key is there under both names.
+    """
+    for old, new in renamed.items():
+        if old in values:
+            if new in values:
+                raise InputError(f"{where}: found `{old}` beside `{new}`, its new name, expected `{new}` alone")
+            print(f"{where}: `{old}` is called `{new}` now: please rename it, the next release reads `{new}` alone")
+            values[new] = values.pop(old)
+
+
 @dataclass_transform(kw_only_default=True, field_specifiers=(Field,))
 def settings(cls: type[Schema]) -> type[Schema]:
     """Decorate a stage's `Config`: it and all dataclasses nested in it refuse unknown keys and conversions.

@@ -180,10 +180,10 @@ def error_table(root: Path) -> str:
                 lines.append(_row(f"position / tip, {words} of `{split}`{of}", row, count))
         fit = _at(metrics[stage], "start_fit", "by_experiment", kind)
         mean, largest = (f"{_number(fit.get(key))} mm" for key in ("mean_mm", "max_mm"))
-        lines.append(f"| pose from which {words} start | {mean} | {largest} | segments, `identify` and `validate` |")
+        lines.append(f"| pose from which {words} start | {mean} | {largest} | markers, `identify` and `validate` |")
     for stage in STAGES[1:]:
         step = _at(metrics[stage], "halved_step").get("max_mm")
-        lines.append(f"| time step, against half of it, `{stage}` | | {_number(step)} mm | one segment in one frame |")
+        lines.append(f"| time step, against half of it, `{stage}` | | {_number(step)} mm | one marker in one frame |")
     return "\n".join([*lines, *_start_rows(root, metrics["filter"])])
 
 

@@ -32,7 +32,7 @@ SESSION = HERE / "data" / "raw" / "pairs"
 SPLITS = (IDENTIFY, IDENTIFY, IDENTIFY, VALIDATE, TEST, TEST)
 MOUNT = Rotation.from_euler("ZY", [30, 85], degrees=True)  # world ← base: the arm sticks out, a little downwards
 MOTORS = {"m1": (1, 2), "m2": (3, 4), "m3": (5, 6)}  # tendons that each winds in and pays out
-SEGMENTS = ("middle", "tip")
+MARKERS = ("middle", "tip")
 STEP, RATE = 5e-4, 500.0  # s; Hz, of what instruments can see
 REST, SECONDS, FADE = 2.0, 20.0, 2.0  # s before a motion, of it, and in which it grows to its size
 FREQUENCIES, LARGEST = (0.11, 0.27, 0.43, 0.8), 0.006  # Hz; m that a motor winds in
@@ -69,7 +69,7 @@ def moved(model: mujoco.MjModel, commands: np.ndarray, names: list[str]) -> list
     hold(batch, model, controls[:, 0])
     move(batch, np.repeat(controls[:, :1], 8000, axis=1), ("qpos",), 8000)  # until it hangs still
     paths = move(batch, controls, ("qpos",), every)["qpos"]
-    sites, data = [model.site(f"{name}_center").id for name in SEGMENTS], mujoco.MjData(model)
+    sites, data = [model.site(f"{name}_center").id for name in MARKERS], mujoco.MjData(model)
     truths = []
     for path, name, split, row in zip(paths, names, SPLITS, commands, strict=True):
         positions, rotations = np.empty((len(path), len(sites), 3)), np.empty((len(path), len(sites), 3, 3))
@@ -82,7 +82,7 @@ def moved(model: mujoco.MjModel, commands: np.ndarray, names: list[str]) -> list
         time = np.arange(len(path)) / RATE
         truths.append(Truth(
             name=name, experiment="motion", split=split, level=None, time=time, begin=REST,
-            base_position=np.array([0.0, 0.0, 1.0]), base_quaternion=wxyz_from_rotation(MOUNT), segments=SEGMENTS,
+            base_position=np.array([0.0, 0.0, 1.0]), base_quaternion=wxyz_from_rotation(MOUNT), markers=MARKERS,
             positions=MOUNT.apply(positions.reshape(-1, 3)).reshape(positions.shape) + [0.0, 0.0, 1.0],
             quaternions=wxyz_from_rotation(turned).reshape(*positions.shape[:2], 4), tendons=tuple(MOTORS),
             command_time=time, commands=row[::every], tendon_positions=row[::every],

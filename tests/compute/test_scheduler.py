@@ -17,7 +17,7 @@ from rehearsal import runs
 from rehearsal.experiments.result import Result
 from tests.identification.test_stage import settings, truth_of
 from tests.support.bent_chain import hardening_stump
-from tests.support.matched_plant import FRAME, begin_project, curl, release, segments_of, small_model, tilt
+from tests.support.matched_plant import FRAME, begin_project, curl, markers_of, release, small_model, tilt
 from tests.support.small_arm import small_spec
 from trunkline.compute import cluster as workers
 from trunkline.compute import scheduler
@@ -90,7 +90,7 @@ def trials():
 
 def as_problem(model, experiments) -> Problem:
     bounds = {"damping": Bounds(1e-3, 1.0), "stiffness": Bounds(0.1, 1e3), "rate_limit": Bounds(0.02, 2.0)}
-    return Problem(model, experiments, segments_of(model), bounds, "positions", WEIGHTS)
+    return Problem(model, experiments, markers_of(model), bounds, "positions", WEIGHTS)
 
 
 @pytest.mark.parametrize("count", [1, 3, 11])
@@ -109,7 +109,7 @@ def test_candidates_times_trials_are_the_same_bits(trials, spreading, count):
 
 def test_pieces_are_really_cut_and_done_elsewhere(trials, spreading):
     model, experiments = trials
-    population = Population(model, experiments, segments_of(model))
+    population = Population(model, experiments, markers_of(model))
 
     def cut(count):
         return population._cut({"dof_damping": np.arange(count)}, None)
@@ -135,9 +135,9 @@ def test_a_candidate_that_diverges_does_so_there_too(spreading):
     model = small_model()
     experiments = [prepare(release(model, 0.25, frames=30), model, 30)]
     fields = candidate_fields(model, {"stiffness": model.jnt_stiffness[:1] * [1.0, 1e5, 1.1]})
-    here = Population(model, experiments, segments_of(model)).simulate(fields)
+    here = Population(model, experiments, markers_of(model)).simulate(fields)
     spreading()
-    there = Population(model, experiments, segments_of(model)).simulate(fields)
+    there = Population(model, experiments, markers_of(model)).simulate(fields)
     assert there.diverged.tolist() == here.diverged.tolist() == [False, True, False]
     assert same(there.positions, here.positions)
 
@@ -154,10 +154,10 @@ def _run_or_die(shared, piece):
 def test_a_worker_killed_on_the_way_changes_no_bit(trials, spreading, tmp_path, monkeypatch):
     model, experiments = trials
     fields = candidate_fields(model, {"damping": np.linspace(0.01, 0.05, 5)})
-    here = Population(model, experiments, segments_of(model)).simulate(fields)
+    here = Population(model, experiments, markers_of(model)).simulate(fields)
     spreading()
     flag = tmp_path / "killed"
-    population = Population(model, experiments, segments_of(model))
+    population = Population(model, experiments, markers_of(model))
     monkeypatch.setattr(
         "trunkline.identification.simulate.population.spread",
         lambda work, pieces, shared: spread(_run_or_die, pieces, (shared, flag)),

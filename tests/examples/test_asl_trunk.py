@@ -38,7 +38,7 @@ def test_the_public_csv_becomes_a_session_that_ingest_reads(public, tmp_path):
     assert [trial.split for trial in session.trials] == ["identify", "identify", "test"] * 3 + ["validate"] * 4
     positions = read_releases(public)
     for number, (_, take, findings) in enumerate(load_raw_trials(folder, session, LIMITS)):
-        assert (take.segments, take.tendons, take.quaternions) == (("1", "2", "3"), (), None)
+        assert (take.markers, take.tendons, take.quaternions) == (("1", "2", "3"), (), None)
         np.testing.assert_array_equal(take.positions, positions[number][: len(take.time)])  # to the last bit
         np.testing.assert_allclose(np.diff(take.time), 0.01)
         assert not findings.repairs

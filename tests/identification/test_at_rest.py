@@ -14,7 +14,7 @@ from trunkline.identification.simulate.at_rest import shapes_at_rest
 from trunkline.identification.simulate.experiment import Experiment
 from trunkline.identification.simulate.pose_fit import PoseFit
 from trunkline.model.arm.tendons import Tendon
-from trunkline.model.elements import PRELOAD, WINDING, numbers_place, numeric_place, segment_sites
+from trunkline.model.elements import PRELOAD, WINDING, marker_sites, numbers_place, numeric_place
 from trunkline.model.simulation.rest import settle
 from trunkline.model.statics.chain import read_chain
 from trunkline.model.statics.equilibria import actuated
@@ -41,7 +41,7 @@ def path_of(model: mujoco.MjModel, pulls: np.ndarray, load: float = 0.0, gravity
 
 def tips(model: mujoco.MjModel, experiment: Experiment, values: dict[str, float] | None = None) -> np.ndarray:
     fields = candidate_fields(model, {k: np.array([v]) for k, v in (values or {"kp": 2000.0}).items()})
-    return shapes_at_rest(model, fields, [experiment], segment_sites(model, ("tip",)), None).positions[0][0, :, 0]
+    return shapes_at_rest(model, fields, [experiment], marker_sites(model, ("tip",)), None).positions[0][0, :, 0]
 
 
 PULLS = np.random.default_rng(3).uniform(-0.002, 0.006, (5, 4))

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.support.matched_plant import release, segments_of, small_model, tilt
+from tests.support.matched_plant import markers_of, release, small_model, tilt
 from trunkline.identification.evaluation.baselines import hanging_still, references
-from trunkline.identification.evaluation.error_tables import segment_table, trial_table
+from trunkline.identification.evaluation.error_tables import marker_table, trial_table
 from trunkline.identification.evaluation.evaluation import Prediction, replay
 from trunkline.identification.simulate.experiment import prepare
 
@@ -25,7 +25,7 @@ def trials_of(model, noise=0.0):
 
 def beside(model, trials):
     experiments = [prepare(trial, model, 30) for trial in trials]
-    replayed = replay(model, experiments, segments_of(model))
+    replayed = replay(model, experiments, markers_of(model))
     return experiments, replayed, references(trials, experiments, model, replayed)
 
 
@@ -83,15 +83,15 @@ def test_tables_say_which_trial_is_bad_and_where_along_the_arm(model):
     measured = experiments[1].measured.copy()
     measured[:, 1] = False
     experiments[1].measured = measured
-    replayed = replay(model, [prepare(trial, model, 30) for trial in trials_of(model)], segments_of(model))
+    replayed = replay(model, [prepare(trial, model, 30) for trial in trials_of(model)], markers_of(model))
     table = trial_table({"model": Prediction(replayed, experiments)}).set_index("trial")
     assert table.e_tip_mm.idxmax() == trials[1].name
     assert table.loc[trials[1].name].e_tip_mm == pytest.approx(20, abs=1)
     assert table.loc[trials[1].name].e_position_mm == pytest.approx(20 / 3, abs=1)  # of the three that were seen
     assert np.isnan(table.loc[trials[2].name].e_velocity_mm_s)
     validate = Prediction(replayed, experiments).of(lambda e: e.split == "validate" and e.kind == "release")
-    along = segment_table({"model": validate}, segments_of(model))
-    assert list(along.segment) == list(segments_of(model))
+    along = marker_table({"model": validate}, markers_of(model))
+    assert list(along.marker) == list(markers_of(model))
     assert np.all(np.diff(along.from_base_mm) > 0)
     assert along.e_position_mm.iloc[-1] == pytest.approx(20, abs=1)
     assert np.isnan(along.e_position_mm.iloc[1])

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tests.support.matched_plant import release, segments_of, small_model
+from tests.support.matched_plant import markers_of, release, small_model
 from trunkline.identification.fit.certainty import ALONE, certainty
 from trunkline.identification.fit.identify import BOUND_TOLERANCE, _at_bound, _factors_at_bound
 from trunkline.identification.fit.linearisation import Linearisation
@@ -95,7 +95,7 @@ def bent():
 def test_a_pose_is_found_where_the_descent_ended_before_its_iterations_did(bent):
     """At the very number that it takes, one fewer and one more."""
     model, trial = bent
-    problem = PoseProblem(model, trial.segments, trial.positions[0])
+    problem = PoseProblem(model, trial.markers, trial.positions[0])
     free, start = np.ones(problem.angles, bool), np.zeros(problem.angles)
     needed = _descend(problem, start, problem.measured, free, 300)
     assert needed.converged
@@ -106,11 +106,11 @@ def test_a_pose_is_found_where_the_descent_ended_before_its_iterations_did(bent)
 
 
 @pytest.mark.parametrize("hidden", [(0,), (2,), (3,), (0, 1)])
-def test_a_pose_says_how_far_seen_segments_are_and_nothing_of_hidden_ones(bent, hidden):
+def test_a_pose_says_how_far_seen_markers_are_and_nothing_of_hidden_ones(bent, hidden):
     model, trial = bent
     positions = trial.positions[0].copy()
     positions[list(hidden)] = np.nan
-    pose = fit_pose(model, segments_of(model), positions)
+    pose = fit_pose(model, markers_of(model), positions)
     assert np.flatnonzero(np.isnan(pose.residuals)).tolist() == list(hidden)
     assert np.nanmax(pose.residuals) < 1e-3
     assert pose.converged

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from tests.support.matched_plant import curl, segments_of, small_model
+from tests.support.matched_plant import curl, markers_of, small_model
 from trunkline.identification.fit.certainty import bootstrap, certainty, weakest_in_words
 from trunkline.identification.fit.fit import CoarseSearch, Fit, Method, Refinement
 from trunkline.identification.fit.identify import identify
@@ -127,7 +127,7 @@ def test_a_force_range_that_no_pull_reaches_is_undetermined():
     )
     weights = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
     result = identify(
-        "test", model, experiments, Fit(segments_of(model), bounds, (), "positions", weights, method)
+        "test", model, experiments, Fit(markers_of(model), bounds, (), "positions", weights, method)
     )
     assert result.certainty.standard_error[1] == result.certainty.half_width[1] == np.inf
     assert undetermined(result, bounds) == ["force_range"]
@@ -151,7 +151,7 @@ def test_factors_that_one_trial_alone_determines_have_no_width(tmp_path):
     )
     weights = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
     result = identify(
-        "test", model, experiments, Fit(segments_of(model), bounds, ("stiffness",), "positions", weights, method)
+        "test", model, experiments, Fit(markers_of(model), bounds, ("stiffness",), "positions", weights, method)
     )
     write_json(tmp_path / "parameters.json", parameter_table(result, bounds))
     table = json.loads((tmp_path / "parameters.json").read_text())

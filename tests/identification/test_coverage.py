@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import binom
 from scipy.stats import t as student
 
-from tests.support.matched_plant import FRAME, segments_of, small_model
+from tests.support.matched_plant import FRAME, markers_of, small_model
 from tests.support.noisy_trials import STAGES, TRIALS, WEIGHTS, measured, with_values
 from trunkline.identification.fit.certainty import bootstrap, certainty
 from trunkline.identification.fit.problem import Bounds, Problem
@@ -46,7 +46,7 @@ def repetitions(request) -> Repetitions:
     errors, widths, resampled = [], [], []
     for _ in range(REPETITIONS):
         experiments = [prepare(measured(trial, rng), model, FRAMES) for trial in clean]
-        problem = Problem(model, experiments, segments_of(model), bounds, "positions", WEIGHTS)
+        problem = Problem(model, experiments, markers_of(model), bounds, "positions", WEIGHTS)
         result = descend(problem, exact + rng.normal(0, 0.02, len(exact)), 12, 1e-6, lambda best: None)
         assert result.converged
         moves = surrogate(problem, result.vector).moves

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.support.matched_plant import segments_of, small_model, tilt
+from tests.support.matched_plant import markers_of, small_model, tilt
 from trunkline.identification.evaluation.evaluation import replay, scores
 from trunkline.identification.fit.fit import CoarseSearch, Fit, Method, Refinement
 from trunkline.identification.fit.identify import identify
@@ -36,13 +36,13 @@ def errors(first: np.ndarray, second: np.ndarray) -> tuple[dict, dict]:
         truth = model.__copy__()
         set_fields(truth, candidate_fields(model, {}, {"stiffness": factors[None]}))
         experiments.append(prepare(tilt(truth, angle), model, 1))
-    segments, stiffness = segments_of(model), PARAMETERS["stiffness"].read(model)
+    markers, stiffness = markers_of(model), PARAMETERS["stiffness"].read(model)
     bounds = {"stiffness": Bounds(0.5 * stiffness, 2 * stiffness)}
-    fit = Fit(segments, bounds, ("stiffness",), "positions", WEIGHTS, METHOD)
+    fit = Fit(markers, bounds, ("stiffness",), "positions", WEIGHTS, METHOD)
     alone = identify("test", model, experiments[:1], fit)
     fitted = {}
     for name in ("coarse", "identified"):
-        replayed = replay(alone.models[name], experiments[:1], segments)
+        replayed = replay(alone.models[name], experiments[:1], markers)
         fitted[name] = scores(replayed, experiments[:1], "positions", WEIGHTS)["identify"]["e_position_mm"]
     left_out = cross_validate("test", alone, experiments, fit, folds=2)
     return fitted, {name: table["e_position_mm"] for name, table in left_out.items()}
@@ -75,7 +75,7 @@ def test_every_trial_is_left_out_once(monkeypatch):
     calls = []
     module = "trunkline.identification.uncertainty.cross_validation"
     monkeypatch.setattr(f"{module}.identify", lambda *args: type("Found", (), {"models": result.models})())
-    monkeypatch.setattr(f"{module}.replay", lambda model, left, segments: calls.append([e.name for e in left]) or left)
+    monkeypatch.setattr(f"{module}.replay", lambda model, left, markers: calls.append([e.name for e in left]) or left)
     monkeypatch.setattr(f"{module}.trial_table", lambda predictions: error_table(predictions))
     result = type("Result", (), {"models": {"coarse": model, "identified": model}})()
     table = cross_validate("test", result, trials, Fit((), {}, (), "positions", WEIGHTS, METHOD), folds=2)

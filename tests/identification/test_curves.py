@@ -18,7 +18,7 @@ def drawn(measured):
 
 
 def path(*bends):
-    """Two segments that bend aside by so many m, frame by frame. Shape (T, 2, 3)."""
+    """Two markers that bend aside by so many m, frame by frame. Shape (T, 2, 3)."""
     return np.array([[[bend / 3, 0.0, -0.1], [bend, 0.0, -0.2]] for bend in bends])
 
 

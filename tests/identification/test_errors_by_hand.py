@@ -17,12 +17,12 @@ def still(frames: int) -> np.ndarray:
 
 
 def moved(positions: np.ndarray, *millimetres: float) -> np.ndarray:
-    """Each segment as far across, m."""
+    """Each marker as far across, m."""
     return positions + np.outer(millimetres, [1e-3, 0.0, 0.0])
 
 
 @pytest.mark.parametrize(("tip", "error"), [(0, 1.0), (1, 2.0), (2, 6.0)])
-def test_the_tip_s_error_is_of_its_own_segment(tip, error):
+def test_the_tip_s_error_is_of_its_own_marker(tip, error):
     row = errors_of(moved(still(5), 1, 2, 6), experiment(still(5)), replace(LIKE, tip=tip), None, None)
     assert row["e_tip_mm"] == pytest.approx(error)
     assert row["e_tip_pct"] == pytest.approx(error / 3)  # of 0.3 m

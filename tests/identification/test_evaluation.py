@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from tests.support.matched_plant import FRAME, curl, release, segments_of, small_model, tilt
+from tests.support.matched_plant import FRAME, curl, markers_of, release, small_model, tilt
 from tests.support.small_arm import small_spec
 from tests.support.swings import FRAMES, LIKE, STEP, TIME, TIP, experiment, swing
 from trunkline.identification.evaluation.evaluation import (
     Prediction,
     errors_of,
     halved_step,
+    marker_positions,
     period_error,
     replay,
     scores,
-    segment_positions,
 )
 from trunkline.identification.parameters.parameters import candidate_fields, set_fields
 from trunkline.identification.simulate.experiment import own_starts, prepare
@@ -29,7 +29,7 @@ def test_only_trials_in_motion_have_a_velocity():
     model = small_model(4)
     experiments = [prepare(trial, model, 20) for trial in (release(model, 0.2, frames=30), tilt(model, 30))]
     for order in (experiments, experiments[::-1]):
-        table = scores(replay(model, order, segments_of(model)), order, "positions", WEIGHTS)["identify"]
+        table = scores(replay(model, order, markers_of(model)), order, "positions", WEIGHTS)["identify"]
         kinds = table["by_experiment"]
         assert "e_velocity_mm_s" not in kinds["static_tilt"]
         assert table["e_velocity_mm_s"] == kinds["release"]["e_velocity_mm_s"]
@@ -48,7 +48,7 @@ def test_half_the_step_moves_little_with_every_option_on():
     model.dof_damping[: arm_hinges(model)] *= 4  # as the plant's
     model.tendon_frictionloss[cables(model)] = plant.tendon_frictionloss[:] = 0
     experiments = [prepare(curl(plant, 30, frames=90), model, 90)]
-    full, halved = (Prediction(replay(model, experiments, segments_of(model), f), experiments) for f in (1.0, 0.5))
+    full, halved = (Prediction(replay(model, experiments, markers_of(model), f), experiments) for f in (1.0, 0.5))
     assert 0.3 < full.scores()["identify"]["e_internal_mm"] < 1.0  # 1 mm is 0.2 % of the arm's length
     change = halved_step(full, halved)
     assert 0 < change["identify"] < 0.05
@@ -58,7 +58,7 @@ def test_half_the_step_moves_little_with_every_option_on():
 def test_trials_that_a_model_does_not_survive_are_counted():
     model = small_model(4)
     experiments = [prepare(release(model, angle, frames=20), model, 20) for angle in (0.2, 0.3)]
-    replayed = replay(model, experiments, segments_of(model))
+    replayed = replay(model, experiments, markers_of(model))
     assert replayed.diverged == 0
     replayed.positions[1][-1, 0] = np.nan
     assert replayed.diverged == 1
@@ -72,7 +72,7 @@ def test_every_model_starts_where_its_own_geometry_puts_the_arm():
     experiments = [prepare(trial, bent, 20) for trial in trials]
     started = own_starts(experiments, trials, bent, cad)
     off = [
-        np.linalg.norm(segment_positions(cad, segments_of(cad), e.start) - trials[0].positions[0], axis=1).mean()
+        np.linalg.norm(marker_positions(cad, markers_of(cad), e.start) - trials[0].positions[0], axis=1).mean()
         for e in (started[0], experiments[0])
     ]
     assert off[0] < 0.5 * off[1]
@@ -102,7 +102,7 @@ def test_a_swing_is_compared_about_where_each_trial_rests():
     wave = (np.exp(-4 * time) * np.cos(8 * time))[:, None, None] * 0.05
     experiment.positions = experiment.positions[-1:] + wave
     moved = experiment.positions + [0.003, 0.004, 0.0]
-    replayed = replay(model, [experiment], segments_of(model))
+    replayed = replay(model, [experiment], markers_of(model))
     replayed.positions[0] = moved
     row = scores(replayed, [experiment])["identify"]
     assert row["e_position_mm"] == pytest.approx(5.0)
@@ -139,9 +139,9 @@ def test_the_late_speed_is_that_of_the_second_second(begin, end, factor, expecte
     assert row["e_late_speed_pct"] == pytest.approx(expected, abs=1e-9)
 
 
-def off_at(rows: slice, *segments: int) -> np.ndarray:
+def off_at(rows: slice, *markers: int) -> np.ndarray:
     measured = np.ones((FRAMES, 3), bool)
-    measured[rows, segments] = False
+    measured[rows, markers] = False
     return measured
 
 
@@ -213,7 +213,7 @@ def test_where_a_simulation_is_lost_it_is_the_arm_s_length_away(bad):
 def test_an_arm_that_hangs_still_has_no_period():
     model = small_model(4)
     experiments = [prepare(release(model, 0.2, frames=60), model, 60)]
-    replayed = replay(model, experiments, segments_of(model))
+    replayed = replay(model, experiments, markers_of(model))
     assert "e_swing_period_pct" in scores(replayed, experiments)["identify"]
     replayed.positions[0][:] = replayed.positions[0][:1]
     assert "e_swing_period_pct" not in scores(replayed, experiments)["identify"]

@@ -7,9 +7,9 @@ import pytest
 
 from tests.support.matched_plant import (
     curl,
+    markers_of,
     motion,
     release,
-    segments_of,
     small_model,
     static_pull,
     tilt,
@@ -29,7 +29,7 @@ PULLS = [(30, -300, -300), (25, 10, -300), (10, 8, 12)]
 def errors(model, trials, **changed):
     """Of each trial as the model replays it, m."""
     experiments = [replace(prepare(trial, model, 437), **changed) for trial in trials]
-    simulated = replay(model, experiments, trials[0].segments).positions
+    simulated = replay(model, experiments, trials[0].markers).positions
     return np.array([position_error(p, e.positions, e.measured) for p, e in zip(simulated, experiments, strict=True)])
 
 
@@ -76,8 +76,8 @@ def test_a_trial_without_load_is_simulated_to_the_last_bit_as_if_there_were_none
     model = small_model()
     experiments = [prepare(trial, model, 437) for trial in every_kind(model)]
     fields = candidate_fields(model, {"stiffness": model.jnt_stiffness[:1] * [1.0, 1.2]})
-    alone = Population(model, experiments, segments_of(model)).simulate(fields).positions
-    population = Population(model, [*(replace(e, load=0.05) for e in experiments), *experiments], segments_of(model))
+    alone = Population(model, experiments, markers_of(model)).simulate(fields).positions
+    population = Population(model, [*(replace(e, load=0.05) for e in experiments), *experiments], markers_of(model))
     for _ in range(2):  # the second call reuses the batch
         beside = population.simulate(fields).positions[len(experiments) :]
         for first, second in zip(alone, beside, strict=True):
@@ -101,7 +101,7 @@ def test_a_static_pull_rests_where_the_plant_does_whatever_the_start(pulls):
     experiment = prepare(trial, model, 437)
     away = replace(experiment, start=experiment.start + 0.02 * np.random.default_rng(0).normal(size=model.nq))
     for start in (experiment, away):
-        positions = replay(model, [start], trial.segments).positions[0]
+        positions = replay(model, [start], trial.markers).positions[0]
         assert position_error(positions, start.positions, start.measured) < 0.2e-3
 
 
@@ -109,6 +109,6 @@ def test_scores_have_every_kind():
     model = small_model()
     trials = every_kind(model)
     experiments = [prepare(trial, model, 437) for trial in trials]
-    table = scores(replay(model, experiments, trials[0].segments), experiments)["identify"]["by_experiment"]
+    table = scores(replay(model, experiments, trials[0].markers), experiments)["identify"]["by_experiment"]
     assert set(table) == set(EXPERIMENTS)
     assert {kind for kind, row in table.items() if "e_velocity_mm_s" in row} == {k for k in table if not is_static(k)}

@@ -18,7 +18,7 @@ WEIGHTS = LossWeights(0.1, 0.5, 0.0, 0.01, 2.0, 3.0)
 
 
 def straight(distance: list[list[float]]) -> np.ndarray:
-    """Segments on -z at these distances (T, S) → (T, S, 3)."""
+    """Markers on -z at these distances (T, S) → (T, S, 3)."""
     return np.stack([np.zeros_like(distance), np.zeros_like(distance), -np.array(distance)], axis=-1)
 
 

@@ -1,4 +1,4 @@
-"""Markers beside their segments' axes, and a mount that is not where its tracked body says."""
+"""Markers beside the arm's axis, and a mount that is not where its tracked body says."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.identification.test_recovery import changed, identified
-from tests.support.matched_plant import curl, release, segments_of, small_model, tilt
+from tests.support.matched_plant import curl, markers_of, release, small_model, tilt
 from tests.support.small_arm import small_spec
 from trunkline.identification.parameters.parameters import candidate_fields, set_fields
 from trunkline.identification.simulate.experiment import prepare
@@ -19,7 +19,7 @@ def model():
 
 
 def sites(model) -> list[int]:
-    return [model.site(f"{name}_center").id for name in segments_of(model)]
+    return [model.site(f"{name}_center").id for name in markers_of(model)]
 
 
 def trials(model) -> list:
@@ -47,7 +47,7 @@ def test_a_marker_is_found_that_is_tracked_at_its_bodys_origin(model):
     marked = with_measured_markers(at_origin, trials(off))
     np.testing.assert_allclose(marked.site_pos[marker], off.site_pos[marker], atol=2e-4)
     residuals = prepare(release(off, 0.15, "validate", 3), marked, 3).fit.residuals
-    assert residuals[segments_of(model).index("unit_03")] < 2e-4
+    assert residuals[markers_of(model).index("unit_03")] < 2e-4
 
 
 def test_markers_on_their_axes_stay_there(model):

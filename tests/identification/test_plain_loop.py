@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from tests.support.matched_plant import release, segments_of, small_model
+from tests.support.matched_plant import markers_of, release, small_model
 from trunkline.identification.fit.problem import Bounds, Problem
 from trunkline.identification.parameters.parameters import candidate_fields, set_fields
 from trunkline.identification.simulate.experiment import prepare
@@ -15,7 +15,7 @@ WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 
 def plain_loss(problem, model, experiments, vector):
     """The loss of one candidate (P,), the way one would write it first."""
-    sites = [model.site(f"{name}_center").id for name in segments_of(model)]
+    sites = [model.site(f"{name}_center").id for name in markers_of(model)]
     model, step, losses = model.__copy__(), model.opt.timestep, []
     set_fields(model, problem.fields(vector[None]))
     for experiment in experiments:
@@ -41,7 +41,7 @@ def test_a_plain_loop_has_the_same_losses():
     truth = model.__copy__()
     set_fields(truth, candidate_fields(model, dict(zip(bounds, np.exp(TRUTH)[:, None], strict=True))))
     experiments = [prepare(release(truth, bend, frames=20), model, 20) for bend in (0.3, -0.25)]
-    problem = Problem(model, experiments, segments_of(model), bounds, "positions", WEIGHTS)
+    problem = Problem(model, experiments, markers_of(model), bounds, "positions", WEIGHTS)
     vectors = TRUTH + np.array([[0.0, 0.0], [0.5, -0.5]])
     expected = [plain_loss(problem, model, experiments, vector) for vector in vectors]
     np.testing.assert_allclose(problem.losses(vectors), expected, rtol=1e-12)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.support.matched_plant import curl, motion, release, segments_of, small_model, tilt
+from tests.support.matched_plant import curl, markers_of, motion, release, small_model, tilt
 from trunkline.identification.fit.fit import CoarseSearch, Fit, Method, Refinement
 from trunkline.identification.fit.identify import identify
 from trunkline.identification.fit.optimizers import LeastSquares
@@ -21,7 +21,7 @@ def identified(trials, model, parameters, per_joint=(), optimizer=LeastSquares(5
     bounds = {name: Bounds(*span) for name, span in parameters.items()}
     fine = LeastSquares(0, 1, 30, 1e-9)
     method = Method(optimizer, CoarseSearch(1.0, 437, 99), Refinement(8, 1e-9), fine, 0.1, np.inf, seed=3)
-    fit = Fit(segments_of(model), bounds, per_joint, "positions", WEIGHTS, method)
+    fit = Fit(markers_of(model), bounds, per_joint, "positions", WEIGHTS, method)
     return identify("test", model, experiments, fit)
 
 
@@ -120,7 +120,7 @@ def test_control_parameters_move_the_loss_the_right_way():
     trials = [curl(model, 60, frames=110)]
     experiments = [prepare(trial, model, 437) for trial in trials]
     spans = {name: Bounds(1e-4, 1e6) for name in ("kp", "kv", "force_range", "time_constant")}
-    problem = Problem(model, experiments, segments_of(model), spans, "positions", WEIGHTS)
+    problem = Problem(model, experiments, markers_of(model), spans, "positions", WEIGHTS)
     truth = np.log([PARAMETERS[name].read(model) for name in spans])
     candidates = truth + np.concatenate([np.zeros((1, 4)), np.diag(np.log([0.5, 3, 0.01, 2]))])
     losses = problem.losses(candidates)
@@ -130,7 +130,7 @@ def test_control_parameters_move_the_loss_the_right_way():
 def test_divergence_is_a_finite_penalty_and_counted():
     model = small_model()
     experiments = [prepare(release(model, 0.25, frames=30), model, 30)]
-    problem = Problem(model, experiments, segments_of(model), {"stiffness": Bounds(1, 1e7)}, "positions", WEIGHTS)
+    problem = Problem(model, experiments, markers_of(model), {"stiffness": Bounds(1, 1e7)}, "positions", WEIGHTS)
     losses = problem.losses(np.log([[PARAMETERS["stiffness"].read(model)], [1e6]]))
     assert losses[0] < 1e-3
     assert losses[1] == pytest.approx(DIVERGED_LOSS)

@@ -106,7 +106,7 @@ def test_without_tendons_trials_that_are_otherwise_alike_are(still):
     [(0.0, LAST, True), (1.99, LAST, True), (2.01, LAST, False), (0.0, 0.98 * LAST, False)],
 )
 def test_a_trial_has_ended_that_was_still_for_long_enough(still, range_mm, long, ended):
-    """Every coordinate of every segment within 2 mm in its last half second, all of it after the start."""
+    """Every coordinate of every marker within 2 mm in its last half second, all of it after the start."""
     positions = still.positions.copy()
     positions[-30, 2, 1] += range_mm / 1e3
     positions[: len(positions) // 2, 0, 0] += 0.1

@@ -23,7 +23,7 @@ from trunkline.recordings.trials.trial import Trial
 
 ROOT = Path(__file__).parents[2]
 FRAME, FRAMES = 1 / 120, 360
-SEGMENTS = ("1", "2", "3")
+MARKERS = ("1", "2", "3")
 CROOKED = np.array([0.06, -0.04, 0.02, 0.05, -0.05, 0.08, 0.03, 0.1])
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 
@@ -56,7 +56,7 @@ def release(truth, x: float, y: float, split="identify", frames=FRAMES) -> Trial
     data = mujoco.MjData(truth)
     data.qpos[:] = np.tile([x, y], 4)
     positions = np.empty((frames, 3, 3))
-    sites = [truth.site(f"{name}_center").id for name in SEGMENTS]
+    sites = [truth.site(f"{name}_center").id for name in MARKERS]
     for frame in range(frames):
         mujoco.mj_forward(truth, data)
         positions[frame] = data.site_xpos[sites]
@@ -64,7 +64,7 @@ def release(truth, x: float, y: float, split="identify", frames=FRAMES) -> Trial
     nothing = np.zeros((frames, 0))
     return Trial(
         name=f"release_{x}_{y}", experiment="release", split=split, level=None, gravity=gravity_in_base(0.0),
-        time=np.arange(frames) * FRAME, segments=SEGMENTS, positions=positions, quaternions=None,
+        time=np.arange(frames) * FRAME, markers=MARKERS, positions=positions, quaternions=None,
         measured=np.ones((frames, 3), bool), tendons=(), commands=nothing, tendon_positions=nothing, start=0.0,
     )  # fmt: skip
 
@@ -76,22 +76,22 @@ def experiments(model, truth):
 
 
 def test_the_shape_is_that_of_the_releases_ends(model, truth, experiments):
-    rest = resting_shape(model, experiments, SEGMENTS)
+    rest = resting_shape(model, experiments, MARKERS)
     data = mujoco.MjData(model)
     data.qpos[:] = rest.pose
     mujoco.mj_kinematics(model, data)
-    for place, name in enumerate(SEGMENTS):
+    for place, name in enumerate(MARKERS):
         np.testing.assert_allclose(data.site(f"{name}_center").xpos, experiments[0].positions[-1, place], atol=5e-4)
 
 
 def test_stiffness_and_damping_come_back_without_static_tilts(model, truth, experiments):
     bounds = {"stiffness": Bounds(0.3, 10.0), "damping": Bounds(0.005, 1.0)}
-    rest = resting_shape(model, experiments, SEGMENTS)
+    rest = resting_shape(model, experiments, MARKERS)
     method = Method(
         LeastSquares(5, 1, 6, 1e-2), CoarseSearch(1.0, 200, 2), Refinement(8, 1e-6),
         LeastSquares(0, 1, 1, 1e-2), 0.1, np.inf, seed=3,
     )
-    fit = Fit(SEGMENTS, bounds, (), "positions", WEIGHTS, method, rest)
+    fit = Fit(MARKERS, bounds, (), "positions", WEIGHTS, method, rest)
     result = identify("test", model, experiments, fit)
     assert result.values["stiffness"] == pytest.approx(1.7, rel=0.05)
     assert result.values["damping"] == pytest.approx(0.15, rel=0.05)
@@ -105,4 +105,4 @@ def test_stiffness_and_damping_come_back_without_static_tilts(model, truth, expe
 def test_releases_that_never_rest_are_refused(model, truth):
     moving = [prepare(release(truth, 0.2, 0.1, frames=90), model, 437)]
     with pytest.raises(InputError, match="rest_shape: found no release with split identify that is at rest"):
-        resting_shape(model, moving, SEGMENTS)
+        resting_shape(model, moving, MARKERS)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.support.matched_plant import release, segments_of, small_model, tilt
+from tests.support.matched_plant import markers_of, release, small_model, tilt
 from tests.support.noisy_trials import WEIGHTS, measured, with_values
 from trunkline.identification.fit.fit import CoarseSearch, Fit, Method, Refinement
 from trunkline.identification.fit.identify import identify
@@ -56,7 +56,7 @@ def fitted(trials, outlying=4.0):
     kind = trials[0].experiment
     experiments = [prepare(trial, PLANT, FRAMES) for trial in trials]
     bounds = {name: Bounds(value / 10, value * 10) for name, value in TRUE[kind].items()}
-    fit = Fit(segments_of(PLANT), bounds, (), "positions", replace(WEIGHTS, outlying=outlying), METHOD)
+    fit = Fit(markers_of(PLANT), bounds, (), "positions", replace(WEIGHTS, outlying=outlying), METHOD)
     result = identify("test", PLANT, experiments, fit)
     reasons = result.influence.deciding()
     for trial, experiment in zip(trials, experiments, strict=True):

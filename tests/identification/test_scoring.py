@@ -102,7 +102,7 @@ def test_an_evaluation_is_of_all_trials_and_of_each_session(models):
     assert "by_session" not in alone
 
 
-def test_the_start_fit_is_of_measured_segments_and_counts_what_did_not_converge():
+def test_the_start_fit_is_of_measured_markers_and_counts_what_did_not_converge():
     fits = [
         ("release", PoseFit(np.zeros(6), np.array([1e-3, np.nan, 3e-3]), 9, True)),
         ("curl", PoseFit(np.zeros(6), np.array([6e-3, 4e-3, 8e-3]), 300, False)),

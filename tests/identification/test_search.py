@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.support.matched_plant import release, segments_of, small_model
+from tests.support.matched_plant import markers_of, release, small_model
 from trunkline.identification.fit.identify import _search
 from trunkline.identification.fit.linearisation import linearise
 from trunkline.identification.fit.optimizers import DifferentialEvolution, LeastSquares
@@ -28,7 +28,7 @@ def problem():
     experiments = [prepare(release(truth, bend, frames=50), model, 50) for bend in (0.3, -0.25)]
     bounds = {"damping": Bounds(0.005, 1.0), "tendon_friction": Bounds(0.02, 3.0)}
     return Problem(
-        model, experiments, segments_of(model), bounds, "positions", LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
+        model, experiments, markers_of(model), bounds, "positions", LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
     )
 
 
@@ -50,7 +50,7 @@ def test_an_optimizer_finds_the_plant(problem, optimizer, tolerance):
 def test_least_squares_takes_the_best_of_its_starts(problem):
     """With the model far off, a start of the hypercube is better, and the descent goes on from there."""
     far = Problem(
-        *(getattr(problem, name) for name in ("model", "experiments", "segments", "parameters", "loss", "weights"))
+        *(getattr(problem, name) for name in ("model", "experiments", "markers", "parameters", "loss", "weights"))
     )
     far.start = lambda: far.bounds()[1]
     single = search(far, LeastSquares(0, 1, 1, 1e-6), seed=2, report=quiet)
@@ -83,7 +83,7 @@ def test_differences_stay_within_the_bounds(problem):
     low, high = problem.bounds()
     vectors_tried = []
     watched = Problem(
-        *(getattr(problem, name) for name in ("model", "experiments", "segments", "parameters", "loss", "weights"))
+        *(getattr(problem, name) for name in ("model", "experiments", "markers", "parameters", "loss", "weights"))
     )
     residuals = watched.residuals
     watched.residuals = lambda vectors, near=None: vectors_tried.append(vectors) or residuals(vectors)
@@ -98,7 +98,7 @@ def test_a_problem_starts_at_the_model_s_own_values(problem):
     expected = [np.log(PARAMETERS[name].read(problem.model)) for name in TRUE]
     np.testing.assert_allclose(problem.start(), expected)
     hardening = Problem(
-        problem.model, problem.experiments, problem.segments, {"hardening": Bounds(0.02, 20.0)}, "positions",
+        problem.model, problem.experiments, problem.markers, {"hardening": Bounds(0.02, 20.0)}, "positions",
         problem.weights,
     )  # fmt: skip
     assert np.exp(hardening.start()[0]) == pytest.approx(np.sqrt(0.02 * 20.0))  # it has none: mid-range

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from tests.support.matched_plant import curl, motion, release, segments_of, small_model, tilt
+from tests.support.matched_plant import curl, markers_of, motion, release, small_model, tilt
 from tests.support.small_arm import small_spec
 from trunkline.errors import InputError
 from trunkline.identification.evaluation.evaluation import replay
@@ -20,25 +20,25 @@ from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement, a
 from trunkline.model.elements import BRANCH, SLIDER, elements
 
 
-def seen_at(model, qpos, segments):
+def seen_at(model, qpos, markers):
     data = mujoco.MjData(model)
     data.qpos[:] = qpos
     mujoco.mj_kinematics(model, data)
-    sites = [model.site(f"{s}_center").id for s in segments]
+    sites = [model.site(f"{s}_center").id for s in markers]
     return data.site_xpos[sites], [data.site_xmat[s].reshape(3, 3) for s in sites]
 
 
 @pytest.mark.parametrize("with_orientations", [True, False])
 def test_pose_fit_finds_a_coil_of_more_than_a_turn(with_orientations):
     model = small_model(units=16)
-    segments = tuple(f"unit_{i:02d}" for i in (*range(1, 9), 10, 12, 14, 16))
+    markers = tuple(f"unit_{i:02d}" for i in (*range(1, 9), 10, 12, 14, 16))
     bend = np.linspace(0.2, 0.6, 16)
     qpos = np.stack([0.4 * bend, bend], axis=1).ravel()  # 6.9 rad in all
-    positions, matrices = seen_at(model, qpos, segments)
-    quaternions = np.empty((len(segments), 4))
+    positions, matrices = seen_at(model, qpos, markers)
+    quaternions = np.empty((len(markers), 4))
     for quaternion, matrix in zip(quaternions, matrices, strict=True):
         mujoco.mju_mat2Quat(quaternion, matrix.ravel())
-    fit = fit_pose(model, segments, positions, quaternions if with_orientations else None)
+    fit = fit_pose(model, markers, positions, quaternions if with_orientations else None)
     assert fit.converged
     assert fit.residuals.max() < 1e-3
     assert np.abs(seen_at(model, fit.qpos, ["unit_16"])[0] - seen_at(model, qpos, ["unit_16"])[0]).max() < 1e-3
@@ -46,11 +46,11 @@ def test_pose_fit_finds_a_coil_of_more_than_a_turn(with_orientations):
 
 def test_pose_fit_leaves_out_what_was_not_seen():
     model = small_model()
-    segments = segments_of(model)
+    markers = markers_of(model)
     qpos = np.tile([0.05, 0.2], 6)
-    positions, _ = seen_at(model, qpos, segments)
+    positions, _ = seen_at(model, qpos, markers)
     positions[2] = np.nan
-    fit = fit_pose(model, segments, positions)
+    fit = fit_pose(model, markers, positions)
     measured = np.isfinite(positions[:, 0])
     assert fit.residuals[measured].max() < 1e-3
 
@@ -62,7 +62,7 @@ def test_an_arm_that_moves_already_starts_with_its_velocity(in_motion):
     trial.start, trial.in_motion = float(trial.time[20]), in_motion
     experiment = prepare(trial, model, 437)
     itself = {"jnt_stiffness": model.jnt_stiffness[None]}
-    simulated = Population(model, [experiment], segments_of(model)).simulate(itself)
+    simulated = Population(model, [experiment], markers_of(model)).simulate(itself)
     error = position_error(simulated.positions[0][0], experiment.positions, experiment.measured)
     assert len(experiment.positions) == 69
     assert (error < 1e-3) if in_motion else (error > 4e-3)
@@ -73,7 +73,7 @@ def test_a_population_of_the_truth_replays_the_truth():
     trials = [tilt(model, 60), release(model, 0.25, frames=60), curl(model, 40, frames=90)]
     experiments = [prepare(trial, model, 437) for trial in trials]
     fields = candidate_fields(model, {"stiffness": model.jnt_stiffness[:1] * [1.0, 1.2]})
-    simulated = Population(model, experiments, segments_of(model)).simulate(fields)
+    simulated = Population(model, experiments, markers_of(model)).simulate(fields)
     for positions, experiment in zip(simulated.positions, experiments, strict=True):
         truth, other = (position_error(p, experiment.positions, experiment.measured) for p in positions)
         assert truth < 0.4e-3  # starts are fitted, and a static shape settles for a finite time
@@ -94,7 +94,7 @@ def test_a_start_between_two_frames_is_where_it_was():
     fine.start = (6 - 0.4) / 120
     experiment = prepare(fine, model, 60)
     assert experiment.lead == pytest.approx(0.4 / 120)
-    simulated = Population(model, [experiment], segments_of(model)).simulate(
+    simulated = Population(model, [experiment], markers_of(model)).simulate(
         candidate_fields(model, {"stiffness": model.jnt_stiffness[:1]})
     )
     assert position_error(simulated.positions[0][0], experiment.positions, experiment.measured) < 0.3e-3
@@ -107,7 +107,7 @@ def test_a_static_shape_does_not_depend_on_where_it_starts():
     shapes = []
     for start in (experiment.start, np.zeros(model.nq)):
         experiment.start = start
-        shapes.append(Population(model, [experiment], segments_of(model)).simulate(fields).positions[0])
+        shapes.append(Population(model, [experiment], markers_of(model)).simulate(fields).positions[0])
     np.testing.assert_allclose(*shapes, atol=0.1e-3)
 
 
@@ -118,7 +118,7 @@ def test_a_static_shape_that_leans_on_joint_limits_does_not_depend_on_the_step()
     model.jnt_solref[:, 0] = 0.004
     experiment = prepare(tilt(model, 60), model, 1)
     fields = candidate_fields(model, {"stiffness": model.jnt_stiffness[:1] * 0.3})
-    populations = [Population(model, [experiment], segments_of(model), factor) for factor in (1, 0.25)]
+    populations = [Population(model, [experiment], markers_of(model), factor) for factor in (1, 0.25)]
     standard, fine = (population.simulate(fields).positions[0] for population in populations)
     np.testing.assert_allclose(standard, fine, atol=5e-6)
 
@@ -127,7 +127,7 @@ def test_a_start_that_nobody_saw_is_refused_by_name():
     model = small_model()
     trial = release(model, 0.2, frames=20)
     trial.measured[:5] = False
-    with pytest.raises(InputError, match="release_0.20_identify: found 0 of 6 segments"):
+    with pytest.raises(InputError, match="release_0.20_identify: found 0 of 6 markers"):
         prepare(trial, model, 20)
 
 
@@ -138,14 +138,14 @@ def test_simulation_does_not_depend_on_threads(monkeypatch):
     results = []
     for threads in ("1", "2"):
         monkeypatch.setenv("TRUNKLINE_THREADS", threads)
-        results.append(Population(model, experiments, segments_of(model)).simulate(fields).positions[0])
+        results.append(Population(model, experiments, markers_of(model)).simulate(fields).positions[0])
     np.testing.assert_array_equal(*results)
 
 
 def test_a_population_of_another_size_and_a_second_call_are_as_the_first():
     model = small_model()
     experiments = [prepare(release(model, 0.25, frames=20), model, 20), prepare(tilt(model, 30), model, 1)]
-    population = Population(model, experiments, segments_of(model))
+    population = Population(model, experiments, markers_of(model))
     values = np.array([0.01, 0.02, 0.05])
     first = population.simulate(candidate_fields(model, {"damping": values})).positions
     single = population.simulate(candidate_fields(model, {"damping": values[1:2]})).positions
@@ -159,7 +159,7 @@ def test_divergence_is_seen():
     model = small_model()
     experiments = [prepare(release(model, 0.25, frames=30), model, 30)]
     fields = candidate_fields(model, {"stiffness": model.jnt_stiffness[:1] * [1.0, 1e5]})
-    simulated = Population(model, experiments, segments_of(model)).simulate(fields)
+    simulated = Population(model, experiments, markers_of(model)).simulate(fields)
     assert simulated.diverged.tolist() == [False, True]
 
 
@@ -175,7 +175,7 @@ def test_a_simulation_that_made_mujoco_warn_counts_as_diverged(monkeypatch, tmp_
     assert np.isfinite(data.site_xpos).all()
     assert sum(warning.number for warning in data.warning)
     fields = candidate_fields(model, {"damping": np.array([0.02, 0.03])})
-    simulated = Population(model, experiments, segments_of(model)).simulate(fields)
+    simulated = Population(model, experiments, markers_of(model)).simulate(fields)
     assert simulated.diverged.all()
     assert not np.isfinite(simulated.positions[0]).any()
     assert np.isfinite(simulated.positions[1]).all()
@@ -186,7 +186,7 @@ def test_winches_wind_a_trial_s_commands_as_step_by_step():
     model = small_model(4, rate_limit=0.15, backlash=3e-3)
     experiments = [prepare(t, model, 437) for t in (curl(model, 40, frames=100), motion(model, 20, frames=60))]
     fields = candidate_fields(model, {"rate_limit": np.array([0.15, 0.3]), "backlash": np.array([3e-3, 1e-3])})
-    simulated = Population(model, experiments, segments_of(model)).simulate(fields)
+    simulated = Population(model, experiments, markers_of(model)).simulate(fields)
     for positions, experiment in zip(simulated.positions, experiments, strict=True):
         truth, other = (position_error(p, experiment.positions, experiment.measured) for p in positions)
         assert truth < 1e-6
@@ -202,7 +202,7 @@ def test_a_command_delay_shifts_what_drives_a_trial(lag):
     errors = {}
     for delay in (0, 3):
         experiment = prepare(trial, model, 60, command_delay=delay * frame)
-        positions = replay(model, [experiment], segments_of(model)).positions[0]
+        positions = replay(model, [experiment], markers_of(model)).positions[0]
         errors[delay] = position_error(positions, experiment.positions, experiment.measured)
     assert errors[lag] < 1e-9
     assert errors[3 - lag] > 1e-3
@@ -212,8 +212,8 @@ def test_trials_of_another_arm_are_refused():
     model = small_model()
     trial = release(model, 0.2, frames=5)
     for name in ("unit_99", "tip", "base"):
-        trial.segments = (*trial.segments[:-1], name)
-        with pytest.raises(InputError, match=f"segments: trial release.*'{name}', expected.*unit_01, .*, unit_06"):
+        trial.markers = (*trial.markers[:-1], name)
+        with pytest.raises(InputError, match=f"markers: trial release.*'{name}', expected.*unit_01, .*, unit_06"):
             prepare(trial, model, 5)
     trial = curl(model, 20, frames=5)
     trial.tendons = ("tendon_1", "tendon_2", "cable")

@@ -175,10 +175,10 @@ def test_exchanged_tendons_are_refused_before_the_first_stage_fits_anything(proj
         run("identify_stiffness", config, root / "artifacts/build_mjcf/arm.xml")
 
 
-def test_a_segment_that_the_model_lacks_is_named_before_markers_are_looked_for(project):
+def test_a_marker_that_the_model_lacks_is_named_before_markers_are_looked_for(project):
     root, model, write = project
     trials = [tilt(model, 30), tilt(model, 75, "validate")]
-    write([replace(trial, segments=("link_1", *trial.segments[1:])) for trial in trials])
+    write([replace(trial, markers=("link_1", *trial.markers[1:])) for trial in trials])
     config = settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.3, 12.0)}, markers="measured")
-    with pytest.raises(InputError, match="session.yaml: segments: trial tilt_30_identify: found 'link_1', .*unit_01"):
+    with pytest.raises(InputError, match="session.yaml: markers: trial tilt_30_identify: found 'link_1', .*unit_01"):
         run("identify_stiffness", config, root / "artifacts/build_mjcf/arm.xml")

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.support.swings import FRAMES, LIKE, SEGMENTS, TIP, experiment, swing, trial
+from tests.support.swings import FRAMES, LIKE, MARKERS, TIP, experiment, swing, trial
 from trunkline.identification.evaluation.baselines import hanging_still
-from trunkline.identification.evaluation.error_tables import segment_table, trial_table
+from trunkline.identification.evaluation.error_tables import marker_table, trial_table
 from trunkline.identification.evaluation.evaluation import Prediction, errors_of, scores
 from trunkline.identification.evaluation.repeatability import end_shape
 from trunkline.identification.fit.fit import Fit
@@ -23,21 +23,21 @@ from trunkline.identification.simulate.loss import (
 from trunkline.identification.uncertainty.trial_diagnostics import exchanged_labels, started_off
 
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
-FIT = Fit(SEGMENTS, {}, (), "positions", WEIGHTS, None)  # type: ignore[arg-type]
+FIT = Fit(MARKERS, {}, (), "positions", WEIGHTS, None)  # type: ignore[arg-type]
 SIMULATED = swing(0.04, 3.5, 12.3)
 
 
-def hidden(rows: slice, segments: slice) -> np.ndarray:
+def hidden(rows: slice, markers: slice) -> np.ndarray:
     measured = np.ones((FRAMES, 3), bool)
-    measured[rows, segments] = False
+    measured[rows, markers] = False
     return measured
 
 
 HIDDEN = {
-    "a segment for a while": hidden(slice(20, 60), slice(1, 2)),
+    "a marker for a while": hidden(slice(20, 60), slice(1, 2)),
     "the tip for a while": hidden(slice(10, 45), slice(TIP, TIP + 1)),
     "all for a while": hidden(slice(30, 40), slice(None)),
-    "a segment never": hidden(slice(None), slice(0, 1)),
+    "a marker never": hidden(slice(None), slice(0, 1)),
     "the tip at the end": hidden(slice(-20, None), slice(TIP, TIP + 1)),
     "the first frames": hidden(slice(0, 12), slice(None)),
     "here and there": np.random.default_rng(1).random((FRAMES, 3)) > 0.3,
@@ -81,7 +81,7 @@ def sentence(judge):
 
 
 def exchanged(positions, measured):
-    """As if the labels of the second segment and the tip were exchanged."""
+    """As if the labels of the second marker and the tip were exchanged."""
     order = [0, 2, 1]
     return exchanged_labels(SIMULATED, experiment(positions[:, order], measured[:, order]), FIT)
 
@@ -101,7 +101,7 @@ COMPARED = {
     "the errors of a swing": of_trial,
     "the errors of a path": of_path,
     "the table of trials": table(trial_table),
-    "the table along the arm": table(lambda predictions: segment_table(predictions, SEGMENTS)),
+    "the table along the arm": table(lambda predictions: marker_table(predictions, MARKERS)),
     "the null model of a swing": last_shape("release"),
     "the null model of a path": last_shape("static_path"),
     "where a trial ends": lambda p, mask: np.array(end_shape(trial(p, mask)), dtype=float),
@@ -140,7 +140,7 @@ MEASURES = {
     ("name", "expected"), [("E_internal", (1 + 2 + 6) / 3), ("position", (1 + 2 + 6) / 3), ("velocity", 1.0)]
 )
 def test_each_error_is_the_mean_over_what_was_measured(name, expected):
-    """By hand: of two segments in three frames, those samples are off by 50 m that were not measured."""
+    """By hand: of two markers in three frames, those samples are off by 50 m that were not measured."""
     real = np.zeros((3, 2, 3))
     real[..., 2] = -100.0
     off = np.array([[1.0, 50.0], [2.0, 50.0], [50.0, 6.0]])

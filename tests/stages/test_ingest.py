@@ -9,7 +9,7 @@ from mcap_ros2.decoder import DecoderFactory
 from mcap_ros2.writer import Writer as RosWriter
 
 from stages import ingest
-from tests.support.sessions import SEGMENTS
+from tests.support.sessions import MARKERS
 from tests.support.workbench import workbench
 from trunkline.pipeline.stage import run_stage
 from trunkline.recordings.logs.definitions import RIGID_BODIES
@@ -47,7 +47,7 @@ def test_takes_report_and_metrics(project, capsys):
     assert warnings[1].startswith("all trials: experiments: no static_pull, motion in the session")
     takes = read_takes(ingest.PROCESSED, SPLITS)
     assert [take.name for take in takes] == ["tilt_00", "tilt_60", "release_a", "curl_40"]
-    assert {take.segments for take in takes} == {SEGMENTS}
+    assert {take.markers for take in takes} == {MARKERS}
     metrics = json.loads((ingest.ARTIFACTS / "metrics.json").read_text())
     assert metrics["trials"] == 4
     assert metrics["refused"] == 0
@@ -63,7 +63,7 @@ def test_takes_report_and_metrics(project, capsys):
     for trial in report["trials"].values():
         assert [f"all trials: {warning}" for warning in trial["warnings"]] == warnings
     assert report["trials"]["release_a"]["stamp_jitter_ms"] == pytest.approx(1.0, rel=0.3)
-    assert set(report["trials"]["release_a"]["coverage"]) == set(SEGMENTS)
+    assert set(report["trials"]["release_a"]["coverage"]) == set(MARKERS)
     assert (ingest.ARTIFACTS / "quality.png").stat().st_size > 20_000
 
 
@@ -101,7 +101,7 @@ def mislabel(session):
 
 def never(session):
     path = session / "session.yaml"
-    path.write_text(path.read_text() + "segments: {unit_08: unit_08, unit_09: unit_09}\n")
+    path.write_text(path.read_text() + "markers: {unit_08: unit_08, unit_09: unit_09}\n")
 
 
 def rewritten(change, late=False, **options):
@@ -146,7 +146,7 @@ def twice(number, content):
         (no_mcap, ["tilt_60.mcap", "found no MCAP file"]),
         (missing, ["session.yaml", "trials.2.file", "release_a.mcap"]),
         (mislabel, ["release_a.mcap: trial release_a: experiment: 'unit_08' moves by", "in a static_tilt"]),
-        (never, ["tilt_00.mcap", "'unit_09' never appears", "`segments` in session.yaml"]),
+        (never, ["tilt_00.mcap", "'unit_09' never appears", "`markers` in session.yaml"]),
         (rewritten(no_bodies_in_every_second), ["release_a.mcap", "never in four in a row"]),
         (rewritten(turned_by_nothing), ["release_a.mcap", "'base' is seen in 0.0 %", "unnormalised quaternion"]),
         (rewritten(twice), ["release_a.mcap", "found 'base' twice in a message"]),

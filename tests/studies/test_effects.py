@@ -9,7 +9,7 @@ from studies import effects
 from studies.choices import Chain
 from studies.effects import EFFECTS, NO_LAG, cad_model, settings_of, tried, validated
 from studies.rows import Rows
-from tests.support.matched_plant import curl, segments_of, small_model
+from tests.support.matched_plant import curl, markers_of, small_model
 from trunkline.identification.simulate.experiment import prepare
 from upkeep.origin import Origin
 
@@ -35,7 +35,7 @@ def test_errors_stand_beside_null_model_cad_model_and_noise_floor():
     cad.jnt_stiffness[:] *= 3
     trials = [curl(plant, 20, split, frames=60, noise=1e-4) for split in ("identify", "validate")]
     experiments = [prepare(trial, model, 60) for trial in trials]
-    link = Chain(model, experiments, SimpleNamespace(segments=segments_of(model)), [], None)
+    link = Chain(model, experiments, SimpleNamespace(markers=markers_of(model)), [], None)
     (row,) = validated("this", link, trials, cad)
     title, kind, _, position, tip, percent, null, guess, floor = row.strip("| ").split(" | ")
     assert (title, kind) == ("this", "curl")

@@ -52,7 +52,7 @@ def begin_project(folder: Path, units: int) -> mujoco.MjModel:
     return model
 
 
-def segments_of(model: mujoco.MjModel) -> tuple[str, ...]:
+def markers_of(model: mujoco.MjModel) -> tuple[str, ...]:
     names = [model.body(i).name for i in range(model.nbody)]
     return tuple(name for name in names if name.startswith("unit_") and BRANCH not in name)
 
@@ -87,8 +87,8 @@ def _trial(model, name, experiment, split, level, gravity, frames, start, pulls,
             data.plastic[model.tendon_plasticadr[slider.tendon] + end] = bend - np.clip(bend, -give, give)
     furthest = (numeric(model, RATE_LIMIT) or np.inf) * model.opt.timestep  # of a winch in a step
     slack, drum, cable = numeric(model, BACKLASH) / 2, lengths[0], lengths[0]
-    segments = segments_of(model)
-    sites = [model.site(f"{s}_center").id for s in segments]
+    markers = markers_of(model)
+    sites = [model.site(f"{s}_center").id for s in markers]
     positions, quaternions = np.empty((frames, len(sites), 3)), np.empty((frames, len(sites), 4))
     if substep:  # the first frame is this share of a frame after the start
         step, model.opt.timestep = model.opt.timestep, substep * FRAME / 8
@@ -107,7 +107,7 @@ def _trial(model, name, experiment, split, level, gravity, frames, start, pulls,
     positions = positions + rng.normal(0, noise, positions.shape)
     return Trial(
         name=name, experiment=experiment, split=split, level=level, gravity=gravity, time=np.arange(frames) * FRAME,
-        segments=segments, positions=positions, quaternions=quaternions, measured=np.ones(positions.shape[:2], bool),
+        markers=markers, positions=positions, quaternions=quaternions, measured=np.ones(positions.shape[:2], bool),
         tendons=("tendon_1", "tendon_2", "tendon_3"), commands=pulls, tendon_positions=pulls, start=0.0,
     )  # fmt: skip
 

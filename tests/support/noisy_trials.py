@@ -66,11 +66,11 @@ def with_values(model: mujoco.MjModel, values: dict[str, float]) -> mujoco.MjMod
 
 def measured(trial: Trial, rng: np.random.Generator) -> Trial:
     """A noise-free trial as motion capture and filter see it."""
-    moving, segments, _ = trial.positions.shape
+    moving, markers, _ = trial.positions.shape
     frames = STILL_FRAMES if moving == 1 else moving
-    noise = rng.normal(0, NOISE[0], (frames + 2 * MARGIN, segments, 3))
+    noise = rng.normal(0, NOISE[0], (frames + 2 * MARGIN, markers, 3))
     noise = sosfiltfilt(LOW_PASS, noise, axis=0)[MARGIN:-MARGIN]
-    turns = rng.normal(0, NOISE[1], (frames, segments, 3))
+    turns = rng.normal(0, NOISE[1], (frames, markers, 3))
     if moving == 1:
         noise, turns = noise.mean(axis=0, keepdims=True), turns.mean(axis=0, keepdims=True)
     turned = rotation_from_wxyz(trial.quaternions.reshape(-1, 4)) * Rotation.from_rotvec(turns.reshape(-1, 3))

@@ -1,4 +1,4 @@
-"""A small made-up session: a flexible pendulum of four segments, tilted, released and curled, in a few seconds."""
+"""A small made-up session: a flexible pendulum of four markers, tilted, released and curled, in a few seconds."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +10,7 @@ from demo.instruments import InstrumentSettings, Measurement, measure
 from demo.recorder import write_log, write_session
 from demo.truth import Truth
 
-SEGMENTS = ("unit_02", "unit_04", "unit_06", "unit_08")
+MARKERS = ("unit_02", "unit_04", "unit_06", "unit_08")
 TENDONS = ("tendon_1", "tendon_2", "tendon_3")
 RELEASE, CURL_BEGIN = 0.4, 0.3  # s
 RATE = 480.0  # Hz
@@ -53,7 +53,7 @@ def bent_truth(
 ) -> Truth:
     """An arm of 0.4 m whose every part bends by `bend` (T,) rad in all, as a circle in the base's x-z plane."""
     time = np.arange(len(bend)) / RATE
-    along = np.linspace(0.1, 0.4, len(SEGMENTS))  # m from the mount
+    along = np.linspace(0.1, 0.4, len(MARKERS))  # m from the mount
     angle = bend[:, None] * along / 0.4
     curvature = np.where(np.abs(bend) < 1e-6, 1e-6, bend)[:, None] / 0.4
     local = np.stack([(1 - np.cos(angle)) / curvature, 0 * angle, -np.sin(angle) / curvature], axis=-1)
@@ -72,7 +72,7 @@ def bent_truth(
         time=time,
         base_position=position,
         base_quaternion=base.as_quat(scalar_first=True),
-        segments=SEGMENTS,
+        markers=MARKERS,
         positions=base.apply(local.reshape(-1, 3)).reshape(local.shape) + position,
         quaternions=turns.as_quat(scalar_first=True).reshape(*angle.shape, 4),
         tendons=TENDONS if pulls.any() else (),

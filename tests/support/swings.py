@@ -9,7 +9,7 @@ from trunkline.recordings.trials.trial import Trial
 
 STEP = 0.01  # s
 FRAMES = 250
-SEGMENTS = ("unit_1", "unit_2", "unit_3")
+MARKERS = ("unit_1", "unit_2", "unit_3")
 TIP = 2
 STRAIGHT = np.array([[0.0, 0.0, -0.1], [0.0, 0.0, -0.2], [0.0, 0.0, -0.3]])
 LIKE = Replay([], 0.3, TIP, STRAIGHT)
@@ -41,7 +41,7 @@ def trial(positions: np.ndarray, measured: np.ndarray | None = None, kind: str =
     visible = np.ones(positions.shape[:2], bool) if measured is None else measured
     facts = {"name": "by hand", "experiment": kind, "split": "identify", "level": None} | more
     return Trial(
-        gravity=np.array([0.0, 0.0, -9.81]), time=STEP * np.arange(frames), segments=SEGMENTS, positions=positions,
+        gravity=np.array([0.0, 0.0, -9.81]), time=STEP * np.arange(frames), markers=MARKERS, positions=positions,
         quaternions=None, measured=visible, tendons=(), commands=np.zeros((frames, 0)),
         tendon_positions=np.zeros((frames, 0)), **facts,
     )  # fmt: skip

@@ -460,5 +460,5 @@ def test_a_page_of_results_has_no_figure_that_was_typed(page):
 def test_such_figures_would_be_found():
     for line in ("by up to 13 mm", "0.507 against", "in 17 s", "92 % of", "17 times as long", "11 of 15"):
         assert FIGURE.search(line), line
-    for line in ("three of eleven curls", "gravity from 2026 on", "tendons 2 and 3", "the 24 segments"):
+    for line in ("three of eleven curls", "gravity from 2026 on", "tendons 2 and 3", "the 24 markers"):
         assert not FIGURE.search(line), line

@@ -93,9 +93,9 @@ def arm_hinges(model: mujoco.MjModel) -> int:
     return model.njnt - sum(len(group.branch) for group in all_elements(model, BRANCH))
 
 
-def segment_sites(model: mujoco.MjModel, segments: tuple[str, ...]) -> np.ndarray:
-    """Numbers of the sites that are the frames of `segments`, in their order. Shape (S,)."""
-    return np.array([model.site(f"{name}_center").id for name in segments], dtype=int)
+def marker_sites(model: mujoco.MjModel, markers: tuple[str, ...]) -> np.ndarray:
+    """Numbers of the sites that are the frames of `markers`, in their order. Shape (S,)."""
+    return np.array([model.site(f"{name}_center").id for name in markers], dtype=int)
 
 
 def cables(model: mujoco.MjModel) -> list[int]:

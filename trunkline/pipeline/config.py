@@ -20,12 +20,13 @@ from yaml import YAMLError
 
 from trunkline.errors import InputError, nearest
 from trunkline.pipeline.validation_errors import describe, in_order, others_missing, path_of
-from trunkline.settings import read_yaml
+from trunkline.settings import read_yaml, rename_keys
 
 Schema = TypeVar("Schema")
 
 SHARED = "shared"  # folder beside those of the stages, of groups that several of them use
 PROJECT = Path(__file__).parents[2]
+RENAMED = {("build_mjcf", "arm"): {"segments": "markers"}}  # stage and group to keys of the release before
 
 
 def load_config(schema: type[Schema], stage: str, root: str | Path = ".") -> Schema:
@@ -42,6 +43,9 @@ def load_config(schema: type[Schema], stage: str, root: str | Path = ".") -> Sch
     params, folder = Path(root) / "params.yaml", own_or_project(Path(root), "conf") / stage
     section = _read_section(params, stage)
     composed = compose_settings(folder, section, f"{params}: {stage}")
+    for (of, group), keys in RENAMED.items():
+        if of == stage and isinstance(composed.get(group), dict):
+            rename_keys(composed[group], keys, f"{folder}: {stage}.{group}")
     # JSON mode: strict about numbers and strings, yet lists may fill tuples and mappings dataclasses.
     adapter = TypeAdapter(schema)
     try:

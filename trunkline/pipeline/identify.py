@@ -9,7 +9,7 @@ import numpy as np
 
 from trunkline.errors import InputError, existing
 from trunkline.identification.evaluation.baselines import references
-from trunkline.identification.evaluation.error_tables import TABLED, segment_table, trial_table
+from trunkline.identification.evaluation.error_tables import TABLED, marker_table, trial_table
 from trunkline.identification.evaluation.evaluation import Prediction, halved_step, replay
 from trunkline.identification.evaluation.repeatability import repeatability
 from trunkline.identification.fit.fit import Fit
@@ -143,7 +143,7 @@ def compare(
     }
     if not all(is_static(e.kind) for e in experiments):
         full = predictions["identified"]
-        halved = replay(models["identified"], full.experiments, settings.segments, step_factor=0.5)
+        halved = replay(models["identified"], full.experiments, settings.markers, step_factor=0.5)
         metrics["halved_step"] = halved_step(full, Prediction(halved, full.experiments))
     if result.factors or whole:
         metrics["per_joint_gain"] = _gain(metrics)
@@ -190,7 +190,7 @@ def save(
     stage: str, inputs: FitInputs, result: Identification, mjcf: str, predictions: dict[str, Prediction], metrics: dict
 ) -> None:
     """Write model, parameters, metrics, tables and figures to `artifacts/<stage>/`."""
-    config, bounds, segments = inputs.config, inputs.fit.parameters, inputs.fit.segments
+    config, bounds, markers = inputs.config, inputs.fit.parameters, inputs.fit.markers
     rests = any(EXPERIMENTS[kind].static or EXPERIMENTS[kind].hangs for kind in config.reported)
     with output_folder(Path("artifacts") / stage) as folder:
         (folder / "arm.xml").write_text(mjcf)
@@ -198,8 +198,8 @@ def save(
         table["fitted_to"] = fingerprints([t for t in inputs.trials if t.experiment in config.experiments])
         write_json(folder / "parameters.json", table)
         write_metrics(folder, metrics)
-        write_tables(folder, predictions, segments)
-        write_plots(folder, result, bounds, segments, predictions, shapes=inputs.from_cad and rests)
+        write_tables(folder, predictions, markers)
+        write_plots(folder, result, bounds, markers, predictions, shapes=inputs.from_cad and rests)
 
 
 def has_factors(stage: str) -> bool:
@@ -247,21 +247,21 @@ def _gain(metrics: dict) -> dict[str, float]:
     }
 
 
-def write_tables(folder: Path, predictions: dict[str, Prediction], segments: tuple[str, ...]) -> None:
+def write_tables(folder: Path, predictions: dict[str, Prediction], markers: tuple[str, ...]) -> None:
     """Errors of every trial, and along the arm those of `validate`, beside baseline, CAD and noise floor."""
     trial_table({name: predictions[name] for name in TABLED}).to_csv(folder / "trials.csv", **CSV)
     validate = {name: prediction.of(lambda e: e.split == VALIDATE) for name, prediction in predictions.items()}
-    segment_table(validate, segments).to_csv(folder / "segments.csv", **CSV)
+    marker_table(validate, markers).to_csv(folder / "markers.csv", **CSV)
 
 
 def write_plots(
-    folder: Path, result: Identification, bounds, segments, predictions: dict[str, Prediction], shapes: bool
+    folder: Path, result: Identification, bounds, markers, predictions: dict[str, Prediction], shapes: bool
 ) -> None:
     """PNGs for people and CSV for `dvc plots`: of one shape a trial (`shapes`), or of motions."""
     # pyplot and scipy.signal take long to import, so not before the first line
     from trunkline.identification.results import curves
     from trunkline.report.figures import identification as plots
-    from trunkline.report.figures.scoring import segment_figure
+    from trunkline.report.figures.scoring import marker_figure
     from trunkline.report.figures.style import save_figure
 
     curves.convergence_table(result).to_csv(folder / "convergence.csv", **CSV)
@@ -269,10 +269,10 @@ def write_plots(
     units = {name: parameter_named(name).unit for name in result.values}
     save_figure(plots.parameter_figure(result, bounds, units, undetermined(result, bounds)), folder / "parameters.png")
     validate = {name: prediction.of(lambda e: e.split == VALIDATE) for name, prediction in predictions.items()}
-    save_figure(segment_figure({"validate split": segment_table(validate, segments)}), folder / "segments.png")
+    save_figure(marker_figure({"validate split": marker_table(validate, markers)}), folder / "markers.png")
     compared = {name: validate[name] for name in ("cad", "identified")}
     if shapes:
-        table = curves.shape_table(compared, segments)
+        table = curves.shape_table(compared, markers)
         table.to_csv(folder / "shapes.csv", **CSV)
         save_figure(plots.shape_figure(table), folder / "shapes.png")
         return
@@ -286,14 +286,14 @@ def write_plots(
         kinds = [e for e in experiments if e.kind == experiments[-1].kind]
         widest = max(kinds, key=lambda e: float(np.ptp(e.positions, axis=0).max()))
         widest_alone = {name: moving[name].of(lambda e: e.name == widest.name) for name in compared}
-        table = curves.distance_table(widest_alone, segments)
+        table = curves.distance_table(widest_alone, markers)
         table.to_csv(folder / "distances.csv", **CSV)
         save_figure(plots.distance_figure(table, widest.name), folder / "distances.png")
         save_figure(plots.path_figure(widest_alone), folder / "paths.png")
 
 
 def read_reported(config: IdentificationSettings) -> list[Trial]:
-    """The session's trials of the reported kinds, which all track the same segments; none of the split test."""
+    """The session's trials of the reported kinds, which all track the same markers; none of the split test."""
     trials = [t for t in read_trials(TRIALS, DECIDING) if t.experiment in config.reported]
     for kind in config.experiments:
         for split in DECIDING:
@@ -301,11 +301,11 @@ def read_reported(config: IdentificationSettings) -> list[Trial]:
                 reason, way_out = f"found no {kind} trial with split {split}", EXPERIMENTS[kind].without
                 otherwise = f", or in params.yaml {way_out}: data/raw/README.md" if way_out else ""
                 raise InputError(f"session.yaml: {reason}, expected at least one{otherwise}")
-    segments = trials[0].segments
+    markers = trials[0].markers
     for trial in trials:
-        if trial.segments != segments:
+        if trial.markers != markers:
             raise InputError(
-                f"trial {trial.name}: found {len(trial.segments)} segments, expected the {len(segments)} of "
+                f"trial {trial.name}: found {len(trial.markers)} markers, expected the {len(markers)} of "
                 f"{trials[0].name}"
             )
     return trials

@@ -159,7 +159,7 @@ def test_ingest_sees_the_arm_whole_and_takes_no_hand_for_it(log, capsys):
 
 def told_of(path, truth, **hardware):
     """A log of a session in which a robot did what `truth` says, and a twin, where it is one of hardware, as well."""
-    bodies, tip = ("link_7", "base", *truth.segments), ("unit_08", (0.0, 0.0, 0.0))
+    bodies, tip = ("link_7", "base", *truth.markers), ("unit_08", (0.0, 0.0, 0.0))
     log_writer = Written(path, Subject(bodies, JOINTS, truth.tendons, STRAIGHT, tip, **hardware))
     base = np.append(truth.base_position, truth.base_quaternion)
     intent = (operator := Operator()).step()
@@ -186,9 +186,9 @@ def test_a_session_in_which_the_arm_was_seen_is_one_to_identify_from(tmp_path, c
     assert inspect([str(tmp_path)]) == 0
     (tmp_path / "session.yaml").write_text(capsys.readouterr().out.split("Proposed session.yaml:\n")[1])
     session = read_session(tmp_path)
-    session.segments = {name: name for name in truth.segments}  # the Panda's links are left out
+    session.markers = {name: name for name in truth.markers}  # the Panda's links are left out
     ((_, take, _),) = load_raw_trials(tmp_path, session, TrialLimits(0.2, 0.3, 0.1, 1.0))
-    assert (take.segments, take.tendons) == (truth.segments, truth.tendons), take
+    assert (take.markers, take.tendons) == (truth.markers, truth.tendons), take
     moves = take.time > 0.5  # poses that repeat themselves to the last bit are taken for frozen ones
     np.testing.assert_allclose(take.positions[moves], truth.positions[::4][moves], atol=1e-9)
     there = np.isfinite(take.base_positions).all(axis=1)
@@ -257,7 +257,7 @@ def test_with_motion_capture_merged_into_it_a_real_session_is_one_to_identify_fr
     (tmp_path / "merged/session.yaml").write_text(proposed)
     session = read_session(tmp_path / "merged")
     ((_, take, _),) = load_raw_trials(tmp_path / "merged", session, TrialLimits(0.2, 0.3, 0.1, 1.0))
-    assert (take.segments, take.tendons) == (truth.segments, truth.tendons), take
+    assert (take.markers, take.tendons) == (truth.markers, truth.tendons), take
     far = np.linalg.norm(take.positions[:, -1] - take.base_positions, axis=1)
     true = np.linalg.norm(truth.positions[::4, -1] - truth.base_position, axis=1)
     there = np.isfinite(far)

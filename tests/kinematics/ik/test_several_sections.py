@@ -41,7 +41,7 @@ def model(tmp_path_factory):
     tendons = [Tendon(angle + turn, 0.006, end=end) for end, turn in ((3, 0.0), (6, 30.0)) for angle in ways]
     arm = Sections(
         kind="sections", sections=[part, part], joint_range_deg=60.0, damping_ratio=0.3, tendons=tendons,
-        hole_ratio=0.8, tip_load=0.0, segments={"tip": 0.16},
+        hole_ratio=0.8, tip_load=0.0, markers={"tip": 0.16},
     )  # fmt: skip
     return arm.build(ACTUATION, SOLVER, tmp_path_factory.mktemp("models")).spec.compile()
 

@@ -123,7 +123,7 @@ def test_the_way_to_a_dead_time_is_said_and_leads_there(project):
         ('name="base"', 'name="mount"', "found no body `base`, expected one: the mount"),
         ('name="base_center"', 'name="middle"', "found no site 'base_center', expected one in the mount"),
         ('name="tip"', 'name="end"', "found no site 'tip', expected one on the last unit"),
-        ("(shoulder|upper|lower|hand)_center", r"\1_middle", "found no site <segment>_center, expected one in every"),
+        ("(shoulder|upper|lower|hand)_center", r"\1_middle", "found no site <marker>_center, expected one for every"),
         ('name="upper_roll" ', "", "found a joint without a name (number 4), expected names for all"),
         ('name="pull_b" ', "", "found an actuator without a name"),
         ('<joint name="hand_roll" axis="1 0 0"/>', "", "body 'hand': found 1 joints, expected two hinges, or none"),

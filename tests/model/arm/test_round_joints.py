@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from tests.support.matched_plant import segments_of, small_model
+from tests.support.matched_plant import markers_of, small_model
 from tests.support.small_arm import small_spec
 from trunkline.errors import InputError
 from trunkline.identification.fit.identify import with_parameters
@@ -101,9 +101,9 @@ def test_a_joint_that_cannot_be_round_is_refused_by_name():
         add_elements(spec, Joints(round=True), 1e-5)
 
 
-def test_segments_are_those_of_the_arm(model):
+def test_markers_are_those_of_the_arm(model):
     plain = small_model(UNITS)
-    assert segments_of(model) == segments_of(plain)
+    assert markers_of(model) == markers_of(plain)
     fields = candidate_fields(plain, {"hardening": np.array([HARDENING])})
     assert "tendon_lengthspring" not in fields
     set_fields(plain, fields)

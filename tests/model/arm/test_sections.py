@@ -29,7 +29,7 @@ TENDONS = [
 def arm(**changed) -> Sections:
     settings = {
         "kind": "sections", "sections": TWO, "joint_range_deg": 40.0, "damping_ratio": 0.1, "tendons": TENDONS,
-        "hole_ratio": 0.8, "tip_load": 0.0, "segments": {"tip": Marker(0.17, (0.005, -0.002))},
+        "hole_ratio": 0.8, "tip_load": 0.0, "markers": {"tip": Marker(0.17, (0.005, -0.002))},
     }  # fmt: skip
     return Sections(**settings | changed)
 
@@ -93,7 +93,7 @@ def test_an_arm_may_bring_guesses_of_its_own_motors(tmp_path):
     ("changed", "message"),
     [
         ({"tendons": [Tendon(0.0, 0.01, end=6)]}, "tendons.0.end: found 6, expected one of the 5 units"),
-        ({"segments": {"tip": 0.17}}, "segments.tip: found 0.17 m, expected at most the length of 0.16 m, or"),
+        ({"markers": {"tip": 0.17}}, "markers.tip: found 0.17 m, expected at most the length of 0.16 m, or"),
     ],
 )
 def test_a_mistake_is_named(changed, message):

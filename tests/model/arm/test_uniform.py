@@ -18,8 +18,8 @@ from trunkline.model.arm.uniform import uniform_chain, uniform_properties
 from trunkline.pipeline.config import load_config
 
 CHAIN = uniform_chain(0.3, 0.05, 6, 0.5)
-SEGMENTS = {"1": 0.1, "2": 0.175, "end": 0.3}
-MARKERS = {name: Marker(distance) for name, distance in SEGMENTS.items()}
+DISTANCES = {"1": 0.1, "2": 0.175, "end": 0.3}
+MARKERS = {name: Marker(distance) for name, distance in DISTANCES.items()}
 
 
 def model_of(tip_load=0.0, masses=(0.02,), stiffness=0.5, tendons=0) -> mujoco.MjModel:
@@ -46,9 +46,9 @@ def test_tracked_points_lie_where_the_drawing_says():
     model = model_of()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    for name, distance in SEGMENTS.items():
+    for name, distance in DISTANCES.items():
         np.testing.assert_allclose(data.site(f"{name}_center").xpos, [0, 0, -distance], atol=1e-12)
-    carriers = [model.body(model.site(f"{name}_center").bodyid[0]).name for name in SEGMENTS]
+    carriers = [model.body(model.site(f"{name}_center").bodyid[0]).name for name in DISTANCES]
     assert carriers == ["unit_02", "unit_04", "unit_06"]  # a point between two units is the first one's end
 
 
@@ -120,7 +120,7 @@ def project(tmp_path, monkeypatch):
         ({"unit_masses": [0.1, 0.1]}, "build_mjcf.arm: unit_masses: found 2, expected one for all"),
         ({"joint_stiffness": 1.0}, "build_mjcf.arm: found both, expected either bending_stiffness"),
         ({"bending_stiffness": None}, "build_mjcf.arm: found neither, expected either bending_stiffness"),
-        ({"segments": {"3": 0.5}}, "build_mjcf.arm: segments.3: found 0.5 m, expected at most the length of 0.3225 m"),
+        ({"markers": {"3": 0.5}}, "build_mjcf.arm: markers.3: found 0.5 m, expected at most the length of 0.3225 m"),
         ({"tip_load": -0.1}, "build_mjcf.arm.tip_load: found -0.1"),
     ],
 )
@@ -142,19 +142,29 @@ def test_units_bend_at_their_upper_ends_where_the_file_does_not_say(project, arm
 
 @pytest.mark.parametrize("arm", ["asl_trunk", "spiral"])
 @pytest.mark.parametrize(
-    ("segments", "message"),
+    ("markers", "message"),
     [
-        ({"wrist": 0.6}, "segments.wrist: found 0.6 m, expected at most the length of "),
-        ({"base": 0.1}, "segments.base: found the name of a body, expected another"),
-        ({"unit_01": 0.1}, "segments.unit_01: found the name of a body, expected another"),
+        ({"wrist": 0.6}, "markers.wrist: found 0.6 m, expected at most the length of "),
+        ({"base": 0.1}, "markers.base: found the name of a body, expected another"),
+        ({"unit_01": 0.1}, "markers.unit_01: found the name of a body, expected another"),
         ({"unit_99": 0.1}, "units' centres have names, unit_01 to unit_"),
     ],
 )
-def test_a_tracked_point_lies_on_the_arm_and_has_a_name_of_its_own(project, arm, segments, message):
+def test_a_tracked_point_lies_on_the_arm_and_has_a_name_of_its_own(project, arm, markers, message):
     with pytest.raises(InputError) as caught:
-        project({"segments": segments}, arm)
+        project({"markers": markers}, arm)
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_markers_by_the_name_of_the_release_before(project, capsys):
+    file = Path("conf/build_mjcf/arm/arm.yaml")
+    project({}, "asl_trunk")
+    text = file.read_text()
+    markers = load_config(Config, "build_mjcf").arm.markers
+    file.write_text(text.replace("markers:", "segments:"))
+    assert load_config(Config, "build_mjcf").arm.markers == markers
+    assert "build_mjcf.arm: `segments` is called `markers` now" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("changes", [{}, {"tendons": 4}, {"bending_stiffness": None, "joint_stiffness": 0.4}])

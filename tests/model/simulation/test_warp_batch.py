@@ -12,7 +12,7 @@ from mujoco.batch import Batch
 from tests.identification.test_stage import settings, truth_of
 from tests.model.simulation.test_capstan import rubbing_arm
 from tests.model.simulation.test_motion import delayed
-from tests.support.matched_plant import begin_project, curl, release, segments_of, small_model
+from tests.support.matched_plant import begin_project, curl, markers_of, release, small_model
 from tests.support.small_arm import small_spec
 from trunkline.errors import InputError
 from trunkline.identification.fit.linearisation import linearise
@@ -230,7 +230,7 @@ def test_a_population_is_where_mujoco_has_it(library, trials, load, friction):
     model.tendon_frictionloss[cables(model)] = friction
     experiments = [replace(experiment, load=load * (i > 0)) for i, experiment in enumerate(experiments)]
     fields = candidate_fields(model, {"damping": np.linspace(0.02, 0.05, 3), "joint_place": np.linspace(0, 0.2, 3)})
-    ours, theirs = (Population(model, experiments, segments_of(model)).simulate(fields, rough=r) for r in (False, True))
+    ours, theirs = (Population(model, experiments, markers_of(model)).simulate(fields, rough=r) for r in (False, True))
     for their, our in zip(theirs.positions, ours.positions, strict=True):
         assert not np.array_equal(their, our)
         assert np.abs(their - our).max() < BOUND
@@ -240,7 +240,7 @@ def test_derivatives_stay_with_mujoco(no_library, trials):
     """Candidates to be ranked ask for the library, which is missing; differences do not."""
     model, experiments = trials
     free = {"damping": Bounds(0.005, 1.0)}
-    problem = Problem(model, experiments, segments_of(model), free, "positions", WEIGHTS)
+    problem = Problem(model, experiments, markers_of(model), free, "positions", WEIGHTS)
     assert np.concatenate(linearise(problem, problem.start()).jacobians).any()
     assert np.isfinite(problem.losses(problem.start()[None])).all()
     with pytest.raises(InputError, match="no library mujoco_warp"):

@@ -10,7 +10,7 @@ TIME = np.arange(300) / RATE
 
 
 def swing(time: np.ndarray, seed: int = 0, noise: float = 1e-5) -> np.ndarray:
-    """Three segments of an arm that swings at 1.3 Hz, with a second bending mode. (T, 3, 3) m."""
+    """Three markers of an arm that swings at 1.3 Hz, with a second bending mode. (T, 3, 3) m."""
     slow, fast = np.exp(-time) * np.cos(8.2 * time), np.exp(-4 * time) * np.sin(30 * time)
     along = np.array([0.03, 0.08, 0.16])[:, None] * [1, 0.3, 0.1]
     across = np.array([0.004, -0.006, 0.003])[:, None] * [0.2, 1, 0]

@@ -9,7 +9,7 @@ import pytest
 from demo.instruments import measure
 from demo.recorder import write_log, write_session
 from tests.support.folders import SHARED, with_recordings
-from tests.support.sessions import SEGMENTS, curl_truth, instruments, record, release_truth, static_truth
+from tests.support.sessions import MARKERS, curl_truth, instruments, record, release_truth, static_truth
 from trunkline.errors import InputError
 from trunkline.recordings.cleaning.checks import TrialLimits
 from trunkline.recordings.cleaning.clock_offset import align_clocks
@@ -59,7 +59,7 @@ def refused(result, message):
 def test_takes_carry_what_was_measured(tmp_path):
     (m,) = record(tmp_path, [curl_truth()], instruments())
     ((take, findings),) = taken(tmp_path)
-    assert take.segments == SEGMENTS
+    assert take.markers == MARKERS
     assert findings.repairs == []
     np.testing.assert_array_equal(take.positions, m.positions[:, 1:])
     np.testing.assert_array_equal(take.base_positions, m.positions[:, 0])
@@ -85,12 +85,23 @@ def test_stamp_and_log_clocks(tmp_path):
     np.testing.assert_allclose(take.time[[0, -1]], (m.logged[[0, -1]] - m.logged[0]) * 1e-9, atol=1e-9)
 
 
+def test_markers_by_the_name_of_the_release_before(tmp_path, capsys):
+    record(tmp_path, [release_truth()], instruments())
+    edit_session(tmp_path, "base: base", "base: base\nsegments: {unit_08: tip}")
+    ((take, _),) = taken(tmp_path)
+    assert take.markers == ("tip",)
+    assert capsys.readouterr().out.startswith(f"{tmp_path / 'session.yaml'}: `segments` is called `markers` now: ")
+    edit_session(tmp_path, "base: base", "base: base\nmarkers: {unit_08: tip}")
+    with pytest.raises(InputError, match="found `segments` beside `markers`, its new name, expected `markers` alone"):
+        read_session(tmp_path)
+
+
 def test_window_and_names_from_the_session(tmp_path):
     record(tmp_path, [release_truth()], instruments())
     edit_session(tmp_path, "split: identify", "split: identify, window: [0.5, 1.5]")
-    edit_session(tmp_path, "base: base", "base: base\nsegments: {unit_08: tip, unit_02: root}")
+    edit_session(tmp_path, "base: base", "base: base\nmarkers: {unit_08: tip, unit_02: root}")
     ((take, _),) = taken(tmp_path)
-    assert take.segments == ("tip", "root")
+    assert take.markers == ("tip", "root")
     assert take.time[0] == 0
     assert take.time[-1] == pytest.approx(1.0, abs=0.02)
     edit_session(tmp_path, "[0.5, 1.5]", "[50, 60]")
@@ -120,25 +131,25 @@ def test_nothing_but_bad_quaternions_is_refused(tmp_path):
     refused(one_trial(tmp_path, spoil), "trial release_a: 'unit_04' is seen in 0.0 % of 2.. frames")
 
 
-def test_segment_that_never_appears_is_refused_by_name(tmp_path):
+def test_marker_that_never_appears_is_refused_by_name(tmp_path):
     def hide(m):
         m.positions[:, 3] = m.quaternions[:, 3] = np.nan
 
     one_trial(tmp_path, hide)
-    edit_session(tmp_path, "base: base", "base: base\nsegments: {unit_02: unit_02, unit_06: unit_06}")
+    edit_session(tmp_path, "base: base", "base: base\nmarkers: {unit_02: unit_02, unit_06: unit_06}")
     message = (
         "trial release_a: 'unit_06' never appears in /rigid_bodies, found base, unit_02, unit_04, unit_08"
     )
     refused(taken(tmp_path)[0], message)
 
 
-def test_segment_that_only_other_trials_have_is_refused_by_name(tmp_path):
+def test_marker_that_only_other_trials_have_is_refused_by_name(tmp_path):
     record(tmp_path, [static_truth(0.0), release_truth()], instruments())
     m = measure(release_truth(), instruments(), np.random.default_rng(0))
     m.positions[:, 3] = m.quaternions[:, 3] = np.nan
     write_log(tmp_path / "release_a.mcap", m)
     good, bad = taken(tmp_path)
-    assert good[0].segments == SEGMENTS
+    assert good[0].markers == MARKERS
     refused(bad, "'unit_06' never appears")
 
 
@@ -250,7 +261,7 @@ def test_real_recordings_without_orientations_or_base_body(tmp_path):
     takes = [take for take, _ in taken(tmp_path)]
     assert len(takes) == 13
     for take in takes:
-        assert take.segments == ("1", "2", "3")
+        assert take.markers == ("1", "2", "3")
         trial, _ = filter_raw_trial(take, FILTER)
         assert trial.quaternions is None
         np.testing.assert_allclose(trial.gravity, [0, 0, -9.80665], atol=1e-9)

@@ -107,10 +107,10 @@ def test_what_names_no_sessions_is_refused_in_one_line(two, lines, message):
 
 def test_another_arm_is_refused(two):
     longer = [replace(t, positions=t.base_position + 1.3 * (t.positions - t.base_position)) for t in all_truths()]
-    renamed = [replace(t, segments=tuple(f"part_{name[-2:]}" for name in t.segments)) for t in all_truths()]
+    renamed = [replace(t, markers=tuple(f"part_{name[-2:]}" for name in t.markers)) for t in all_truths()]
     threads = ("thread_1", "thread_2", "thread_3")
     cables = [release_truth(), replace(curl_truth(split="identify"), tendons=threads)]
-    for truths, message in ((longer, "from the body before it, expected about"), (renamed, "found segments part_02"),
+    for truths, message in ((longer, "from the body before it, expected about"), (renamed, "found markers part_02"),
                          (cables, "found tendons thread_1")):  # fmt: skip
         shutil.rmtree(two / "data/raw/arm_7/friday")
         record(two / "data/raw/arm_7/friday", truths, instruments(), 7)

@@ -10,7 +10,7 @@ from demo.instruments import measure
 from demo.recorder import write_log, write_session
 from tests.support.folders import SHARED, with_recordings
 from tests.support.sessions import (
-    SEGMENTS,
+    MARKERS,
     TENDONS,
     curl_truth,
     instruments,
@@ -115,7 +115,7 @@ def test_a_body_that_is_off_is_named(sound, name, body):
     trials, session = judged(sound, **{name: moved(take_of(sound, name), body, [0.0, 0.3, 0.4])})
     assert list(trials) == [name]
     (fault,) = [fault for fault in trials[name] if "expected neighbours at distances" in fault]
-    assert fault.startswith(f"{SEGMENTS[body]!r} is ")
+    assert fault.startswith(f"{MARKERS[body]!r} is ")
     assert session == []
 
 
@@ -145,28 +145,28 @@ def test_one_log_in_another_unit_is_named(sound, factor):
 
 
 @pytest.mark.parametrize("order", [(1, 0, 2, 3), (0, 2, 1, 3), (0, 1, 3, 2), (2, 1, 0, 3)])
-def test_exchanged_segments_of_the_whole_session_are_named(sound, order):
-    names = tuple(SEGMENTS[place] for place in order)
-    trials, session = judged(sound, **every(sound, lambda take: replace(take, segments=names)))
+def test_exchanged_markers_of_the_whole_session_are_named(sound, order):
+    names = tuple(MARKERS[place] for place in order)
+    trials, session = judged(sound, **every(sound, lambda take: replace(take, markers=names)))
     assert trials == {}
     assert len(session) == 1
-    assert "check `segments` in session.yaml" in session[0]
-    for segment, name in zip(SEGMENTS, names, strict=True):
-        assert (segment == name) or repr(name) in session[0]
+    assert "check `markers` in session.yaml" in session[0]
+    for marker, name in zip(MARKERS, names, strict=True):
+        assert (marker == name) or repr(name) in session[0]
 
 
-@pytest.mark.parametrize("names", [SEGMENTS[::-1], ("root", "a", "b", "tip"), ("7", "b8", "c9", "1")])
-def test_segments_named_from_the_tip_or_without_numbers_are_left(sound, names):
-    assert judged(sound, **every(sound, lambda take: replace(take, segments=names))) == ({}, [])
+@pytest.mark.parametrize("names", [MARKERS[::-1], ("root", "a", "b", "tip"), ("7", "b8", "c9", "1")])
+def test_markers_named_from_the_tip_or_without_numbers_are_left(sound, names):
+    assert judged(sound, **every(sound, lambda take: replace(take, markers=names))) == ({}, [])
 
 
-def test_a_base_that_moves_while_a_segment_rests_is_named(sound):
+def test_a_base_that_moves_while_a_marker_rests_is_named(sound):
     def exchange(take):
         positions, quaternions = take.positions.copy(), take.quaternions.copy()
         positions[:, 0], quaternions[:, 0] = take.base_positions, take.base_quaternions
         changed = {"base_positions": take.positions[:, 0], "base_quaternions": take.quaternions[:, 0]}
-        names = ("base", *take.segments[1:])
-        return replace(take, positions=positions, quaternions=quaternions, segments=names, **changed)
+        names = ("base", *take.markers[1:])
+        return replace(take, positions=positions, quaternions=quaternions, markers=names, **changed)
 
     _, session = judged(sound, base="unit_02", **every(sound, exchange))
     assert session[-1].startswith("base: 'unit_02' moves by ")

@@ -20,7 +20,7 @@ TIME = np.arange(FRAMES) / RATE
 
 
 def take(kind: str = "motion", oriented: bool = False, **changes) -> RawTrial:
-    """Two segments that sway, seen in every frame of the uniform clock, and a base that stands still."""
+    """Two markers that sway, seen in every frame of the uniform clock, and a base that stands still."""
     positions = np.zeros((FRAMES, 2, 3))
     positions[..., 2] = [-0.2, -0.4]
     if not EXPERIMENTS[kind].static:
@@ -28,7 +28,7 @@ def take(kind: str = "motion", oriented: bool = False, **changes) -> RawTrial:
     quaternions = np.tile([1.0, 0, 0, 0], (FRAMES, 2, 1)) if oriented else None
     facts = {
         "name": "by hand", "experiment": kind, "split": "identify", "level": None, "time": TIME,
-        "segments": ("unit_1", "unit_2"), "positions": positions, "quaternions": quaternions,
+        "markers": ("unit_1", "unit_2"), "positions": positions, "quaternions": quaternions,
         "base_positions": np.zeros((FRAMES, 3)), "base_quaternions": np.tile([1.0, 0, 0, 0], (FRAMES, 1)),
         "up": np.array([0.0, 0.0, 1.0]), "tendons": ("tendon_1",), "command_time": TIME, "tendon_time": np.empty(0),
         "commands": 0.01 * np.clip(TIME - 0.5, 0, 1)[:, None], "tendon_positions": np.empty((0, 1)),
@@ -36,9 +36,9 @@ def take(kind: str = "motion", oriented: bool = False, **changes) -> RawTrial:
     return RawTrial(**facts | changes)
 
 
-def missing(source: RawTrial, begin: int, count: int, segment: int = 1) -> RawTrial:
+def missing(source: RawTrial, begin: int, count: int, marker: int = 1) -> RawTrial:
     positions = source.positions.copy()
-    positions[begin : begin + count, segment] = np.nan
+    positions[begin : begin + count, marker] = np.nan
     return replace(source, positions=positions)
 
 
@@ -53,7 +53,7 @@ def test_a_gap_that_is_short_enough_is_measured_throughout(missed):
 @pytest.mark.parametrize("missed", [BRIDGED + 1, 2 * BRIDGED, 3 * BRIDGED, 100])
 def test_a_longer_gap_is_not_measured_nor_is_what_the_low_pass_carries_beyond_it(missed):
     trial, effect = filter_raw_trial(missing(take(), 100, missed), SETTINGS)
-    assert trial.measured[:, 0].all(), "the other segment was seen"
+    assert trial.measured[:, 0].all(), "the other marker was seen"
     hidden = np.flatnonzero(~trial.measured[:, 1])
     assert hidden.tolist() == list(range(100 - MARGIN, 100 + missed + MARGIN))
     assert effect.gap_share == pytest.approx(len(hidden) / (2 * FRAMES))
@@ -110,7 +110,7 @@ def test_fewer_samples_than_the_low_pass_needs_are_refused(samples, enough):
 
 
 def moving_while_hidden(count: int) -> tuple[RawTrial, slice]:
-    """At rest, but for a while in which nobody sees the second segment and after which it is 2 mm elsewhere."""
+    """At rest, but for a while in which nobody sees the second marker and after which it is 2 mm elsewhere."""
     source, hidden = take("static_pull"), slice(100, 100 + count)
     source.positions[hidden.stop :, 1, 0] += 2e-3
     source.positions[hidden, 1, 0] = np.nan
@@ -131,7 +131,7 @@ def static(positions: np.ndarray, measured: np.ndarray, quaternions: np.ndarray 
     frames = len(positions)
     return Trial(
         name="by hand", experiment="static_tilt", split="identify", level=0.0, gravity=np.array([0, 0, -9.81]),
-        time=np.arange(frames) / RATE, segments=("a", "b"), positions=positions, quaternions=quaternions,
+        time=np.arange(frames) / RATE, markers=("a", "b"), positions=positions, quaternions=quaternions,
         measured=measured, tendons=("t",), commands=np.arange(frames)[:, None] * 1.0,
         tendon_positions=np.arange(frames)[:, None] * 2.0,
     )  # fmt: skip

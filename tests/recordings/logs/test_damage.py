@@ -9,7 +9,7 @@ import pytest
 from demo.instruments import measure
 from demo.recorder import write_log, write_session
 from stages import ingest
-from tests.support.sessions import SEGMENTS, all_truths, curl_truth, instruments, record, release_truth, static_truth
+from tests.support.sessions import MARKERS, all_truths, curl_truth, instruments, record, release_truth, static_truth
 from tests.support.workbench import ROOT
 from trunkline.pipeline.stage import run_stage
 from trunkline.recordings.cleaning.checks import TrialLimits
@@ -82,7 +82,7 @@ def test_bodies_taken_for_each_other_are_put_right(tmp_path, right, frames, bodi
             values[frames, list(bodies)] = values[frames, [*bodies[1:], bodies[0]]]
 
     takes, findings = session(tmp_path / "wrong", swap)
-    names = " and ".join(repr(("base", *SEGMENTS)[body]) for body in bodies)
+    names = " and ".join(repr(("base", *MARKERS)[body]) for body in bodies)
     (repair,) = [line for line in findings[0].repairs if "taken for each other" in line]
     assert repair.startswith(f"{names} were taken for each other in ")
     begin, end = map(float, repair.partition(" between ")[2].removesuffix(" s, put right").split(" and "))
@@ -98,13 +98,13 @@ def test_bodies_taken_for_each_other_are_put_right(tmp_path, right, frames, bodi
     np.testing.assert_array_equal(takes[0].base_quaternions[same], right[0].base_quaternions[same])
 
 
-def test_a_segment_taken_for_the_base_is_put_right(tmp_path, right):
+def test_a_marker_taken_for_the_base_is_put_right(tmp_path, right):
     test_bodies_taken_for_each_other_are_put_right(tmp_path, right, slice(60, 110), (0, 1))
 
 
 @pytest.mark.parametrize("bodies", [(2, 3, 4, 5), (0, 2, 1, 3), (4, 7, 5, 6)])
 def test_rounds_of_four_are_told_too(bodies):
-    """On a tapering arm of nine segments that swings; for two frames, and for one."""
+    """On a tapering arm of nine markers that swings; for two frames, and for one."""
     rng = np.random.default_rng(0)
     along = np.concatenate([[0], np.cumsum(0.06 * 0.9 ** np.arange(9))])
     angle = 2.0 * np.sin(0.1 * np.arange(300))[:, None] * along / along[-1] + 1e-9

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.recordings.logs.test_schemas import CASES, write_foxglove, write_ros
-from tests.support.sessions import SEGMENTS, all_truths, instruments, motion_truth, pull_truth, record
+from tests.support.sessions import MARKERS, all_truths, instruments, motion_truth, pull_truth, record
 from tests.support.workbench import ROOT
 from trunkline.recordings.cleaning.checks import TrialLimits
 from trunkline.recordings.cleaning.loading import load_raw_trials
@@ -31,7 +31,7 @@ def test_a_lab_session_is_described_and_its_proposal_is_the_session(tmp_path, ca
     described, proposed = inspect(capsys, tmp_path)
     assert "mocap4r2_msgs/msg/RigidBodies (cdr), poses: " in described
     assert "tilt_60.mcap" in described
-    for name in ("base", *SEGMENTS):
+    for name in ("base", *MARKERS):
         assert f"    {name:7}  seen in " in described
     (tmp_path / "session.yaml").write_text(proposed)
     session = read_session(tmp_path)
@@ -82,7 +82,7 @@ def test_every_schema_gets_a_proposal_that_is_read(tmp_path, capsys, encoding, k
         assert session.base == "base"
     else:
         ((_, take, _),) = load_raw_trials(tmp_path, session, LIMITS)
-        assert len(take.segments) == 2, take
+        assert len(take.markers) == 2, take
         assert np.isfinite(take.positions).any()
 
 

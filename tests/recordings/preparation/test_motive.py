@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from demo.instruments import measure
-from tests.support.sessions import SEGMENTS, instruments, release_truth
+from tests.support.sessions import MARKERS, instruments, release_truth
 from trunkline.errors import InputError
 from trunkline.recordings.cleaning.checks import TrialLimits
 from trunkline.recordings.cleaning.loading import load_raw_trials
@@ -14,7 +14,7 @@ from trunkline.recordings.preparation.export import read_export
 from trunkline.recordings.preparation.motive import main
 from trunkline.recordings.session.session import read_session
 
-BODIES = ("base", *SEGMENTS)
+BODIES = ("base", *MARKERS)
 LIMITS = TrialLimits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
 
 
@@ -64,7 +64,7 @@ def test_an_export_becomes_a_session_that_is_ingested(tmp_path, measured, unit, 
     session = read_session(tmp_path / "session")
     assert (session.frame.up, session.frame.unit, session.base, session.clock) == ((0, 1, 0), "m", "base", "frame")
     ((_, take, findings),) = load_raw_trials(tmp_path / "session", session, LIMITS)
-    assert take.segments == SEGMENTS
+    assert take.markers == MARKERS
     assert take.experiment == "release"
     assert findings.repairs == []
     np.testing.assert_allclose(take.positions, measured.positions[:, 1:], atol=1e-8)
@@ -114,7 +114,7 @@ def spoil(path, old, new):
         ("0,0.000000,", "0,0.000000,abc", "row 9: could not convert string to float: 'abc"),
         ("\n4,0.033333,", "\n4,,", "row 13 lacks its frame number or time"),
         ("Take Name", "Total Exported Frames,9999,Take Name", "the header says 9999 (Total Exported Frames)"),
-        (f",{SEGMENTS[1]}", f",{SEGMENTS[0]}", f"found Position X of the rigid body '{SEGMENTS[0]}' twice"),
+        (f",{MARKERS[1]}", f",{MARKERS[0]}", f"found Position X of the rigid body '{MARKERS[0]}' twice"),
     ],
 )
 def test_what_is_not_understood_is_one_line_and_writes_nothing(tmp_path, capsys, measured, old, new, message):

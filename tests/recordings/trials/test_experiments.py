@@ -44,7 +44,7 @@ def test_starts_are_found_in_the_signal_that_tells_them():
     pull = 0.02 * np.clip(time - 0.3, 0, 0.5)
     trial = Trial(
         name="a", experiment="release", split="identify", level=None, gravity=np.array([0, 0, -9.81]), time=time,
-        segments=("unit_01",), positions=swing[:, None, None] * np.ones(3), quaternions=None,
+        markers=("unit_01",), positions=swing[:, None, None] * np.ones(3), quaternions=None,
         measured=np.ones((240, 1), bool), tendons=("tendon_1",), commands=pull[:, None], tendon_positions=pull[:, None],
     )  # fmt: skip
     assert EXPERIMENTS["release"].start(trial, lambda columns: columns).time == pytest.approx(0.8, abs=0.02)

@@ -15,7 +15,7 @@ def smooth(columns):
 
 
 def ring_down(release: float, noise: float, seed: int, hand: float = 0.0, duration: float = 3.0):
-    """Three segments held at up to 0.2 m aside until `release`, while a hand drifts by `hand` m/s."""
+    """Three markers held at up to 0.2 m aside until `release`, while a hand drifts by `hand` m/s."""
     time = np.arange(int(duration * RATE)) / RATE
     since = np.clip(time - release, 0, None)
     omega, decay = 2 * np.pi * 1.3, 1.0
@@ -71,7 +71,7 @@ def test_a_hold_that_creeps_is_not_taken_for_the_release():
 
 @pytest.mark.parametrize("gentle", [0.0, 0.1, 0.2])
 def test_the_arm_is_free_when_the_hand_has_gone(gentle):
-    """x'' = -ω² x - c x' + hand, whose force fades within `gentle` s from 0.5 s on; two segments follow."""
+    """x'' = -ω² x - c x' + hand, whose force fades within `gentle` s from 0.5 s on; two markers follow."""
     fine, omega, damping = np.arange(0, 3, 1e-4), 8.2, 3.0
     hand = 0.2 * omega**2 * np.clip(1 - (fine - 0.5) / max(gentle, 1e-9), 0, 1)
     hand[fine < 0.5] = 0.2 * omega**2

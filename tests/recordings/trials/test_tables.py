@@ -11,7 +11,7 @@ from trunkline.recordings.trials.trial import Trial, read_trials, write_trials
 RNG = np.random.default_rng(0)
 
 
-def trial(name, frames, segments, tendons, oriented):
+def trial(name, frames, markers, tendons, oriented):
     return Trial(
         name=name,
         experiment="curl",
@@ -20,10 +20,10 @@ def trial(name, frames, segments, tendons, oriented):
         load=0.25,
         gravity=RNG.normal(size=3),
         time=np.arange(frames) / 120,
-        segments=tuple(f"unit_{i}" for i in range(segments)),
-        positions=RNG.normal(size=(frames, segments, 3)),
-        quaternions=RNG.normal(size=(frames, segments, 4)) if oriented else None,
-        measured=RNG.random((frames, segments)) < 0.5,
+        markers=tuple(f"unit_{i}" for i in range(markers)),
+        positions=RNG.normal(size=(frames, markers, 3)),
+        quaternions=RNG.normal(size=(frames, markers, 4)) if oriented else None,
+        measured=RNG.random((frames, markers)) < 0.5,
         tendons=tuple(f"tendon_{i}" for i in range(tendons)),
         commands=RNG.normal(size=(frames, tendons)),
         tendon_positions=RNG.normal(size=(frames, tendons)),
@@ -33,7 +33,7 @@ def trial(name, frames, segments, tendons, oriented):
     )
 
 
-def take(name, frames, segments, tendons, commands, oriented):
+def take(name, frames, markers, tendons, commands, oriented):
     return RawTrial(
         name=name,
         experiment="release",
@@ -42,9 +42,9 @@ def take(name, frames, segments, tendons, commands, oriented):
         load=0.1,
         up=np.array([0.0, 1, 0]),
         time=np.arange(frames) / 120,
-        segments=tuple(f"unit_{i}" for i in range(segments)),
-        positions=np.where(RNG.random((frames, segments, 1)) < 0.2, np.nan, 1.5) * np.ones(3),
-        quaternions=RNG.normal(size=(frames, segments, 4)) if oriented else None,
+        markers=tuple(f"unit_{i}" for i in range(markers)),
+        positions=np.where(RNG.random((frames, markers, 1)) < 0.2, np.nan, 1.5) * np.ones(3),
+        quaternions=RNG.normal(size=(frames, markers, 4)) if oriented else None,
         base_positions=RNG.normal(size=(frames, 3)),
         base_quaternions=RNG.normal(size=(frames, 4)),
         tendons=tuple(f"tendon_{i}" for i in range(tendons)),

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import mujoco
 
-from tests.support.matched_plant import curl, release, segments_of, small_model, static_pull, tilt
+from tests.support.matched_plant import curl, markers_of, release, small_model, static_pull, tilt
 from trunkline.identification.evaluation.baselines import references
 from trunkline.identification.evaluation.evaluation import Prediction, replay
 from trunkline.identification.results.scoring import fingerprints
@@ -69,7 +69,7 @@ def metrics(model: mujoco.MjModel, trials: list[Trial]) -> dict:
 
     def of(subset: list[Trial]) -> dict:
         experiments = [prepare(trial, model, 40) for trial in subset]
-        replayed = replay(model, experiments, segments_of(model))
+        replayed = replay(model, experiments, markers_of(model))
         predictions = {"identified": Prediction(replayed, experiments), "cad": Prediction(replayed, experiments)}
         predictions |= references(subset, experiments, model, replayed)
         return {name: prediction.scores() for name, prediction in predictions.items()}

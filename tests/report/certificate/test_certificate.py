@@ -111,12 +111,12 @@ def test_replays_are_the_trials_to_a_twentieth_of_a_millimetre(certificate):
     names = [row["name"] for row in packed["trials"]]
     assert names == [trial.name for trial in trials]
     points = len(packed["radii_m"])
-    assert points == len(trials[0].segments) + 1
+    assert points == len(trials[0].markers) + 1
     row, trial = packed["trials"][0], trials[0]
     first = numbers[row["offset"] : row["offset"] + 3 * points].reshape(points, 3) * UNIT
     np.testing.assert_allclose(first[1:], trial.positions[0], atol=UNIT)
     assert not first[0].any()
-    hidden = [replace(trials[0], measured=np.arange(len(trial.segments))[None] > 0), *trials[1:]]
+    hidden = [replace(trials[0], measured=np.arange(len(trial.markers))[None] > 0), *trials[1:]]
     lost = np.frombuffer(base64.b64decode(sample(trials=hidden).replays["data"]), "<i2")
     assert (lost == LOST).sum() == 3
 
@@ -131,7 +131,7 @@ def test_a_model_of_another_session_is_refused_in_one_line():
 
 
 def test_a_model_of_another_arm_is_refused_in_one_line():
-    with pytest.raises(InputError, match="session.yaml: segments: trial tilt_0_identify: found 'unit_04'"):
+    with pytest.raises(InputError, match="session.yaml: markers: trial tilt_0_identify: found 'unit_04'"):
         sample(model=small_model(3), trials=None)
 
 

@@ -59,7 +59,7 @@ def test_what_no_log_will_tell_is_said():
     lines = doubt_lines(one_side, None)
     assert lines[0].startswith("masses are as described")
     assert lines[1] == "no tendon bends the arm towards -180°: neighbours are 280° apart"
-    still = session(["static_path"], frame={"up": [0, 0, 1], "gravity": "none"}, segments={"marker": "unit_05"})
+    still = session(["static_path"], frame={"up": [0, 0, 1], "gravity": "none"}, markers={"marker": "unit_05"})
     text = "\n".join(doubt_lines(one_side, still))
     assert "tells joint_friction, damping, tendon_friction, friction_time, kv, time_constant" in text
     assert "stiffness and kp show in their ratio alone" in text
@@ -69,11 +69,11 @@ def test_what_no_log_will_tell_is_said():
 
 
 def test_names_that_the_arm_has_not_are_noted(model):
-    named = {"motors": {"m1": {"unit": "m", "tendons": {"tendon_1": 1, "tendon2": -1}}}, "segments": {"a": "middle"}}
+    named = {"motors": {"m1": {"unit": "m", "tendons": {"tendon_1": 1, "tendon2": -1}}}, "markers": {"a": "middle"}}
     lines = doubt_lines(model, session(["motion"], **named))
     assert "session.yaml: motors: found 'tendon2', the arm has tendon_1, tendon_2, tendon_3" in lines
-    assert any("found 'base'" in line for line in doubt_lines(model, session(["motion"], segments={"a": "base"})))
-    assert any(line.startswith("session.yaml: segments: found 'middle', the arm has unit_01,") for line in lines)
+    assert any("found 'base'" in line for line in doubt_lines(model, session(["motion"], markers={"a": "base"})))
+    assert any(line.startswith("session.yaml: markers: found 'middle', the arm has unit_01,") for line in lines)
 
 
 def test_what_is_hardly_meant_is_noted():
@@ -133,5 +133,5 @@ def test_keys_that_an_arm_lacks_are_told_at_once(tmp_path):
         read_drawing(lacking, ROOT)
     message = str(caught.value)
     assert "missing, expected a value; also missing: " in message
-    for key in ("joint_range_deg", "damping_ratio", "tendons", "hole_ratio", "tip_load", "segments", "mass"):
+    for key in ("joint_range_deg", "damping_ratio", "tendons", "hole_ratio", "tip_load", "markers", "mass"):
         assert key in message

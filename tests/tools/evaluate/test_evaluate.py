@@ -13,7 +13,7 @@ import pytest
 from demo.recorder import write_log
 from tests.identification.test_stage import settings
 from tests.support.matched_plant import curl, release, small_model, tilt
-from tests.support.sessions import SEGMENTS, all_truths, instruments, record
+from tests.support.sessions import MARKERS, all_truths, instruments, record
 from tests.support.small_arm import small_spec
 from tests.support.workbench import workbench
 from trunkline.errors import InputError
@@ -81,9 +81,9 @@ def test_it_prints_and_writes_every_trial_beside_what_its_errors_stand_beside(la
     assert {p.name for p in out.iterdir()} == {
         "metrics.json",
         "trials.csv",
-        "segments.csv",
+        "markers.csv",
         "errors.png",
-        "segments.png",
+        "markers.png",
     }
     metrics = json.loads((out / "metrics.json").read_text())
     identified, cad, null = (metrics[name] for name in ("model", "cad", "null"))
@@ -180,7 +180,7 @@ def test_what_is_said_of_logs_begins_with_who_asked_and_names_repairs(tmp_path, 
     output, errors = capsys.readouterr()
     assert all(line.startswith("ask: ") for line in (output + errors).splitlines())
     (line,) = [line for line in errors.splitlines() if "taken for each other" in line]
-    first, second = SEGMENTS[:2]
+    first, second = MARKERS[:2]
     assert line.startswith(f"ask: repaired: release_a: {first!r} and {second!r} were taken for each other in ")
 
 
@@ -196,7 +196,7 @@ def test_what_is_said_of_logs_begins_with_who_asked_and_names_repairs(tmp_path, 
         ),
         (["right/arm.xml", "data/processed/filter", "--settings", "right"], "right/params.yaml: no such file"),
         (["bare.xml", "data/processed/filter"], "bare.xml: found no site 'base_center', expected one in the mount"),
-        (["renamed.xml", "data/processed/filter"], "segments: trial tilt_30_identify: found 'unit_02', expected names"),
+        (["renamed.xml", "data/processed/filter"], "markers: trial tilt_30_identify: found 'unit_02', expected names"),
         (["cables.xml", "data/processed/filter"], "tendons: trial tilt_30_identify: found 'tendon_2', expected names"),
         (["broken.xml", "data/processed/filter"], "broken.xml: not a model that MuJoCo reads"),
     ],

@@ -59,7 +59,7 @@ def _truth(model: mujoco.MjModel, angle: float, name: str, frames: int) -> Truth
     place = np.array([0.2, -0.1, 1.5])
     return Truth(
         name=name, experiment="static_tilt", split="identify", level=angle, time=np.arange(frames) / RATE,
-        base_position=place, base_quaternion=wxyz_from_rotation(base), segments=trial.segments,
+        base_position=place, base_quaternion=wxyz_from_rotation(base), markers=trial.markers,
         positions=np.tile(place + base.apply(trial.positions[0]), (frames, 1, 1)),
         quaternions=np.tile(wxyz_from_rotation(turned), (frames, 1, 1)), tendons=(), command_time=np.empty(0),
         commands=np.empty((0, 0)), tendon_positions=np.empty((frames, 0)),

@@ -152,19 +152,19 @@ def test_a_session_with_a_mistake_stops_no_other_and_is_scored_once_it_is_put_ri
 def test_a_trial_of_another_arm_is_refused_in_one_line(lab, capsys):
     session = drop(lab, "same")
     text = (session / "session.yaml").read_text()
-    named = "segments: {unit_01: unit_01, unit_02: joint_02}\n"
+    named = "markers: {unit_01: unit_01, unit_02: joint_02}\n"
     (session / "session.yaml").write_text(text.replace("trials:", f"{named}trials:"))
     assert watch(lab) == 2
     *lines, last = capsys.readouterr().out.splitlines()
     assert last == "monitor: 0 of 0 trials judged"
     assert len(lines) == len(TILTS)
-    assert all("refused: session.yaml: segments: " in line and "found 'joint_02'" in line for line in lines)
+    assert all("refused: session.yaml: markers: " in line and "found 'joint_02'" in line for line in lines)
 
 
 def test_a_model_that_does_not_fit_the_reference_is_refused_in_one_line(lab, capsys):
     write_model(lab / "arm.xml", "link_")
     assert watch(lab, "--out", str(lab / "other")) == 2
-    assert "error: session.yaml: segments: trial tilt_35_0: found 'unit_01', expected" in capsys.readouterr().err
+    assert "error: session.yaml: markers: trial tilt_35_0: found 'unit_01', expected" in capsys.readouterr().err
 
 
 def test_the_state_of_another_model_is_refused(lab, capsys):

@@ -136,7 +136,7 @@ def test_another_up_that_fits_better_is_named(model):
     def lines_with(of: list[Trial], up: tuple[float, ...]) -> list[str]:
         takes = [mounted(trial, base, up, 1e-6) for trial in of]
         arm, experiments, fit = to_identify_from(config, model, of)
-        return up_lines(arm, experiments, fit.segments, other_ups(takes))
+        return up_lines(arm, experiments, fit.markers, other_ups(takes))
 
     right = tuple(np.round(base.apply(-trial.gravity / STANDARD_GRAVITY)) + 0.0)
     assert lines_with([trial], right) == []

@@ -9,7 +9,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
-from trunkline.identification.evaluation.evaluation import Prediction, Replay, segment_positions
+from trunkline.identification.evaluation.evaluation import Prediction, Replay, marker_positions
 from trunkline.identification.parameters.per_session import model_in
 from trunkline.identification.simulate.experiment import Experiment, measured_pose, start_frames
 from trunkline.identification.simulate.pose_fit import fit_pose
@@ -48,7 +48,7 @@ def references(
 def hanging_still(experiments: list[Experiment], like: Replay, ended: list[Experiment]) -> Replay:
     """Every trial as the mean shape at rest, from the first frame to the last.
 
-    The shape is the mean over those trials of `ended` of the same kind to identify from, of where each segment was
+    The shape is the mean over those trials of `ended` of the same kind to identify from, of where each marker was
     measured last: in a static tilt its mean place, after a release or a curl where the arm came to rest. A kind of
     which there is none to identify from takes the mean over all kinds, a session without any the mean over all trials.
 
@@ -76,7 +76,7 @@ def start_pose(trials: list[Trial], experiments: list[Experiment], model: mujoco
     Trials at rest are left out: their start is fitted to the very frame that is compared.
     """
     pairs = [(trial, e) for trial, e in zip(trials, experiments, strict=True) if not is_static(e.kind)]
-    shapes = [segment_positions(model_in(trial.session, model), trial.segments, e.start) for trial, e in pairs]
+    shapes = [marker_positions(model_in(trial.session, model), trial.markers, e.start) for trial, e in pairs]
     positions = [np.broadcast_to(shape, e.positions.shape) for shape, (_, e) in zip(shapes, pairs, strict=True)]
     return Prediction(replace(like, positions=positions), [e for _, e in pairs])
 
@@ -86,7 +86,7 @@ def noise_floor(
 ) -> Prediction:
     """What noise and pose fit alone leave of every trial, in `poses` of its frames at most, evenly spread.
 
-    Joint angles are fitted to the measured segments of each, as for the pose from which a simulation starts. What
+    Joint angles are fitted to the measured markers of each, as for the pose from which a simulation starts. What
     remains is measurement noise that the low-pass left, what the smoothing of the pose fit takes from a sharp bend,
     and what no pose of this model can be. A simulation that is right in everything else is not expected to come
     nearer, though it may: the fit also weighs orientations and smoothness. These frames have no rate of change.
@@ -100,19 +100,19 @@ def _floor(trial: Trial, experiment: Experiment, model: mujoco.MjModel, count: i
     first = 0 if is_static(trial.experiment) else start_frames(trial)[0] + 1
     measured = np.flatnonzero(experiment.measured.any(axis=1))
     frames = measured[np.linspace(0, len(measured) - 1, min(count, len(measured))).round().astype(int)]
-    poses = [fit_pose(model, trial.segments, *measured_pose(trial, first + frame)).qpos for frame in frames]
+    poses = [fit_pose(model, trial.markers, *measured_pose(trial, first + frame)).qpos for frame in frames]
     parts = {name: getattr(experiment, name)[frames] for name in ("controls", "positions", "measured")}
-    shapes = np.array([segment_positions(model, trial.segments, qpos) for qpos in poses])
+    shapes = np.array([marker_positions(model, trial.markers, qpos) for qpos in poses])
     return replace(experiment, frame_step=0.0, **parts), shapes
 
 
 def _last_shape(experiment: Experiment) -> np.ndarray:
-    """Where each segment was measured last, of shapes at rest that follow each other their mean, m; nan where it never
+    """Where each marker was measured last, of shapes at rest that follow each other their mean, m; nan where it never
     was. Shape (S, 3)."""
     if is_stepwise(experiment.kind):
         return np.nanmean(np.where(experiment.measured[..., None], experiment.positions, np.nan), axis=0)
-    frames, segments = experiment.measured.shape
+    frames, markers = experiment.measured.shape
     last = frames - 1 - np.argmax(experiment.measured[::-1], axis=0)
-    shape = experiment.positions[last, np.arange(segments)]
+    shape = experiment.positions[last, np.arange(markers)]
     never = ~np.logical_or.reduce(experiment.measured, axis=0)
     return np.where(never[:, None], np.nan, shape)

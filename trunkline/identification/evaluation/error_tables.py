@@ -48,9 +48,9 @@ def trial_table(predictions: dict[str, Prediction]) -> pd.DataFrame:
     )
 
 
-def segment_table(predictions: dict[str, Prediction], segments: tuple[str, ...]) -> pd.DataFrame:
+def marker_table(predictions: dict[str, Prediction], markers: tuple[str, ...]) -> pd.DataFrame:
     """The position error along the arm, mean over frames, then over the trials of a kind: columns experiment, model,
-    segment, from_base_mm (in the straight arm), e_position_mm. Models have their `LABELS`."""
+    marker, from_base_mm (in the straight arm), e_position_mm. Models have their `LABELS`."""
     rows = []
     for model, prediction in predictions.items():
         replayed = prediction.replay
@@ -64,12 +64,12 @@ def segment_table(predictions: dict[str, Prediction], segments: tuple[str, ...])
             valid = np.isfinite(errors)
             means = np.where(valid, errors, 0).sum(axis=0) / np.where(valid.any(axis=0), valid.sum(axis=0), np.nan)
             for index in np.argsort(places):
-                rows.append((kind, LABELS[model], segments[index], places[index], means[index] * 1e3))
-    return pd.DataFrame(rows, columns=["experiment", "model", "segment", "from_base_mm", "e_position_mm"])
+                rows.append((kind, LABELS[model], markers[index], places[index], means[index] * 1e3))
+    return pd.DataFrame(rows, columns=["experiment", "model", "marker", "from_base_mm", "e_position_mm"])
 
 
 def _along(positions: np.ndarray, experiment: Experiment, length: float) -> np.ndarray:
-    """Mean distance of each segment from its measurement, m; nan for one that was never measured. Shape (S,)."""
+    """Mean distance of each marker from its measurement, m; nan for one that was never measured. Shape (S,)."""
     distances = np.linalg.norm(survived(positions, length) - experiment.positions, axis=-1)
     count = experiment.measured.sum(axis=0)
     return np.where(experiment.measured, distances, 0).sum(axis=0) / np.where(count, count, np.nan)

@@ -17,7 +17,7 @@ from trunkline.identification.simulate.loss import (
 )
 from trunkline.identification.simulate.resting import LAST, STILL
 from trunkline.identification.simulate.simulated_sessions import Sessions
-from trunkline.model.elements import segment_sites
+from trunkline.model.elements import marker_sites
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_static, is_stepwise
 from trunkline.recordings.trials.splits import SPLITS
 
@@ -30,9 +30,9 @@ STRUCTURE = "jnt_stiffness"  # any field: a population of one is the model itsel
 class Replay:
     """One model's simulation of every experiment, in their order.
 
-    positions: of the segments, m. Each (T, S, 3). length: of the model's straight arm, from the mount to the tip, m.
-    tip: which segment is the farthest from the base along the chain.
-    straight: where that straight arm has its segments, m. Shape (S, 3).
+    positions: of the markers, m. Each (T, S, 3). length: of the model's straight arm, from the mount to the tip, m.
+    tip: which marker is the farthest from the base along the chain.
+    straight: where that straight arm has its markers, m. Shape (S, 3).
     """
 
     positions: list[np.ndarray]
@@ -69,26 +69,26 @@ class Prediction:
 
 
 def replay(
-    model: mujoco.MjModel, experiments: list[Experiment], segments: tuple[str, ...], step_factor: float = 1.0
+    model: mujoco.MjModel, experiments: list[Experiment], markers: tuple[str, ...], step_factor: float = 1.0
 ) -> Replay:
     """Simulate `experiments` with `model` as it is, its time step (times a factor) fitted to divide a frame evenly."""
-    simulated = Sessions(model, experiments, segments, step_factor).simulate(
+    simulated = Sessions(model, experiments, markers, step_factor).simulate(
         lambda _, variant: {STRUCTURE: np.array(getattr(variant, STRUCTURE))[None]}
     )
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     length = float(np.linalg.norm(data.site("tip").xpos - data.site("base_center").xpos))
-    tip = int(np.argmax(model.site_bodyid[segment_sites(model, segments)]))
-    straight = segment_positions(model, segments, model.qpos0)
+    tip = int(np.argmax(model.site_bodyid[marker_sites(model, markers)]))
+    straight = marker_positions(model, markers, model.qpos0)
     return Replay([positions[0] for positions in simulated.positions], length, tip, straight)
 
 
-def segment_positions(model: mujoco.MjModel, segments: tuple[str, ...], qpos: np.ndarray) -> np.ndarray:
-    """Where `model` has its segments at angles `qpos` (n,) of its first hinges, the arm's, m. Shape (S, 3)."""
+def marker_positions(model: mujoco.MjModel, markers: tuple[str, ...], qpos: np.ndarray) -> np.ndarray:
+    """Where `model` has its markers at angles `qpos` (n,) of its first hinges, the arm's, m. Shape (S, 3)."""
     data = mujoco.MjData(model)
     data.qpos[: len(qpos)] = qpos
     mujoco.mj_kinematics(model, data)
-    return data.site_xpos[segment_sites(model, segments)]
+    return data.site_xpos[marker_sites(model, markers)]
 
 
 def scores(
@@ -98,7 +98,7 @@ def scores(
 
     `by_experiment` has the same for every kind; shapes at rest that follow each other have two errors of the tip more;
     `without_repaired` where `ingest` repaired some of the split's trials, `repaired` of them. Where a simulation
-    diverged, its segments count as the arm's length away along every axis.
+    diverged, its markers count as the arm's length away along every axis.
     """
     rows = trial_errors(Prediction(replayed, experiments), loss, weights)
     table: dict[str, dict] = {}
@@ -140,7 +140,7 @@ def halved_step(whole: Prediction, halved: Prediction) -> dict:
     """By which share of itself half the time step moves E_internal, per split, and the tip error (`tip`).
 
     Measured errors hardly change if those of the step hide beside others, hence also the largest distance between the
-    two simulations of any segment, and of the tip, in mm.
+    two simulations of any marker, and of the tip, in mm.
     """
     before, after = whole.scores(), halved.scores()
 
@@ -202,7 +202,7 @@ def errors_of(
 
 
 def about_rest(positions: np.ndarray, experiment: Experiment, tip: int, length: float) -> dict[str, float]:
-    """What is left of the errors of a swing, simulated as `positions` (T, S, 3) m, once each segment is moved by where
+    """What is left of the errors of a swing, simulated as `positions` (T, S, 3) m, once each marker is moved by where
     it rests at the end of this trial: how it swings, wherever it comes to rest. And by which share of itself the tip's
     speed is off in `LATE`, if it has any there. Nothing of a trial that does not come to rest.
     """

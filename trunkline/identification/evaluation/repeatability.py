@@ -19,14 +19,14 @@ FEWEST = 3  # trials that end alike, below which they say nothing
 def repeatability(trials: list[Trial], tip: int) -> dict[str, dict]:
     """The scatter of the shapes in which trials of a kind end at rest, by kind; without a kind that never repeats.
 
-    A trial's distance is that of its segments from their mean place over the trials that end alike, enlarged by
+    A trial's distance is that of its markers from their mean place over the trials that end alike, enlarged by
     √(n / (n - 1)), as the mean is drawn towards each of the n.
 
     Args:
-        trials: that track the same segments. tip: which of these is the farthest from the base along the chain.
+        trials: that track the same markers. tip: which of these is the farthest from the base along the chain.
 
     Returns:
-        `mean_mm` over segments and trials, `tip_mm` of the tip alone, `tip_worst_mm` of the worst trial, `trials`
+        `mean_mm` over markers and trials, `tip_mm` of the tip alone, `tip_worst_mm` of the worst trial, `trials`
         that end alike with others, `groups` of them.
     """
     table = {}

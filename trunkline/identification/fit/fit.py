@@ -53,14 +53,14 @@ class Method:
 class Fit:
     """What is fitted to trials, and how.
 
-    segments: names of those that the trials track.
+    markers: names of those that the trials track.
     parameters: scalars of the whole arm and their ranges.
     per_joint: what then gets a factor for each joint, "stiffness" or "damping".
     loss: "distances" (the paper's) or "positions".
     rest: the shape in which the arm hangs, whatever its stiffness; None where it is as the model says.
     """
 
-    segments: tuple[str, ...]
+    markers: tuple[str, ...]
     parameters: dict[str, Bounds]
     per_joint: tuple[str, ...]
     loss: str
@@ -71,5 +71,5 @@ class Fit:
     def problem(self, model: mujoco.MjModel, experiments: list[Experiment], step_factor: float = 1.0) -> Problem:
         """The search for the scalars, from those of `model`."""
         return Problem(
-            model, experiments, self.segments, self.parameters, self.loss, self.weights, step_factor, rest=self.rest
+            model, experiments, self.markers, self.parameters, self.loss, self.weights, step_factor, rest=self.rest
         )

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from trunkline.compute.progress import progress
-from trunkline.identification.evaluation.evaluation import segment_positions
+from trunkline.identification.evaluation.evaluation import marker_positions
 from trunkline.identification.fit.certainty import Certainty, bootstrap, certainty
 from trunkline.identification.fit.fit import Fit, Refinement
 from trunkline.identification.fit.influence import Influence, influence
@@ -163,7 +163,7 @@ def _reweigh(problem: Problem, result: SearchResult, fit: Fit, label: str) -> tu
     surrogate is made anew where its prediction of the losses was wrong.
     """
     kinds, settings = [e.kind for e in problem.experiments], fit.method.polish
-    straight = segment_positions(problem.model, problem.segments, problem.model.qpos0)
+    straight = marker_positions(problem.model, problem.markers, problem.model.qpos0)
     bends = np.array([np.square(e.positions - straight).sum(axis=2)[e.measured].mean() for e in problem.experiments])
     around = made = surrogate(problem, result.vector, result.linear.residuals if result.linear else None)
     made_at = result.vector

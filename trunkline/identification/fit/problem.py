@@ -47,7 +47,7 @@ class Problem:
 
     model: mujoco.MjModel
     experiments: list[Experiment]
-    segments: tuple[str, ...]
+    markers: tuple[str, ...]
     parameters: dict[str, Bounds]
     loss: str
     weights: LossWeights
@@ -65,7 +65,7 @@ class Problem:
     def __post_init__(self):
         if self.trial_weights is None:
             self.trial_weights = np.ones(len(self.experiments))
-        self._sessions = Sessions(self.model, self.experiments, self.segments, self.step_factor)
+        self._sessions = Sessions(self.model, self.experiments, self.markers, self.step_factor)
         self._last: tuple[np.ndarray, list[np.ndarray]] | None = None  # candidate that was alone, and where it rests
         self.units = int(unit_of_hinge(self.model).max()) + 1
 

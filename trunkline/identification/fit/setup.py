@@ -28,7 +28,7 @@ def set_up(
     if config.markers == "measured":
         model = with_measured_markers(model, [t for t in trials if t.experiment in config.experiments])
     experiments = [prepare(trial, model, config.frames, config.command_delay) for trial in trials]
-    fit = fit_of(config, trials[0].segments)
+    fit = fit_of(config, trials[0].markers)
     names = names_in(model, config.parameters)
     fit.parameters = fit.parameters | {name: config.parameters[shared] for name, shared in names.items()}
     if config.rest_shape == "measured" and (others := other_sessions(trials)):
@@ -36,14 +36,14 @@ def set_up(
         raise InputError(f"rest_shape: measured: found {1 + len(others)} sessions, {expected}")
     if config.rest_shape == "measured":
         fitted = [e for e in experiments if e.kind in config.experiments]
-        fit.rest = resting_shape(model, fitted, fit.segments)
+        fit.rest = resting_shape(model, fitted, fit.markers)
     return model, experiments, fit
 
 
-def fit_of(config: IdentificationSettings, segments: tuple[str, ...]) -> Fit:
+def fit_of(config: IdentificationSettings, markers: tuple[str, ...]) -> Fit:
     """What a stage's settings ask for, with the shape at rest that the model has."""
     return Fit(
-        segments, config.parameters, tuple(config.per_joint), config.loss.kind, weights=config.loss, method=config
+        markers, config.parameters, tuple(config.per_joint), config.loss.kind, weights=config.loss, method=config
     )
 
 

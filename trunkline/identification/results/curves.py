@@ -11,7 +11,7 @@ from trunkline.identification.fit.identify import Identification
 from trunkline.identification.simulate.loss import distances
 
 ERROR_CUTOFF = 6.0  # Hz, of the low-pass over error curves, as the paper filters its figure
-SHOWN_SEGMENTS = 5
+SHOWN_MARKERS = 5
 
 
 def convergence_table(identification: Identification) -> pd.DataFrame:
@@ -29,7 +29,7 @@ def error_curves(predictions: dict[str, Prediction]) -> pd.DataFrame:
     """Over time, mean over trials: columns time_s, model, position_error_mm, velocity_error_mm_s, tip_error_mm.
 
     The first two are those of the paper's figure, of distances from the base and of their rate of change, mean over
-    segments; the third is how far the tip is from where it was measured. All are low-pass filtered.
+    markers; the third is how far the tip is from where it was measured. All are low-pass filtered.
     """
     experiments = next(iter(predictions.values())).experiments
     frames = min(e.frames for e in experiments)
@@ -62,36 +62,36 @@ def _smooth(low_pass: np.ndarray, errors: np.ma.MaskedArray) -> np.ndarray:
     return sosfiltfilt(low_pass, np.abs(errors).mean(axis=(1, 2)).filled(0.0))
 
 
-def distance_table(predictions: dict[str, Prediction], segments: tuple[str, ...]) -> pd.DataFrame:
-    """Distances from the base of a few segments in one trial: columns time_s, segment, source, distance_mm.
+def distance_table(predictions: dict[str, Prediction], markers: tuple[str, ...]) -> pd.DataFrame:
+    """Distances from the base of a few markers in one trial: columns time_s, marker, source, distance_mm.
 
     Args:
         predictions: of that trial alone.
     """
     (experiment,) = next(iter(predictions.values())).experiments
-    outer = len(segments) // 3  # nearer the base, distances hardly change
-    chosen = np.unique(np.linspace(outer, len(segments) - 1, SHOWN_SEGMENTS).astype(int))
+    outer = len(markers) // 3  # nearer the base, distances hardly change
+    chosen = np.unique(np.linspace(outer, len(markers) - 1, SHOWN_MARKERS).astype(int))
     sources = {"measured": experiment.positions} | {LABELS[m]: p.replay.positions[0] for m, p in predictions.items()}
     time = np.arange(experiment.frames) * experiment.frame_step
     return pd.concat(
         pd.DataFrame(
-            {"time_s": time, "segment": segments[s], "source": source, "distance_mm": distances(positions)[:, s] * 1e3}
+            {"time_s": time, "marker": markers[s], "source": source, "distance_mm": distances(positions)[:, s] * 1e3}
         )
         for source, positions in sources.items()
         for s in chosen
     )
 
 
-def shape_table(predictions: dict[str, Prediction], segments: tuple[str, ...]) -> pd.DataFrame:
+def shape_table(predictions: dict[str, Prediction], markers: tuple[str, ...]) -> pd.DataFrame:
     """Of each trial the shape furthest from the one that it begins with, in the plane of the tilt: columns trial,
-    tilt_deg, source, segment, x_mm, z_mm. Of a release that is its first swing to the other side."""
+    tilt_deg, source, marker, x_mm, z_mm. Of a release that is its first swing to the other side."""
     rows = []
     for index, experiment in enumerate(next(iter(predictions.values())).experiments):
         shapes = {LABELS[model]: p.replay.positions[index] for model, p in predictions.items()}
         sources = {"measured": experiment.positions} | shapes
-        from_first = np.linalg.norm(experiment.positions - experiment.positions[0], axis=2)  # (T, segments)
+        from_first = np.linalg.norm(experiment.positions - experiment.positions[0], axis=2)  # (T, markers)
         shown = int(np.nan_to_num(from_first).max(axis=1).argmax())
         for source, positions in sources.items():
-            for segment, (x, _, z) in zip(segments, positions[shown] * 1e3, strict=True):
-                rows.append((experiment.name, np.degrees(tilt_of_gravity(experiment.gravity)), source, segment, x, z))
-    return pd.DataFrame(rows, columns=["trial", "tilt_deg", "source", "segment", "x_mm", "z_mm"])
+            for marker, (x, _, z) in zip(markers, positions[shown] * 1e3, strict=True):
+                rows.append((experiment.name, np.degrees(tilt_of_gravity(experiment.gravity)), source, marker, x, z))
+    return pd.DataFrame(rows, columns=["trial", "tilt_deg", "source", "marker", "x_mm", "z_mm"])

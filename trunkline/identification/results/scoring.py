@@ -96,7 +96,7 @@ def _evaluated(predictions: dict[str, Prediction], trials: list[Trial]) -> dict:
 def _predictions(
     models, model, trials: list[Trial], experiments: list[Experiment], ended, floor_poses: int = FLOOR_POSES
 ) -> dict[str, Prediction]:
-    """Of all `models`, and what stands beside them; `model` is the one to whose segments poses are fitted."""
+    """Of all `models`, and what stands beside them; `model` is the one to whose markers poses are fitted."""
     predictions = predict(models, trials, experiments, model)
     like = next(iter(predictions.values())).replay
     return predictions | references(trials, experiments, model, like, ended, floor_poses)
@@ -111,7 +111,7 @@ def predict(
     for model in models.values():
         if id(model) not in predictions:
             started = own_starts(experiments, trials, fitted, model)
-            predictions[id(model)] = Prediction(replay(model, started, trials[0].segments), started)
+            predictions[id(model)] = Prediction(replay(model, started, trials[0].markers), started)
     return {name: predictions[id(model)] for name, model in models.items()}
 
 

@@ -1,4 +1,4 @@
-"""Trials at rest: where candidates of a model have their segments, by the statics."""
+"""Trials at rest: where candidates of a model have their markers, by the statics."""
 
 import copy
 from typing import NamedTuple
@@ -17,7 +17,7 @@ from trunkline.model.statics.restart import actuated_from
 
 
 class Shapes(NamedTuple):
-    """Of every trial its segments for C candidates, m, NaN where one finds no rest. Each (C, T, S, 3).
+    """Of every trial its markers for C candidates, m, NaN where one finds no rest. Each (C, T, S, 3).
 
     angles: of the arm's hinges for the first candidate, rad, NaN likewise. Each (T, n). iterations: of Newton's method.
     """
@@ -38,7 +38,7 @@ def shapes_at_rest(
 
     Args:
         fields: of the candidates, as `parameters.candidate_fields`.
-        sites: numbers of the segments' sites. Shape (S,).
+        sites: numbers of the markers' sites. Shape (S,).
     """
     count = len(next(iter(fields.values())))
     candidate_model, data = copy.copy(model), mujoco.MjData(model)

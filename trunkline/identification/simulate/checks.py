@@ -1,4 +1,4 @@
-"""Whether trials are of this arm: its segments and tendons, each where its name says and pulled as far as it says."""
+"""Whether trials are of this arm: its markers and tendons, each where its name says and pulled as far as it says."""
 
 import mujoco
 import numpy as np
@@ -34,7 +34,7 @@ def check_trials(trials: list[Trial], model: mujoco.MjModel) -> None:
     """
     for trial in trials:
         check_names(trial, model)
-    trials = [trial for trial in trials if len(trial.segments) > 1]  # of a tip alone, many shapes lead there
+    trials = [trial for trial in trials if len(trial.markers) > 1]  # of a tip alone, many shapes lead there
     for trial in trials:
         if trial.tendons:
             kind = EXPERIMENTS[trial.experiment]
@@ -157,7 +157,7 @@ def _agreement(pulls: np.ndarray, shorter: np.ndarray) -> float:
 def _path_lengths(trial: Trial, model: mujoco.MjModel, frame: int) -> np.ndarray:
     """Of the model's tendons through the pose of a frame, m. Shape (nt,)."""
     data = mujoco.MjData(model)
-    pose = fit_pose(model, trial.segments, *measured_pose(trial, frame)).qpos
+    pose = fit_pose(model, trial.markers, *measured_pose(trial, frame)).qpos
     data.qpos[: len(pose)] = pose
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)

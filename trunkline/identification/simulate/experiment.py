@@ -22,7 +22,7 @@ SWAY_FRAMES = 8  # between the poses that tell how a hand moves the arm that it 
 LOOK_BACK = 30  # frames in which to look for a start pose that enough cameras saw
 GEOMETRY = ("jnt_pos", "jnt_axis", "body_pos", "body_quat", "site_pos")
 SAME_PLACE = 1e-5  # m, and of a quaternion; what MJCF rounds away is less
-MEASURED_SHARE = 0.6  # of the segments that must be measured in the frame of the start pose
+MEASURED_SHARE = 0.6  # of the markers that must be measured in the frame of the start pose
 
 
 @dataclass
@@ -39,7 +39,7 @@ class Experiment:
         lead: s from the start to the first frame.
         controls: commanded tendon lengths, m, held from one frame to the next: row 0 from the start to the first
             frame, row t from frame t - 1 to frame t. Shape (T, nu).
-        positions: measured segments, m, base frame. Shape (T, S, 3).
+        positions: measured markers, m, base frame. Shape (T, S, 3).
         measured: where they count. Shape (T, S).
         fit: how well the start matches the measurement.
         repaired: whether `ingest` changed anything in the trial.
@@ -84,7 +84,7 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
         command_delay: s from a logged command to the motor that acts on it.
 
     Raises:
-        InputError: if its segments and tendons are not those of the model, or too little was measured.
+        InputError: if its markers and tendons are not those of the model, or too little was measured.
     """
     check_names(trial, model)
     static, stepwise = is_static(trial.experiment), is_stepwise(trial.experiment)
@@ -184,7 +184,7 @@ def measured_pose(trial: Trial, frame: int) -> tuple[np.ndarray, np.ndarray | No
 
 
 def _fit_frame(trial: Trial, model: mujoco.MjModel, frame: int) -> PoseFit:
-    return fit_pose(model, trial.segments, *measured_pose(trial, frame))
+    return fit_pose(model, trial.markers, *measured_pose(trial, frame))
 
 
 def _velocity(trial: Trial, model: mujoco.MjModel, frame: int) -> np.ndarray:
@@ -207,12 +207,12 @@ def _extrapolated(trial: Trial, model: mujoco.MjModel, frame: int) -> tuple[np.n
 
 
 def _measured_frame(trial: Trial, latest: int) -> int:
-    """The last frame up to `latest` in which enough segments were measured."""
+    """The last frame up to `latest` in which enough markers were measured."""
     for frame in range(latest, max(latest - LOOK_BACK, -1), -1):
         if trial.measured[frame].mean() >= MEASURED_SHARE:
             return frame
     raise InputError(
-        f"trial {trial.name}: found {int(trial.measured[latest].sum())} of {len(trial.segments)} segments measured at "
+        f"trial {trial.name}: found {int(trial.measured[latest].sum())} of {len(trial.markers)} markers measured at "
         f"its start, {trial.time[latest]:.2f} s, expected {MEASURED_SHARE:.0%} of them"
     )
 
@@ -229,12 +229,12 @@ def commanded_lengths(trial: Trial, model: mujoco.MjModel) -> np.ndarray:
 
 
 def check_names(trial: Trial, model: mujoco.MjModel) -> None:
-    """Refuse a trial whose segments or tendons the model does not have, or that has only some of its tendons: those
+    """Refuse a trial whose markers or tendons the model does not have, or that has only some of its tendons: those
     that it leaves out may have pulled."""
     sites = [model.site(i).name for i in range(model.nsite)]
     units = [name.removesuffix("_center") for name in sites if name.endswith("_center") and name != "base_center"]
     tendons = [model.tendon(i).name for i in cables(model)]
-    for key, used, names in (("segments", trial.segments, units), ("tendons", trial.tendons, tendons)):
+    for key, used, names in (("markers", trial.markers, units), ("tendons", trial.tendons, tendons)):
         unknown = [name for name in used if name not in names]
         if unknown:
             valid = f"names of the model: {', '.join(names)}" if names else "none, as the arm has none"

@@ -1,4 +1,4 @@
-"""Trials in motion: where candidates of a model have their segments, all candidates times all trials as one batch."""
+"""Trials in motion: where candidates of a model have their markers, all candidates times all trials as one batch."""
 
 import copy
 from itertools import pairwise
@@ -30,7 +30,7 @@ class InMotion:
     Args:
         trials: by their numbers, longest first, so that those still running are a prefix.
         slack: whether all cables are slack in all of them, or in none: the former are cheaper.
-        sites: numbers of the segments' sites. Shape (S,).
+        sites: numbers of the markers' sites. Shape (S,).
         step_factor: as `Population`.
     """
 
@@ -51,7 +51,7 @@ class InMotion:
         return self.__dict__ | {"_batches": {}}  # a worker makes its own
 
     def shapes(self, fields: Fields, numbers: list[int], rough: bool = False) -> tuple[list[np.ndarray], int]:
-        """Positions of C candidates' segments in trials `numbers`, in the order of `trials`, m, NaN where a candidate
+        """Positions of C candidates' markers in trials `numbers`, in the order of `trials`, m, NaN where a candidate
         makes MuJoCo warn; and how many steps that took.
 
         First from each trial's start to its first frame, then frame by frame. Each (C, T, S, 3).

@@ -1,6 +1,6 @@
 """The paper's losses and error measures, for a whole population at once.
 
-Shapes: C candidates, T frames, S tracked segments without the base. Distances are from the base frame's origin,
+Shapes: C candidates, T frames, S markers without the base. Distances are from the base frame's origin,
 positions in the base frame, all in metres. `measured` (T, S) is False where there is nothing to compare with.
 """
 
@@ -37,7 +37,7 @@ def huber(residual: np.ndarray, delta: float) -> np.ndarray:
 
 
 def distances(positions: np.ndarray) -> np.ndarray:
-    """d_i, the distance of each segment from the base: (..., S, 3) → (..., S)."""
+    """d_i, the distance of each marker from the base: (..., S, 3) → (..., S)."""
     return np.linalg.norm(positions, axis=-1)
 
 
@@ -47,7 +47,7 @@ def distance_residuals(
     """Residuals r of the paper's loss L_sum, so that L_sum = ½ Σ r².
 
     L_sum is the mean over frames of w_pos L_pos,t + w_vel L_vel,t, where L_pos,t is the mean over the measured
-    segments of Huber((d_sim - d_real) / (|d_real| + ε)), L_vel,t the same of the change of d from frame to
+    markers of Huber((d_sim - d_real) / (|d_real| + ε)), L_vel,t the same of the change of d from frame to
     frame, and L_vel of the first frame is 0. For one frame it is the static loss L, times w_pos.
 
     Args:
@@ -67,7 +67,7 @@ def position_residuals(
     """As `distance_residuals`, with positions in the base frame in place of distances from the base.
 
     Distances hardly change while an arm swings gently to and fro; positions do. A Huber loss is then of the
-    length of a vector, relative to the segment's distance from the base, or to the root mean square of its steps:
+    length of a vector, relative to the marker's distance from the base, or to the root mean square of its steps:
     relative to each measured step, the slowest count most, and their noise biases the motors' gains.
     """
     pairs = (measured[1:] & measured[:-1])[..., None]
@@ -129,7 +129,7 @@ def internal_error(simulated: np.ndarray, real: np.ndarray, measured: np.ndarray
 
 
 def position_error(simulated: np.ndarray, real: np.ndarray, measured: np.ndarray) -> np.ndarray:
-    """Mean distance between simulated and measured segments in the base frame, in m. (..., T, S, 3) → (...)."""
+    """Mean distance between simulated and measured markers in the base frame, in m. (..., T, S, 3) → (...)."""
     return np.linalg.norm(simulated - real, axis=-1)[..., measured].mean(axis=-1)
 
 

@@ -1,15 +1,15 @@
-"""Where markers sit beside their segments' axes: what poses that no model of forces has touched tell."""
+"""Where markers sit beside the arm's axis, from measured poses and the arm's geometry alone, without any forces."""
 
 import mujoco
 import numpy as np
 
 from trunkline.identification.simulate.experiment import measured_pose, start_frames
 from trunkline.identification.simulate.pose_fit import POSITION_SIGMA, PoseProblem, fit_pose
-from trunkline.model.elements import segment_sites
+from trunkline.model.elements import marker_sites
 from trunkline.recordings.trials.splits import IDENTIFY
 from trunkline.recordings.trials.trial import Trial
 
-MARKER_SIGMA = 2e-3  # m, how far beside its segment's axis a marker is expected; holds back what no pose tells
+MARKER_SIGMA = 2e-3  # m, how far beside the arm's axis a marker is expected; a prior where poses leave it open
 ROUNDS = 3  # of fitting poses and moving markers; a round solves for both, but for what is not linear
 
 
@@ -17,7 +17,7 @@ def with_measured_markers(model: mujoco.MjModel, trials: list[Trial]) -> mujoco.
     """A copy of `model` whose tracked sites are where the trials to identify from saw them in their start poses."""
     model = model.__copy__()
     fitted = [trial for trial in trials if trial.split == IDENTIFY]
-    sites = segment_sites(model, fitted[0].segments)
+    sites = marker_sites(model, fitted[0].markers)
     model.site_sameframe[sites] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE  # else a site at its body's origin stays there
     moved = np.zeros((len(sites), 3))
     straight = model.site_pos[sites].copy()
@@ -38,8 +38,8 @@ def _offsets(model: mujoco.MjModel, trials: list[Trial], moved: np.ndarray) -> n
     right = -moved.ravel() / MARKER_SIGMA**2
     for trial in trials:
         pose = measured_pose(trial, start_frames(trial)[1])
-        problem = PoseProblem(model, trial.segments, *pose)
-        jacobian, residual = problem.linearise(fit_pose(model, trial.segments, *pose).qpos, problem.measured)
+        problem = PoseProblem(model, trial.markers, *pose)
+        jacobian, residual = problem.linearise(fit_pose(model, trial.markers, *pose).qpos, problem.measured)
         design = np.zeros((len(residual), size))
         for index, rows in zip(problem.measured, problem.position_rows(), strict=True):
             body = model.site_bodyid[problem.sites[index]]

@@ -10,13 +10,13 @@ from trunkline.identification.parameters.parameters import Fields
 from trunkline.identification.simulate.at_rest import shapes_at_rest
 from trunkline.identification.simulate.experiment import Experiment
 from trunkline.identification.simulate.in_motion import InMotion
-from trunkline.model.elements import arm_hinges, segment_sites
+from trunkline.model.elements import arm_hinges, marker_sites
 from trunkline.recordings.trials.experiments import is_static
 
 
 @dataclass
 class Simulated:
-    """Segment positions of every trial, in the order of the experiments.
+    """Marker positions of every trial, in the order of the experiments.
 
     positions: per trial (C, T, S, 3), m; not finite from where a candidate diverged.
     diverged: which candidates left the physics in any trial, or made MuJoCo warn. Shape (C,).
@@ -52,7 +52,7 @@ class _PieceResult:
 
 
 class Population:
-    """Simulates candidates of one model on a fixed list of experiments of the same segments.
+    """Simulates candidates of one model on a fixed list of experiments of the same markers.
 
     Args:
         model: the model that candidates start from. Its step is fitted to divide a frame evenly.
@@ -60,10 +60,10 @@ class Population:
     """
 
     def __init__(
-        self, model: mujoco.MjModel, experiments: list[Experiment], segments: tuple[str, ...], step_factor: float = 1.0
+        self, model: mujoco.MjModel, experiments: list[Experiment], markers: tuple[str, ...], step_factor: float = 1.0
     ):
         self._model = model
-        self._sites = segment_sites(model, segments)
+        self._sites = marker_sites(model, markers)
         self._experiments = experiments
         # longest first, as `InMotion` has them
         order = sorted(range(len(experiments)), key=lambda i: -experiments[i].frames)

@@ -1,4 +1,4 @@
-"""Joint angles that put the model's segments where motion capture saw them."""
+"""Joint angles that put the model's markers where motion capture saw them."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ import numpy as np
 from mujoco import minimize
 
 from trunkline.frames import rotation_from_wxyz
-from trunkline.model.elements import arm_hinges, segment_sites
+from trunkline.model.elements import arm_hinges, marker_sites
 
 POSITION_SIGMA = 0.5e-3  # m, what a tracked position is trusted to
 ROTATION_SIGMA = np.radians(1.0)  # what a tracked orientation is trusted to, axis misalignment included
@@ -16,15 +16,15 @@ LIMIT_GIVE = 1.5  # a limit is soft: units give when they are pressed on each ot
 UNLIMITED = 2 * np.pi  # rad, of hinges without limits
 STEP_TOLERANCE = 1e-5  # relative step at convergence
 GRADIENT_TOLERANCE = 1e-3  # of the cost in units of sigma², with columns of unit length
-AT_A_TIME = 3  # segments: half the time of one by one, to the same poses
+AT_A_TIME = 3  # markers: half the time of one by one, to the same poses
 
 
 @dataclass
 class PoseFit:
     """Joint angles of one frame.
 
-    qpos: of the arm's hinges, rad, shape (n,). residuals: distance of each segment from its measurement, m, shape (S,).
-    iterations: of the last descent, on all segments. converged: whether it ended before they ran out.
+    qpos: of the arm's hinges, rad, shape (n,). residuals: distance of each marker from its measurement, m, shape (S,).
+    iterations: of the last descent, on all markers. converged: whether it ended before they ran out.
     """
 
     qpos: np.ndarray
@@ -36,26 +36,26 @@ class PoseFit:
 class PoseProblem:
     """Residuals of joint angles: positions, orientations, and the change of bend from joint to joint.
 
-    The last term decides what the tracked segments leave open (units without markers) and is weak beside them.
+    The last term decides what the markers leave open (units without any) and is weak beside them.
 
     Args:
-        segments: names of the tracked bodies, whose frames are the sites `<name>_center`.
+        markers: names of the tracked bodies, whose frames are the sites `<name>_center`.
         positions: m, base frame. Shape (S, 3); rows that are not finite are left out.
         quaternions: wxyz. Shape (S, 4), or None for positions alone.
 
     Attributes:
-        measured: indices of the measured segments, from the base on.
+        measured: indices of the measured markers, from the base on.
     """
 
     def __init__(
         self,
         model: mujoco.MjModel,
-        segments: tuple[str, ...],
+        markers: tuple[str, ...],
         positions: np.ndarray,
         quaternions: np.ndarray | None = None,
     ):
         self.model, self.data = model, mujoco.MjData(model)
-        self.sites = segment_sites(model, segments)
+        self.sites = marker_sites(model, markers)
         self.positions = positions
         self._targets = None if quaternions is None else rotation_from_wxyz(quaternions).as_matrix()
         measured = np.flatnonzero(np.isfinite(positions).all(axis=1))
@@ -67,9 +67,9 @@ class PoseProblem:
         self._smooth = rows / BEND_CHANGE_SIGMA
 
     def linearise(self, qpos: np.ndarray, measured: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Jacobian (R, n) and residuals (R,) in units of sigma, against the segments `measured`, by the arm's n angles.
+        """Jacobian (R, n) and residuals (R,) in units of sigma, against the markers `measured`, by the arm's n angles.
 
-        First the changes of bend; then of every segment three rows for its position, and three for its orientation
+        First the changes of bend; then of every marker three rows for its position, and three for its orientation
         if it has one.
         """
         model, data = self.model, self.data
@@ -90,23 +90,23 @@ class PoseProblem:
         return np.concatenate(rows), np.concatenate(residuals)
 
     def position_rows(self) -> np.ndarray:
-        """Which residuals are those of the positions of all segments `measured`, M of them. Shape (M, 3)."""
+        """Which residuals are those of the positions of all markers `measured`, M of them. Shape (M, 3)."""
         each = 3 if self._targets is None else 6
         return len(self._smooth) + each * np.arange(len(self.measured))[:, None] + np.arange(3)
 
 
 def fit_pose(
     model: mujoco.MjModel,
-    segments: tuple[str, ...],
+    markers: tuple[str, ...],
     positions: np.ndarray,
     quaternions: np.ndarray | None = None,
     max_iterations: int = 300,
 ) -> PoseFit:
     """Least squares over the residuals of a `PoseProblem`, whose arguments these are, by `mujoco.minimize`."""
-    problem = PoseProblem(model, segments, positions, quaternions)
+    problem = PoseProblem(model, markers, positions, quaternions)
     measured, hinges, angles = problem.measured, problem.hinges, problem.angles
     qpos = np.zeros(angles)
-    # From the base on, a few segments at a time, each new joint first bent as the one before it: a coil of more
+    # From the base on, a few markers at a time, each new joint first bent as the one before it: a coil of more
     # than one turn has many wrong answers near the straight arm, and none on this way.
     for count in [*range(AT_A_TIME, len(measured), AT_A_TIME), len(measured)]:
         free = model.jnt_bodyid[:angles] <= model.site_bodyid[problem.sites[measured[count - 1]]]
@@ -121,7 +121,7 @@ def fit_pose(
 def _descend(
     problem: PoseProblem, qpos: np.ndarray, measured: np.ndarray, free: np.ndarray, max_iterations: int
 ) -> PoseFit:
-    """Least squares over the hinges `free` (n,), against segments `measured`, from `qpos`, within the limits' give."""
+    """Least squares over the hinges `free` (n,), against markers `measured`, from `qpos`, within the limits' give."""
     model = problem.model
     cache: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
 

@@ -71,7 +71,7 @@ def spring_references(fields: Fields, model: mujoco.MjModel, rest: RestShape) ->
     return references
 
 
-def resting_shape(model: mujoco.MjModel, experiments: list[Experiment], segments: tuple[str, ...]) -> RestShape:
+def resting_shape(model: mujoco.MjModel, experiments: list[Experiment], markers: tuple[str, ...]) -> RestShape:
     """The mean shape at the ends of the releases to identify from; those that still move have no say.
 
     Raises:
@@ -94,5 +94,5 @@ def resting_shape(model: mujoco.MjModel, experiments: list[Experiment], segments
     if np.ptp(gravities, axis=0).max() > SAME_GRAVITY:
         reason = "found releases under different gravity angles"
         raise InputError(f"rest_shape: {reason}, expected the same for all, or rest_shape: unchanged")
-    pose = fit_pose(model, segments, np.mean(shapes, axis=0)).qpos
+    pose = fit_pose(model, markers, np.mean(shapes, axis=0)).qpos
     return rest_shape(model, pose, np.mean(gravities, axis=0))

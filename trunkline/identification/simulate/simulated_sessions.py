@@ -15,13 +15,13 @@ class Sessions:
     """A `Population` for each session of the experiments; arguments as there."""
 
     def __init__(
-        self, model: mujoco.MjModel, experiments: list[Experiment], segments: tuple[str, ...], step_factor: float = 1.0
+        self, model: mujoco.MjModel, experiments: list[Experiment], markers: tuple[str, ...], step_factor: float = 1.0
     ):
         self._parts = []
         for session in dict.fromkeys(e.session for e in experiments):
             places = [i for i, e in enumerate(experiments) if e.session == session]
             arm = model_in(session, model)
-            population = Population(arm, [experiments[i] for i in places], segments, step_factor)
+            population = Population(arm, [experiments[i] for i in places], markers, step_factor)
             self._parts.append((session, arm, places, population))
 
     def simulate(

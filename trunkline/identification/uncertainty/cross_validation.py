@@ -37,7 +37,7 @@ def errors_left_out(
         title = f"{label} fold {fold + 1} of {folds}"
         refit = identify(title, result.models["coarse"], others, replace(fit, method=near))
         models = {name: refit.models[name] for name in ("coarse", "identified")}
-        replays = {name: replay(model, left_out, fit.segments) for name, model in models.items()}
+        replays = {name: replay(model, left_out, fit.markers) for name, model in models.items()}
         tables.append(trial_table({name: Prediction(replayed, left_out) for name, replayed in replays.items()}))
     return pd.concat(tables, ignore_index=True)
 

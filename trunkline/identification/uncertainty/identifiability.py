@@ -87,7 +87,7 @@ def described_lines(model: mujoco.MjModel, experiments: list[Experiment], fit: F
     A released arm swings about its straight shape, and the described one with a guess of damping: that a straight arm
     is nearer to a release does not mean that anything is described wrongly.
     """
-    replayed = replay(model, experiments, fit.segments)
+    replayed = replay(model, experiments, fit.markers)
     described, plain = (Prediction(simulated, experiments) for simulated in (replayed, straight(experiments, replayed)))
     off, still = described.overall(), plain.overall()
     description = f"as described, it is {off['e_position_mm']:.3g} mm off ({off['e_position_pct']:.2g} % of length)"

@@ -32,7 +32,7 @@ def trial_diagnostics(
         trial, experiment: the same trial. others: experiments to compare with, it may be among them.
         model: what was identified.
     """
-    simulated = replay(model, [experiment], fit.segments).positions[0]
+    simulated = replay(model, [experiment], fit.markers).positions[0]
     if not np.isfinite(simulated).all():
         return ["it diverges"]
     sentences = [
@@ -63,8 +63,8 @@ def started_off(simulated: np.ndarray, experiment: Experiment, fit: Fit) -> str:
 
 
 def exchanged_labels(simulated: np.ndarray, experiment: Experiment, fit: Fit) -> str:
-    """Whether it fits better with two segments' labels exchanged."""
-    segments = experiment.positions.shape[1]
+    """Whether it fits better with two markers' labels exchanged."""
+    markers = experiment.positions.shape[1]
     apart = np.linalg.norm(simulated[:, :, None] - experiment.positions[:, None], axis=-1)  # (T, simulated, measured)
     both = experiment.measured[:, None] & experiment.measured[:, :, None]
     cost = np.where(both, apart, 0).sum(axis=0) / np.maximum(both.sum(axis=0), 1)
@@ -73,13 +73,13 @@ def exchanged_labels(simulated: np.ndarray, experiment: Experiment, fit: Fit) ->
     first, second = np.unravel_index(np.argmax(gain), gain.shape)
     if gain[first, second] <= 0:
         return ""
-    order = np.arange(segments)
+    order = np.arange(markers)
     order[[first, second]] = second, first
     before = _loss(simulated, experiment.positions, experiment.measured, fit)
     after = _loss(simulated, experiment.positions[:, order], experiment.measured[:, order], fit)
     if after > BETTER * before:
         return ""
-    return f"{fit.segments[first]!r} and {fit.segments[second]!r} look exchanged"
+    return f"{fit.markers[first]!r} and {fit.markers[second]!r} look exchanged"
 
 
 def another_level(simulated: np.ndarray, trial: Trial, experiment: Experiment, model: mujoco.MjModel, fit: Fit) -> str:
@@ -100,7 +100,7 @@ def another_level(simulated: np.ndarray, trial: Trial, experiment: Experiment, m
         return ""
     losses = [
         _loss(positions, experiment.positions, experiment.measured, fit) if np.isfinite(positions).all() else np.inf
-        for positions in replay(model, tried, fit.segments).positions
+        for positions in replay(model, tried, fit.markers).positions
     ]
     best = int(np.argmin(losses))
     before = _loss(simulated, experiment.positions, experiment.measured, fit)

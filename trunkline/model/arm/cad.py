@@ -34,8 +34,8 @@ class ChainArm(ABC):
         tendons: how many, evenly spread, or one description each. hole_ratio: distance of their holes from the axis
             over the unit's outer radius, where none is described.
         tip_load: kg that hangs at the tip.
-        segments: name of a tracked point to its distance from the mount along the straight arm, m, or to where its
-            marker sits beside the arm.
+        markers: name of a marker to its distance from the mount along the straight arm, m, or to where it
+            sits beside the arm.
         actuation: guesses of this arm's motors, in place of those in config.yaml.
         joint_place: where a unit bends, as a share of its length: 0 at its upper end, as in the paper's chain.
     """
@@ -46,18 +46,18 @@ class ChainArm(ABC):
     tendons: Annotated[int, Field(ge=0, le=MOST)] | Annotated[list[Tendon], Field(max_length=MOST)]
     hole_ratio: Annotated[float, Field(gt=0, le=1)]
     tip_load: Annotated[float, Field(ge=0, le=100)]
-    segments: dict[str, Annotated[float, Field(gt=0, le=10)] | Marker]
+    markers: dict[str, Annotated[float, Field(gt=0, le=10)] | Marker]
     joint_place: Annotated[float, Field(ge=0, le=1)] = field(default=0.0, kw_only=True)
     actuation: Actuation | None = field(default=None, kw_only=True)
 
     def __post_init__(self):
-        for name, place in self.segments.items():
+        for name, place in self.markers.items():
             if name == "base" or re.fullmatch(r"unit_\d+", name):
-                raise ValueError(f"segments.{name}: found the name of a body, expected another: the mount is `base`, "
+                raise ValueError(f"markers.{name}: found the name of a body, expected another: the mount is `base`, "
                                  f"and the {self.units} units' centres have names, {unit_name(0)} to "
                                  f"{unit_name(self.units - 1)}, without an entry")
             if not isinstance(place, Marker) and place > self.length:
-                raise ValueError(f"segments.{name}: found {place} m, expected at most the length of {self.length} m, "
+                raise ValueError(f"markers.{name}: found {place} m, expected at most the length of {self.length} m, "
                                  f"or {{distance: {place}}} of a marker that sticks out")
 
         for number, tendon in enumerate([] if isinstance(self.tendons, int) else self.tendons):
@@ -99,6 +99,6 @@ class ChainArm(ABC):
             "stiffness_base": properties.stiffness[0],
             "damping_base": properties.damping[0],
         }
-        markers = {name: at if isinstance(at, Marker) else Marker(at) for name, at in self.segments.items()}
+        markers = {name: at if isinstance(at, Marker) else Marker(at) for name, at in self.markers.items()}
         spec = build_spec(chain, properties, tendons, solver, self.tip_load, markers, self.joint_place)
         return CadArm(spec, metrics)

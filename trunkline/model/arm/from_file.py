@@ -61,7 +61,7 @@ def _missing(model: mujoco.MjModel) -> str | None:
         if name not in sites:
             return f"found no site {name!r}, expected one {where}"
     if not any(name.endswith(CENTER) and name != "base_center" for name in sites):
-        return f"found no site <segment>{CENTER}, expected one in every tracked segment"
+        return f"found no site <marker>{CENTER}, expected one for every marker"
     return None
 
 

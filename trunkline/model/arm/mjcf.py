@@ -1,8 +1,8 @@
 """Geometry and unit properties to a MuJoCo model: a pseudo-rigid chain, two hinges a joint, pulling tendons.
 
 Names: bodies `base`, `unit_01`…, `tip_load`; hinges `unit_01_x`, `unit_01_y`; sites `unit_01_center` (the tracked
-frame), `unit_01_tendon_1`…, `base_center`, `tip`; tendons `tendon_1`…; actuators `tendon_1_position`…. Segments
-that an arm tracks elsewhere than in its units' centres have their own names: site `<segment>_center`.
+frame), `unit_01_tendon_1`…, `base_center`, `tip`; tendons `tendon_1`…; actuators `tendon_1_position`…. Markers
+that an arm tracks elsewhere than in its units' centres have their own names: site `<marker>_center`.
 """
 
 from dataclasses import dataclass
@@ -101,14 +101,14 @@ def build_spec(
     tendons: Tendons,
     solver: Solver,
     tip_load: float = 0.0,
-    segments: dict[str, Marker] | None = None,
+    markers: dict[str, Marker] | None = None,
     joint_place: float = 0.0,
 ) -> mujoco.MjSpec:
     """The arm hanging straight down from its mount, in SI units. Compile it with `.compile()`.
 
     Args:
         tip_load: kg that hangs at the tip.
-        segments: name of a tracked point to where its marker sits.
+        markers: name of a marker to where it sits.
         joint_place: where a unit bends, as a share of its length from its upper end.
     """
     spec = mujoco.MjSpec()
@@ -140,7 +140,7 @@ def build_spec(
         body = _add_unit(body, index, chain, properties, solver, joint_place)
         _add_holes(body, unit_name(index), index + 1, -chain.lengths[index] / 2, tendons.routes, cables)
         units.append(body)
-    for name, marker in (segments or {}).items():
+    for name, marker in (markers or {}).items():
         unit = chain.unit_at(marker.distance)
         place = [*marker.aside, chain.lengths[:unit].sum() - marker.distance]
         units[unit].add_site(name=f"{name}_center", pos=place)

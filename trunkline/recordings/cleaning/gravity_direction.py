@@ -87,7 +87,7 @@ def _check_hanging(takes: list[RawTrial]) -> str | None:
 
 
 def _hang(take: RawTrial) -> np.ndarray:
-    """The direction (3,) from the base to the farthest segment, over the last fifth of a take."""
+    """The direction (3,) from the base to the farthest marker, over the last fifth of a take."""
     ends = slice(-max(1, len(take.time) // 5), None)
     middle = np.nanmedian(take.positions[ends], axis=0) - np.nanmedian(take.base_positions[ends], axis=0)
     distance = np.where(np.isfinite(middle[:, 0]), np.linalg.norm(middle, axis=1), 0)

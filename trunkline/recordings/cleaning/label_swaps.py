@@ -1,6 +1,6 @@
-"""Segments taken for one another: labels that change places, told by the distances along the arm.
+"""Markers taken for one another: labels that change places, told by the distances along the arm.
 
-The distance between nearby segments hardly depends on the arm's shape. Where two labels are exchanged, both are
+The distance between nearby markers hardly depends on the arm's shape. Where two labels are exchanged, both are
 at the other's usual distances from their neighbours. What is found here, `repairs` puts back.
 """
 
@@ -12,9 +12,9 @@ import numpy as np
 from trunkline.recordings.signals.runs import lasting
 
 LONGEST = 4  # labels in a round
-NEIGHBOURS = 2  # nearest segments with which one may be exchanged
-REFERENCES = 4  # nearest other bodies by whose distances two segments are told apart
-LEAST_CONTRAST = 3e-3  # m by which the distances of two segments must differ
+NEIGHBOURS = 2  # nearest markers with which one may be exchanged
+REFERENCES = 4  # nearest other bodies by whose distances two markers are told apart
+LEAST_CONTRAST = 3e-3  # m by which the distances of two markers must differ
 LONE = 3  # frames that one of the two, alone, has to be at the other's place
 CLEAR = 0.3  # the exchanged labels must fit this many times better
 SAMPLE = 200  # frames of a log that tell the usual distances

@@ -24,7 +24,7 @@ def load_raw_trials(
 ) -> Iterator[tuple[TrialEntry, RawTrial | InputError, Findings]]:
     """Read trial by trial. A trial that cannot be used comes as the error that says why.
 
-    Every take has the same segments: those that session.yaml maps, or all that any log shows.
+    Every take has the same markers: those that session.yaml maps, or all that any log shows.
     """
     logs: dict[str, LogSource | InputError] = {}
     read: list[tuple[LogSource, Stretch] | InputError] = []
@@ -106,7 +106,7 @@ def _take(
         load=trial.load,
         up=session.frame.up_direction() if session.frame.gravity == "standard" else np.zeros(3),
         time=stretch.time,
-        segments=tuple(reference.segments.values()),
+        markers=tuple(reference.markers.values()),
         positions=positions,
         quaternions=quaternions,
         base_positions=base_positions,

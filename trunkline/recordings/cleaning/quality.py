@@ -18,7 +18,7 @@ class Quality:
     """The quality of one take.
 
     interval: s, median time between frames. dropped: frames missing between others.
-    coverage: (S,) share of frames in which a segment has a good sample. gaps: s, of each stretch without.
+    coverage: (S,) share of frames in which a marker has a good sample. gaps: s, of each stretch without.
     position_noise: (S,) m, angle_noise: (S,) rad or None: per axis, standard deviation.
     """
 
@@ -38,7 +38,7 @@ def judge(take: RawTrial, findings: Findings) -> Quality:
     interval = float(np.median(steps))
     visible = np.isfinite(take.positions[..., 0])
     gaps = [np.diff(take.time[good]) for good in visible.T]
-    shape = (len(take.time), len(take.segments), -1)
+    shape = (len(take.time), len(take.markers), -1)
     position_noise = noise_level(take.positions.reshape(len(take.time), -1)).reshape(shape[1:])
     angle_noise = None
     if take.quaternions is not None:
@@ -117,7 +117,7 @@ def summary(qualities: list[Quality], gathered: CheckedSession) -> dict:
         "refused": len(gathered.refused),
         "repairs": repairs,
         "warnings": sum(len(quality.findings.warnings) for quality in qualities),
-        "poses": sum(len(quality.take.time) * (len(quality.take.segments) + 1) for quality in qualities),
+        "poses": sum(len(quality.take.time) * (len(quality.take.markers) + 1) for quality in qualities),
         "coverage": float(np.mean([quality.coverage.mean() for quality in qualities])),
         "dropped_frames": sum(quality.dropped for quality in qualities),
         "gaps": len(gaps),
@@ -147,7 +147,7 @@ def _trial(quality: Quality) -> dict:
         "rate_hz": 1 / quality.interval,
         "dropped_frames": quality.dropped,
         "stamp_jitter_ms": None if findings.frames is None else 1e3 * findings.frames.jitter,
-        "coverage": dict(zip(take.segments, quality.coverage.tolist(), strict=True)),
+        "coverage": dict(zip(take.markers, quality.coverage.tolist(), strict=True)),
         "gaps": len(quality.gaps),
         "longest_gap_ms": 1e3 * float(quality.gaps.max(initial=0)),
         "position_noise_mm": 1e3 * float(np.median(quality.position_noise)),

@@ -19,13 +19,13 @@ UNIT = {"m": 1.0, "mm": 1e-3}
 class Reference:
     """What each trial is read and repaired by.
 
-    segments: name in the log to name in the model, in the order of every take. base: the body that marks the mount,
+    markers: name in the log to name in the model, in the order of every take. base: the body that marks the mount,
     None where none does. scale: m per unit of the logs' positions.
-    distances: between the base and the segments, see `usual_distances`; None where there is too little to compare.
+    distances: between the base and the markers, see `usual_distances`; None where there is too little to compare.
     joint_topics: of all logs. repairs, warnings: what is to be said of every trial; see `Findings`.
     """
 
-    segments: dict[str, str]
+    markers: dict[str, str]
     base: str | None
     scale: float
     distances: np.ndarray | None
@@ -35,19 +35,19 @@ class Reference:
 
     @property
     def bodies(self) -> list[str]:
-        """Names in the log of the bodies that a trial needs: the base, where one marks it, then the segments."""
-        return list(self.segments) if self.base is None else [self.base, *self.segments]
+        """Names in the log of the bodies that a trial needs: the base, where one marks it, then the markers."""
+        return list(self.markers) if self.base is None else [self.base, *self.markers]
 
 
 def reference_of(session: Session, trials: list[tuple[TrialEntry, LogSource, Stretch]]) -> Reference:
     """Compare the logs of a session: the trials of the split `identify`, or all where none of those can be read."""
     base = None if isinstance(session.base, FixedBase) else session.base
-    segments, sources = session.segments, [source for _, source, _ in trials]
-    if segments is None:
+    markers, sources = session.markers, [source for _, source, _ in trials]
+    if markers is None:
         names = {name for source in sources for name in source.poses.names if name != session.base}
-        segments = {name: name for name in sorted(names)}
+        markers = {name: name for name in sorted(names)}
     joint_topics = tuple(sorted({name for source in sources for name in source.joint_topics}))
-    reference = Reference(segments, base, UNIT[session.frame.unit], None, joint_topics)
+    reference = Reference(markers, base, UNIT[session.frame.unit], None, joint_topics)
     bodies = reference.bodies
     complete = [some for some in trials if set(bodies) <= set(some[1].poses.names)]
     chosen, fallback = deciding(complete, lambda some: some[0].split)

@@ -71,11 +71,11 @@ def untangle(
     reference: Reference,
     findings: Findings,
 ) -> None:
-    """Give labels that changed places back, in the poses of the base (where a body marks it) and of the segments, at
+    """Give labels that changed places back, in the poses of the base (where a body marks it) and of the markers, at
     times (T,) s."""
     if reference.distances is None:
         return
-    names = [reference.base or "base", *reference.segments]
+    names = [reference.base or "base", *reference.markers]
     bodies = np.insert(positions, 0, base[0], axis=1)
     turns = None if quaternions is None else np.insert(quaternions, 0, base[1], axis=1)
     for swap in find_label_swaps(bodies, reference.distances, reference.base is not None):

@@ -41,14 +41,14 @@ def name_apart(gathered: CheckedSession, session: str) -> None:
 
 
 def require_same_arm(sessions: dict[str, CheckedSession], distance: float) -> None:
-    """Refuse sessions that cannot be of one arm: other segments, other tendons, or other distances along it.
+    """Refuse sessions that cannot be of one arm: other markers, other tendons, or other distances along it.
 
     Args:
         distance: share of the arm's length by which usual distances from the base may differ.
     """
     (first, reference), *others = sessions.items()
     for name, other in others:
-        for key in ("segments", "tendons"):
+        for key in ("markers", "tendons"):
             ours, theirs = (
                 next((list(getattr(t, key)) for t in session.takes if getattr(t, key)), [])
                 for session in (reference, other)
@@ -60,8 +60,8 @@ def require_same_arm(sessions: dict[str, CheckedSession], distance: float) -> No
         off = np.abs(ours - theirs)
         if np.nanmax(off) > distance * np.nanmax(ours):
             worst = int(np.nanargmax(off))
-            segment, before = reference.takes[0].segments[worst], f"{1e3 * ours[worst]:.0f} mm in the session {first}"
-            problem = f"session {name}: found {segment!r} {1e3 * theirs[worst]:.0f} mm from the body before it"
+            marker, before = reference.takes[0].markers[worst], f"{1e3 * ours[worst]:.0f} mm in the session {first}"
+            problem = f"session {name}: found {marker!r} {1e3 * theirs[worst]:.0f} mm from the body before it"
             raise InputError(f"{problem}, expected about {before}, as one arm is identified from both")
 
 
@@ -77,7 +77,7 @@ def require_distinct_logs(folders: dict[str, Path], sessions: dict[str, Session]
 
 
 def _along(gathered: CheckedSession) -> np.ndarray:
-    """Usual distances of each segment from the body before it, the base before the first, m. Shape (S,)."""
+    """Usual distances of each marker from the body before it, the base before the first, m. Shape (S,)."""
     usual = usual_distances([np.insert(take.positions, 0, take.base_positions, axis=1) for take in gathered.takes])
     return np.diagonal(usual, 1)
 

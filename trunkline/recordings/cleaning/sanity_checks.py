@@ -1,6 +1,6 @@
 """Whether a trial can be what session.yaml says: its bodies against the arm, its motion against the experiment.
 
-Lengths are measured against the arm's own, which is the largest of the segments' usual distances from the base. Every
+Lengths are measured against the arm's own, which is the largest of the markers' usual distances from the base. Every
 check compares a trial with that, with the session's other trials, or with what its kind of experiment means.
 """
 
@@ -57,18 +57,18 @@ def check_sanity(
     chosen, _ = deciding(takes, lambda take: take.split)
     usual = usual_distances([_bodies(take) for take in chosen])
     length = float(np.nanmax(usual[0]))
-    names, idle = (base or "base", *takes[0].segments), settings.still * length
+    names, idle = (base or "base", *takes[0].markers), settings.still * length
     zeros = encoder_zeros(chosen, idle)
     for take, record in zip(takes, findings, strict=True):
         record.faults += _misplaced(take, usual, names, settings.distance * length)
         record.faults += _motion(take, length, settings.still)
         record.faults += check_pulls(take, length, idle, settings.pull, zeros)
-    faults = _order(takes[0].segments, usual) + _loose(chosen, usual, settings, length)
+    faults = _order(takes[0].markers, usual) + _loose(chosen, usual, settings, length)
     return faults if base is None else faults + _base_at_rest(chosen, base)
 
 
 def _bodies(take: RawTrial) -> np.ndarray:
-    """The base and the segments, (T, 1 + S, 3) m."""
+    """The base and the markers, (T, 1 + S, 3) m."""
     return np.insert(take.positions, 0, take.base_positions, axis=1)
 
 
@@ -106,21 +106,21 @@ def _motion(take: RawTrial, length: float, still: float) -> list[str]:
     if static == (travel[most] <= still * length):
         return []
     share = 100 * travel[most] / length
-    travelled = f"{take.segments[most]!r} moves by {_mm(travel[most])}, {share:.2g} % of the arm's length"
+    travelled = f"{take.markers[most]!r} moves by {_mm(travel[most])}, {share:.2g} % of the arm's length"
     expected = f"expected {'at most' if static else 'more than'} {100 * still:g} % in a {take.experiment}"
     others = ", ".join(name for name, kind in EXPERIMENTS.items() if kind.static != static)
     return [f"experiment: {travelled}, {expected}: is it another experiment ({others})?"]
 
 
-def _order(segments: tuple[str, ...], usual: np.ndarray) -> list[str]:
-    """Numbered segments that do not follow each other along the arm as their numbers do, up or down.
+def _order(markers: tuple[str, ...], usual: np.ndarray) -> list[str]:
+    """Numbered markers that do not follow each other along the arm as their numbers do, up or down.
 
-    From the base on, the next segment along an arm is the nearest of those that are left. Along any other order the
+    From the base on, the next marker along an arm is the nearest of those that are left. Along any other order the
     way from body to body is longer.
     """
-    numbered = [re.fullmatch(r"(.*?)(\d+)", name) for name in segments]
+    numbered = [re.fullmatch(r"(.*?)(\d+)", name) for name in markers]
     parts = [match.groups() for match in numbered if match is not None]
-    if len(parts) < len(segments) or len({stem for stem, _ in parts}) > 1 or len(parts) < 3:
+    if len(parts) < len(markers) or len({stem for stem, _ in parts}) > 1 or len(parts) < 3:
         return []
     if not np.isfinite(usual).all(where=~np.eye(len(usual), dtype=bool)):
         return []
@@ -128,16 +128,16 @@ def _order(segments: tuple[str, ...], usual: np.ndarray) -> list[str]:
     while left:
         along.append(min(left, key=lambda body: usual[along[-1], body]))
         left.remove(along[-1])
-    named = sorted(range(len(segments)), key=lambda place: int(parts[place][1]))
+    named = sorted(range(len(markers)), key=lambda place: int(parts[place][1]))
     length = float(usual[0].max(where=np.isfinite(usual[0]), initial=0.0))
     orders = [[0, *(place + 1 for place in order)] for order in (named, named[::-1])]
     order = min(orders, key=lambda order: _way(usual, order))
     if _way(usual, order) - _way(usual, along) <= LONGER * length:
         return []
-    places = [(segments[a - 1], segments[b - 1]) for a, b in zip(order[1:], along[1:], strict=True) if a != b]
+    places = [(markers[a - 1], markers[b - 1]) for a, b in zip(order[1:], along[1:], strict=True) if a != b]
     exchanged = ", ".join(f"{actual!r} where {name!r} is expected" for name, actual in places)
     problem = f"along the arm lies {exchanged}, by the distances between them"
-    return [f"segments: {problem}: check `segments` in session.yaml"]
+    return [f"markers: {problem}: check `markers` in session.yaml"]
 
 
 def _way(usual: np.ndarray, order: list[int]) -> float:
@@ -145,9 +145,9 @@ def _way(usual: np.ndarray, order: list[int]) -> float:
 
 
 def _loose(takes: list[RawTrial], usual: np.ndarray, settings: SanityLimits, length: float) -> list[str]:
-    """Segments that are not fixed to the arm: in most trials in which it moves they keep no distance from any other
-    segment, or rest while one nearer to the base moves."""
-    least, still, count = settings.distance * length, settings.still * length, len(takes[0].segments)
+    """Markers that are not fixed to the arm: in most trials in which it moves they keep no distance from any other
+    marker, or rest while one nearer to the base moves."""
+    least, still, count = settings.distance * length, settings.still * length, len(takes[0].markers)
     apart, farther = [], usual[0, 1:, None] > usual[0, None, 1:]
     rests = []
     for take in takes:
@@ -161,17 +161,17 @@ def _loose(takes: list[RawTrial], usual: np.ndarray, settings: SanityLimits, len
         rests.append((travel < still) & (farther & (travel > least)).any(axis=1))
     faults = []
     for flags, motion in (
-        (apart, f"keeps no distance from any other segment, to within {_mm(least)}, while the arm moves"),
-        (rests, f"rests, to within {_mm(still)}, while segments nearer to the base move"),
+        (apart, f"keeps no distance from any other marker, to within {_mm(least)}, while the arm moves"),
+        (rests, f"rests, to within {_mm(still)}, while markers nearer to the base move"),
     ):
         most = np.mean(flags, axis=0) > 0.5 if flags else np.zeros(count, bool)
-        hit = [name for name, some in zip(takes[0].segments, most, strict=True) if some]
+        hit = [name for name, some in zip(takes[0].markers, most, strict=True) if some]
         faults += [f"{name!r} {motion}: is it on the arm?" for name in hit]
     return faults
 
 
 def _base_at_rest(takes: list[RawTrial], base: str) -> list[str]:
-    """A base that moves or turns while a segment rests."""
+    """A base that moves or turns while a marker rests."""
     motion = []
     for take in takes:
         if EXPERIMENTS[take.experiment].static or take.quaternions is None:
@@ -183,7 +183,7 @@ def _base_at_rest(takes: list[RawTrial], base: str) -> list[str]:
     for moved, unit, scale in zip(np.median(motion, axis=0), ("mm", "°"), (1e3, np.degrees(1)), strict=True):
         rests = int(np.argmin(moved[1:])) + 1
         if moved[0] > CLEAR * moved[rests]:
-            problem = f"moves by {scale * moved[0]:.2f} {unit} while {takes[0].segments[rests - 1]!r} moves by"
+            problem = f"moves by {scale * moved[0]:.2f} {unit} while {takes[0].markers[rests - 1]!r} moves by"
             expected = "expected the body at the mount, which rests"
             return [f"base: {base!r} {problem} {scale * moved[rests]:.2f} {unit}, {expected}"]
     return []

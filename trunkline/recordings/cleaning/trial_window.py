@@ -72,7 +72,7 @@ def columns_of(source: LogSource, names: list[str], where: str) -> list[int]:
     for name in names:
         if name not in poses.names:
             problem = f"{name!r} never appears in {source.pose_topic}, found {', '.join(poses.names)}"
-            raise InputError(f"{where}: {problem}, expected it, or `segments` in session.yaml that leaves it out")
+            raise InputError(f"{where}: {problem}, expected it, or `markers` in session.yaml that leaves it out")
     return [poses.names.index(name) for name in names]
 
 
@@ -95,7 +95,7 @@ def check_seen(positions: np.ndarray, names: list[str], least: float, where: str
 
 
 def split_base(session: Session, positions: np.ndarray, quaternions: np.ndarray | None, where: str):
-    """(base positions (T, 3), base quaternions (T, 4), segments' positions, segments' quaternions)."""
+    """(base positions (T, 3), base quaternions (T, 4), markers' positions, markers' quaternions)."""
     if isinstance(session.base, FixedBase):
         quaternion = session.base.quaternion or _upright(session.frame.up_direction())
         ones = np.ones((len(positions), 1))

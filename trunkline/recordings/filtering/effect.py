@@ -10,11 +10,11 @@ from trunkline.recordings.trials.trial import Trial
 
 @dataclass
 class Effect:
-    """samples: of all segments on the uniform clock. gap_share, filled_share: not trusted, filled in.
+    """samples: of all markers on the uniform clock. gap_share, filled_share: not trusted, filled in.
     outliers: samples dropped.
 
     position_noise (m), angle_noise (rad): root mean square of what the filter took away, per axis.
-    tilt: rad, measured. motion: m, how far the segments still move in a static tilt (standard deviation).
+    tilt: rad, measured. motion: m, how far the markers still move in a static tilt (standard deviation).
     base_shift (m), base_turn (rad): of the mount within the trial.
     """
 

@@ -46,7 +46,7 @@ def filter_raw_trial(take: RawTrial, settings: Filter) -> tuple[Trial, Effect]:
     bandwidth of the filter the arm turns by little, so that this differs from the sphere in second order.
 
     Raises:
-        InputError: if a segment has too few good samples.
+        InputError: if a marker has too few good samples.
     """
     base = average_base(take.base_positions, take.base_quaternions)
     positions, quaternions = to_base_frame(base, take.positions, take.quaternions)
@@ -54,15 +54,15 @@ def filter_raw_trial(take: RawTrial, settings: Filter) -> tuple[Trial, Effect]:
     if kind.stepwise:
         return _settled(take, positions, quaternions, base)
     grid = np.arange(int(take.time[-1] * settings.rate) + 1) / settings.rate
-    frames, count = len(grid), len(take.segments)
+    frames, count = len(grid), len(take.markers)
     width = 3 if quaternions is None else 7
     columns, measured = np.empty((frames, count, width)), np.empty((frames, count), bool)
     filled, dropped, removed = 0, 0, []
-    for index, name in enumerate(take.segments):
+    for index, name in enumerate(take.markers):
         samples = positions[:, index]
         if quaternions is not None:
             samples = np.hstack([samples, quaternions[:, index]])
-        filtered = _segment(take.time, samples, grid, settings, f"trial {take.name}: {name!r}")
+        filtered = _marker(take.time, samples, grid, settings, f"trial {take.name}: {name!r}")
         columns[:, index], measured[:, index] = filtered.columns, filtered.measured
         filled, dropped = filled + filtered.filled, dropped + filtered.dropped
         removed.append(filtered.removed)
@@ -108,7 +108,7 @@ def _trial(
         session=take.session,
         gravity=gravity,
         time=time,
-        segments=take.segments,
+        markers=take.markers,
         positions=positions,
         quaternions=quaternions,
         measured=measured,
@@ -146,7 +146,7 @@ def _settled(
     return trial, effect
 
 
-class _Segment(NamedTuple):
+class _Marker(NamedTuple):
     """columns (G, C), filtered, and measured (G,), where they may be trusted. filled, dropped: samples on the uniform
     clock between others that are further apart, and outliers. removed: mean square of what the filter took. (C,)."""
 
@@ -157,8 +157,8 @@ class _Segment(NamedTuple):
     removed: np.ndarray
 
 
-def _segment(time: np.ndarray, samples: np.ndarray, grid: np.ndarray, settings: Filter, where: str) -> _Segment:
-    """Filter one segment's samples (T, 3) or (T, 7), position and quaternion, NaN where unseen, onto `grid` (G,)."""
+def _marker(time: np.ndarray, samples: np.ndarray, grid: np.ndarray, settings: Filter, where: str) -> _Marker:
+    """Filter one marker's samples (T, 3) or (T, 7), position and quaternion, NaN where unseen, onto `grid` (G,)."""
     oriented = samples.shape[1] == 7
     good = np.isfinite(samples).all(axis=1)
     time, samples = time[good], samples[good]
@@ -173,7 +173,7 @@ def _segment(time: np.ndarray, samples: np.ndarray, grid: np.ndarray, settings: 
     smooth = low_pass(resample(time, samples, grid), settings.rate, settings.cutoff, settings.order)
     # the low-pass carries what fills a gap some frames beyond its edges
     reach = round(settings.rate / settings.cutoff / 2)
-    return _Segment(
+    return _Marker(
         columns=smooth,
         measured=~binary_dilation(~bridged(time, grid, settings.longest_bridge), iterations=reach),
         filled=int(np.sum(~bridged(time, grid, 1.5 / settings.rate))),
@@ -183,7 +183,7 @@ def _segment(time: np.ndarray, samples: np.ndarray, grid: np.ndarray, settings: 
 
 
 def average_static(trial: Trial) -> Trial:
-    """A trial of one frame: the mean over the frames in which each segment was measured."""
+    """A trial of one frame: the mean over the frames in which each marker was measured."""
     weight = trial.measured / np.maximum(trial.measured.sum(axis=0), 1)
     positions = np.einsum("ts,tsi->si", weight, trial.positions)[None]
     quaternions = trial.quaternions

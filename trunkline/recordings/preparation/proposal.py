@@ -67,12 +67,12 @@ def propose(surveys: list[LogSurvey], up: tuple[int, int, int] | None = None) ->
 def _up(poses: PoseStream, base: str | None) -> tuple[int, int, int]:
     """The axis along which the first body, or the base, is above the last at the end: an arm hangs."""
     names = poses.names
-    segments = [i for i, name in enumerate(names) if name != base]
-    first = names.index(base) if base is not None else segments[0]
+    markers = [i for i, name in enumerate(names) if name != base]
+    first = names.index(base) if base is not None else markers[0]
     ends = poses.positions[-max(1, len(poses.positions) // 5) :]
-    if first == segments[-1]:
+    if first == markers[-1]:
         return 0, 0, 1
-    hang = np.nanmean(ends[:, first], axis=0) - np.nanmean(ends[:, segments[-1]], axis=0)
+    hang = np.nanmean(ends[:, first], axis=0) - np.nanmean(ends[:, markers[-1]], axis=0)
     if not np.isfinite(hang).all():
         return 0, 0, 1
     axis = int(np.argmax(np.abs(hang)))

@@ -24,7 +24,9 @@ from trunkline.errors import InputError, nearest
 from trunkline.recordings.session.shared_recordings import check_shared
 from trunkline.recordings.trials.experiments import EXPERIMENTS, LOAD, ExperimentName, Level
 from trunkline.recordings.trials.splits import SplitName
-from trunkline.settings import read_yaml
+from trunkline.settings import read_yaml, rename_keys
+
+RENAMED = {"segments": "markers"}  # keys of the release before
 
 
 def _folder_name(name: str) -> str:
@@ -177,7 +179,7 @@ class TrialEntry(Entry):
 
 
 class Session(Entry):
-    """base: the body that marks the mount, or its pose. segments, tendons: name in the log to name in the model.
+    """base: the body that marks the mount, or its pose. markers, tendons: name in the log to name in the model.
 
     bodies: names of the poses, in order, where messages hold them without. A list of tendons does the same for numbers.
     clock: what dates a pose: its header's stamp, the recorder's log time, or its frame number at the rate
@@ -189,7 +191,7 @@ class Session(Entry):
 
     frame: MocapFrame
     base: str | FixedBase
-    segments: dict[str, str] | None = Field(default=None, min_length=1)
+    markers: dict[str, str] | None = Field(default=None, min_length=1)
     tendons: dict[str, str] | None = Field(default=None, min_length=1)
     motors: dict[str, MotorEntry] | None = Field(default=None, min_length=1)
     topics: Topics = Topics()
@@ -226,7 +228,7 @@ class Session(Entry):
     def _one_to_one(self):
         if self.motors is not None and self.tendons is not None:
             raise ValueError("motors: found it beside `tendons`, expected one of the two")
-        for key in ("segments", "tendons"):
+        for key in ("markers", "tendons"):
             names = list((getattr(self, key) or {}).values())
             twice = next((name for name in names if names.count(name) > 1), None)
             if twice is not None:
@@ -270,6 +272,8 @@ def read_session(folder: Path) -> Session:
     if not path.is_file():
         raise InputError(f"{folder}: found {len(logs)} logs and no session.yaml, expected both")
     content = OmegaConf.to_container(read_yaml(path), resolve=False)
+    assert isinstance(content, dict)
+    rename_keys(content, RENAMED, str(path))
     try:
         session = Session.model_validate(content)
     except ValidationError as error:

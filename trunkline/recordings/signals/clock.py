@@ -65,11 +65,11 @@ def estimate_offset(
     """The offset between the clocks at which the shape explains the tendons best; None if they rest.
 
     A taut tendon's length is a function of the arm's shape, whatever the dynamics. It is fitted as a
-    quadratic in the principal motions of the segments, for every offset within ±limit; the best fit wins. Motors,
+    quadratic in the principal motions of the markers, for every offset within ±limit; the best fit wins. Motors,
     cables and friction let the shape lag behind what was wound or sent, and this fit takes the lag for an offset.
 
     Args:
-        time (T,) s, positions (T, S, 3) m with NaN: the segments in any fixed frame.
+        time (T,) s, positions (T, S, 3) m with NaN: the markers in any fixed frame.
         motor_time (M,) s, pulls (M, K) m: measured tendon positions, or commands.
         limit: s, the largest offset looked for.
     """

@@ -16,7 +16,7 @@ def outliers(time: np.ndarray, columns: np.ndarray, deviations: float) -> np.nda
 
     A row is predicted along a line from the two before it, the two behind it and the ones at its sides; the best
     counts. So a good row beside a bad one passes. Where the arm is shaken, all rows disagree somewhat, and one has
-    to stand out from them too. Three bad rows that agree with each other are no noise but a segment taken for
+    to stand out from them too. Three bad rows that agree with each other are no noise but a marker taken for
     another, and pass.
 
     Args:

@@ -15,9 +15,9 @@ BASE = "base"  # the base body's name in poses.parquet
 
 @dataclass(kw_only=True)
 class RawTrial(TrialRecording):
-    """T frames, S segments, K tendons; the motors have Tc commands and Tm measured positions.
+    """T frames, S markers, K tendons; the motors have Tc commands and Tm measured positions.
 
-    name, experiment, split, level, load: as planned, see `Planned`. segments: S names, tendons: K names, as in the
+    name, experiment, split, level, load: as planned, see `Planned`. markers: S names, tendons: K names, as in the
     model.
     up: (3,) unit vector against gravity, 0 where there is none. time: (T,) s from the first frame.
     positions (T, S, 3) m, quaternions (T, S, 4) wxyz or None, base_positions (T, 3), base_quaternions (T, 4):
@@ -49,7 +49,7 @@ SCHEMA = pa.schema(
         "frames": pa.int64(),
         "commands": pa.int64(),
         "tendon_positions": pa.int64(),
-        "segments": pa.list_(pa.string()),
+        "markers": pa.list_(pa.string()),
         "tendons": pa.list_(pa.string()),
         "orientations": pa.bool_(),
     }
@@ -75,7 +75,7 @@ def write_takes(folder: Path, takes: list[RawTrial]) -> None:
                 "frames": len(take.time),
                 "commands": len(take.command_time),
                 "tendon_positions": len(take.tendon_time),
-                "segments": list(take.segments),
+                "markers": list(take.markers),
                 "tendons": list(take.tendons),
                 "orientations": take.quaternions is not None,
             }
@@ -85,7 +85,7 @@ def write_takes(folder: Path, takes: list[RawTrial]) -> None:
             quaternions = np.full((*take.positions.shape[:2], 4), np.nan)
         positions = np.concatenate([take.base_positions[:, None], take.positions], axis=1)
         quaternions = np.concatenate([take.base_quaternions[:, None], quaternions], axis=1)
-        poses.append(pose_table(take.name, take.time, (BASE, *take.segments), positions, quaternions))
+        poses.append(pose_table(take.name, take.time, (BASE, *take.markers), positions, quaternions))
         for stream, time, values in (
             ("command", take.command_time, take.commands),
             ("position", take.tendon_time, take.tendon_positions),
@@ -104,7 +104,7 @@ def read_takes(folder: Path, splits: tuple[str, ...]) -> list[RawTrial]:
     rows, poses, pulls = read_tables(folder, "ingest")
     takes, pose_row, pull_row = [], 0, 0
     for row in rows:
-        shape = (row["frames"], 1 + len(row["segments"]))
+        shape = (row["frames"], 1 + len(row["markers"]))
         pose = {key: column[pose_row : pose_row + shape[0] * shape[1]] for key, column in poses.items()}
         pose_row += shape[0] * shape[1]
         motors = {}
@@ -126,7 +126,7 @@ def read_takes(folder: Path, splits: tuple[str, ...]) -> list[RawTrial]:
                 session=row.get("session", ""),
                 up=np.array(row["up"]),
                 time=pose["time"].reshape(shape)[:, 0].copy(),
-                segments=tuple(row["segments"]),
+                markers=tuple(row["markers"]),
                 positions=positions[:, 1:],
                 quaternions=quaternions[:, 1:] if row["orientations"] else None,
                 base_positions=positions[:, 0],

@@ -24,15 +24,15 @@ class PlannedTrial:
 
 @dataclass(kw_only=True)
 class TrialRecording(PlannedTrial):
-    """A trial of T frames, S segments and K tendons.
+    """A trial of T frames, S markers and K tendons.
 
-    time: (T,) s from the first frame. positions (T, S, 3) m, quaternions (T, S, 4) wxyz or None: of the segments.
+    time: (T,) s from the first frame. positions (T, S, 3) m, quaternions (T, S, 4) wxyz or None: of the markers.
     commands, tendon_positions: m of pull, one column a tendon. What else a frame, a clock or a gap means is told by
     the class that derives from this one.
     """
 
     time: np.ndarray
-    segments: tuple[str, ...]
+    markers: tuple[str, ...]
     positions: np.ndarray
     quaternions: np.ndarray | None
     tendons: tuple[str, ...]

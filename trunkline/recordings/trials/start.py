@@ -95,7 +95,7 @@ def _let_go(
 
 
 def _speed(polynomials: np.ndarray, at: float) -> float:
-    """Speed, m/s, of segments that move as polynomials (DEGREE + 1, 3 S) of time over HOLD, highest power first."""
+    """Speed, m/s, of markers that move as polynomials (DEGREE + 1, 3 S) of time over HOLD, highest power first."""
     velocity = np.stack([np.polyval(np.polyder(column), at) for column in polynomials.T]) / HOLD
     return float(robust_length(velocity.reshape(1, -1, 3))[0])
 
@@ -140,7 +140,7 @@ def free_time(time: np.ndarray, positions: np.ndarray, begin: float) -> float:
     """When a hand that lets go gently is gone, s: it moves along from `begin` on, the arm pulling ever harder.
 
     An arm that is let go at once accelerates most at once. Where its acceleration still grows, something holds it; so
-    it is free from the largest acceleration of its farthest travelling segment before that one's top speed.
+    it is free from the largest acceleration of its farthest travelling marker before that one's top speed.
 
     Args:
         time (T,) s, uniform. positions (T, S, 3) m, filtered. begin: s, when the arm began to move.
@@ -153,7 +153,7 @@ def free_time(time: np.ndarray, positions: np.ndarray, begin: float) -> float:
 
 
 def robust_length(vectors: np.ndarray) -> np.ndarray:
-    """Upper quartile over the segments of the lengths of (T, S, 3): a few hidden segments do not matter. (T,)."""
+    """Upper quartile over the markers of the lengths of (T, S, 3): a few hidden markers do not matter. (T,)."""
     return np.quantile(np.linalg.norm(vectors, axis=2), 0.75, axis=1)
 
 

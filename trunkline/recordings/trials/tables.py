@@ -37,16 +37,16 @@ def with_sessions(schema: pa.Schema, sessions: list[str]) -> pa.Schema:
 def pose_table(
     trial: str,
     time: np.ndarray,
-    segments: tuple[str, ...],
+    markers: tuple[str, ...],
     positions: np.ndarray,
     quaternions: np.ndarray | None,
 ) -> pa.Table:
-    """Rows (trial, time, segment, x, y, z, qw, qx, qy, qz), frame by frame; quaternions NaN if None."""
+    """Rows (trial, time, marker, x, y, z, qw, qx, qy, qz), frame by frame; quaternions NaN if None."""
     if quaternions is None:
         quaternions = np.full((*positions.shape[:2], 4), np.nan)
     columns = {axis: positions[..., i] for i, axis in enumerate("xyz")}
     columns |= {f"q{axis}": quaternions[..., i] for i, axis in enumerate("wxyz")}
-    return long_table(trial, time, "segment", segments, columns)
+    return long_table(trial, time, "marker", markers, columns)
 
 
 def long_table(

@@ -1,4 +1,4 @@
-"""A filtered trial: every tracked segment and tendon on one uniform clock, in the base frame.
+"""A filtered trial: every marker and tendon on one uniform clock, in the base frame.
 
 This is what the identification stages read. Positions in metres in the base frame (origin at the arm's mount,
 arm along -z when straight), quaternions (w, x, y, z), time in seconds from the trial's first frame.
@@ -17,9 +17,9 @@ from trunkline.recordings.trials.tables import long_table, pose_table, read_tabl
 
 @dataclass(kw_only=True)
 class Trial(TrialRecording):
-    """One experiment of T frames, S segments and K tendons.
+    """One experiment of T frames, S markers and K tendons.
 
-    name, experiment, split, level, load: as planned, see `Planned`. segments: S names, tendons: K names, as in the
+    name, experiment, split, level, load: as planned, see `Planned`. markers: S names, tendons: K names, as in the
     model.
     gravity: (3,) m/s² in the base frame, measured from the base body.
     time: (T,) s, uniform. A static trial is averaged over time and has T = 1.
@@ -48,7 +48,7 @@ def sessions_of(trials: list[Trial]) -> list[str]:
 
 
 def write_trials(folder: Path, trials: list[Trial]) -> None:
-    """Write trials.parquet (a row a trial), poses.parquet (a row a frame and segment) and commands.parquet
+    """Write trials.parquet (a row a trial), poses.parquet (a row a frame and marker) and commands.parquet
     (a row a frame and tendon) into `folder`, in the order of `trials`."""
     rows = [
         {
@@ -65,7 +65,7 @@ def write_trials(folder: Path, trials: list[Trial]) -> None:
             "swaying": trial.swaying,
             "repairs": trial.repairs,
             "frames": len(trial.time),
-            "segments": list(trial.segments),
+            "markers": list(trial.markers),
             "tendons": list(trial.tendons),
             "orientations": trial.quaternions is not None,
         }
@@ -85,7 +85,7 @@ def write_trials(folder: Path, trials: list[Trial]) -> None:
             "swaying": pa.bool_(),
             "repairs": pa.int64(),
             "frames": pa.int64(),
-            "segments": pa.list_(pa.string()),
+            "markers": pa.list_(pa.string()),
             "tendons": pa.list_(pa.string()),
             "orientations": pa.bool_(),
         }
@@ -93,7 +93,7 @@ def write_trials(folder: Path, trials: list[Trial]) -> None:
     schema = with_sessions(schema, [trial.session for trial in trials])
     pq.write_table(pa.Table.from_pylist(rows, schema), Path(folder) / "trials.parquet")
     poses = [
-        pose_table(t.name, t.time, t.segments, t.positions, t.quaternions).append_column(
+        pose_table(t.name, t.time, t.markers, t.positions, t.quaternions).append_column(
             "measured", pa.array(t.measured.ravel())
         )
         for t in trials
@@ -114,7 +114,7 @@ def read_trials(folder: Path, splits: tuple[str, ...]) -> list[Trial]:
     rows, poses, commands = read_tables(folder, "filter")
     trials, pose_row, command_row = [], 0, 0
     for row in rows:
-        shape = (row["frames"], len(row["segments"]))
+        shape = (row["frames"], len(row["markers"]))
         pose = {key: column[pose_row : pose_row + shape[0] * shape[1]] for key, column in poses.items()}
         pose_row += shape[0] * shape[1]
         command_shape = (row["frames"], len(row["tendons"]))
@@ -131,7 +131,7 @@ def read_trials(folder: Path, splits: tuple[str, ...]) -> list[Trial]:
                 session=row.get("session", ""),
                 gravity=np.array(row["gravity"]),
                 time=pose["time"].reshape(shape)[:, 0].copy(),
-                segments=tuple(row["segments"]),
+                markers=tuple(row["markers"]),
                 positions=stack(pose, ("x", "y", "z"), shape),
                 quaternions=stack(pose, ("qw", "qx", "qy", "qz"), shape) if row["orientations"] else None,
                 measured=pose["measured"].reshape(shape),

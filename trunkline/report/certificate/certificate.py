@@ -104,7 +104,7 @@ def certify(
     radius = uncertainty["radius_mm"]["median"]
     prediction = replayed(model, trials, tables, config.frames)
     facts = {
-        "arm": {"name": config.arm, "length_m": length, "segments": len(trials[0].segments), "tendons": model.nu},
+        "arm": {"name": config.arm, "length_m": length, "markers": len(trials[0].markers), "tendons": model.nu},
         "session": {
             "name": config.session,
             "recorded": recorded_of_each(trials, DECIDING),
@@ -124,7 +124,7 @@ def certify(
                "open": sum(len(stage["open"]) for stage in facts["parameters"].values())}  # fmt: skip
     if uncertainty["measured"]:
         numbers["coverage"] = uncertainty["measured"]
-    replays = packed(prediction, model, trials[0].segments)
+    replays = packed(prediction, model, trials[0].markers)
     return Certificate(facts, numbers, replays, held_out_shapes(prediction), tip_budget)
 
 
@@ -135,7 +135,7 @@ def inputs_of(
     """Of the budget. ingested: metrics of the stage `ingest`."""
     parameters, noise = identified(tables), ingested["position_noise_mm"] / 1e3
     rested = at_rest(trials)
-    tip = replay(model, [], trials[0].segments).tip
+    tip = replay(model, [], trials[0].markers).tip
     residuals = tip_residuals(model, rested, tip)
     usable = np.isfinite(residuals)
     lacking = None
@@ -174,7 +174,7 @@ def replayed(model: mujoco.MjModel, trials: list[Trial], tables: dict[str, dict]
     kinds = {kind for table in tables.values() for kind in table["compared"]["experiments"]}
     delay = compared["command_delay"]
     experiments = [prepare(trial, model, frames, delay) for trial in trials if trial.experiment in kinds]
-    return Prediction(replay(model, experiments, trials[0].segments), experiments)
+    return Prediction(replay(model, experiments, trials[0].markers), experiments)
 
 
 def held_out_shapes(prediction: Prediction) -> list[tuple[str, np.ndarray, np.ndarray]]:

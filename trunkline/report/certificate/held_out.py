@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from trunkline.identification.evaluation.evaluation import segment_positions
+from trunkline.identification.evaluation.evaluation import marker_positions
 from trunkline.identification.parameters.per_session import model_in
 from trunkline.recordings.trials.experiments import is_static
 from trunkline.recordings.trials.splits import VALIDATE
@@ -19,7 +19,7 @@ def at_rest(trials: list[Trial]) -> list[Trial]:
 
 
 def tip_residuals(model: mujoco.MjModel, trials: list[Trial], tip: int) -> np.ndarray:
-    """Distances of the twin's segment of number `tip` from where `trials` at rest saw it, m, NaN where they did not.
+    """Distances of the twin's marker of number `tip` from where `trials` at rest saw it, m, NaN where they did not.
     Shape (N,)."""
     lengths = np.full(len(trials), np.nan)
     for session in sessions_of(trials):
@@ -28,6 +28,6 @@ def tip_residuals(model: mujoco.MjModel, trials: list[Trial], tip: int) -> np.nd
         equilibria = arm_of(session_model).rest(posed([trials[i] for i in places], session_model))
         for i, qpos, rested in zip(places, equilibria.qpos, equilibria.converged, strict=True):
             if rested and trials[i].measured[-1, tip]:
-                place = segment_positions(session_model, trials[i].segments, qpos)[tip]
+                place = marker_positions(session_model, trials[i].markers, qpos)[tip]
                 lengths[i] = np.linalg.norm(place - trials[i].positions[-1, tip])
     return lengths

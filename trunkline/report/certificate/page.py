@@ -46,7 +46,7 @@ def _first(facts: dict) -> str:
     arm, session = facts["arm"], facts["session"]
     rows = {
         "Arm": f"{arm['name']}; {1e3 * arm['length_m']:.0f} mm, {arm['tendons']} tendons, "
-        f"{arm['segments']} segments tracked",
+        f"{arm['markers']} markers tracked",
         "Session": f"{session['name']}; {'; '.join(session['recorded'])}",
     }
     return (
@@ -61,7 +61,7 @@ def _errors(facts: dict) -> str:
     whole = [row for row in facts["errors"] if row["kind"] is None or _lone(facts, row)]
     table = [_error_row(row, whole=False) for row in whole]
     every = [_error_row(row, whole=row["kind"] is None) for row in facts["errors"]]
-    caption = "Position error over all segments / of the tip, mm (the former in % of length), mean over trials"
+    caption = "Position error over all markers / of the tip, mm (the former in % of length), mean over trials"
     note = (
         "<p class=\"quiet\">Nothing was fitted to the trials of test; choices are made on those of validate. The noise "
         "floor is what noise and the fit of a pose leave by themselves.</p>\n"

@@ -6,22 +6,22 @@ import mujoco
 import numpy as np
 
 from trunkline.identification.evaluation.evaluation import Prediction
-from trunkline.model.elements import segment_sites
+from trunkline.model.elements import marker_sites
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 
 UNIT = 5e-5  # m, of a number: ± 1.6 m
 LOST = -32768  # of a point that was not seen
-THINNEST = 3e-3  # m, as which a segment without a shape is drawn
+THINNEST = 3e-3  # m, as which a marker without a shape is drawn
 FASTEST = 40.0  # frames a second, at most
 
 
-def packed(prediction: Prediction, model: mujoco.MjModel, segments: tuple[str, ...]) -> dict:
+def packed(prediction: Prediction, model: mujoco.MjModel, markers: tuple[str, ...]) -> dict:
     """Of what a model says of some trials, beside what was measured: for `client/src/certificate/replays.js`.
 
-    Each trial has its measured frames, then its simulated ones; a frame has the mount and then the segments from the
+    Each trial has its measured frames, then its simulated ones; a frame has the mount and then the markers from the
     base on, a point its x, y and z in 16 bits.
     """
-    sites = segment_sites(model, segments)
+    sites = marker_sites(model, markers)
     order = np.argsort(np.linalg.norm(prediction.replay.straight, axis=1))
     site_geoms = [model.geom_bodyid == body for body in model.site_bodyid[sites[order]]]
     radii = [model.geom_size[shapes, 0].max(initial=THINNEST) for shapes in site_geoms]

@@ -42,7 +42,7 @@ def verdict(
     tip = f", tips {identified['e_tip_mm']:.2g} mm" if "e_tip_mm" in identified else ""
     good = f"good for {fit[0]}" if fit and better else f"good {NOTHING}"
     rest = f"at rest, in the median pose, its tip is within {radius_mm:.2g} mm of the twin's in 95 of 100 cases"
-    start = f"{where}, segments are {off:.2g} mm off in the mean, {share:.2g} % of length{tip}"
+    start = f"{where}, markers are {off:.2g} mm off in the mean, {share:.2g} % of length{tip}"
     return f"{start}; {rest}; {good}; not for {_listed(limits)}."
 
 

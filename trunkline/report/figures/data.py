@@ -59,13 +59,13 @@ def _gaps(axis: Axes, qualities: dict[int, Quality]) -> None:
 
 
 def _noise(axis: Axes, qualities: dict[int, Quality]) -> None:
-    segments = next(iter(qualities.values())).take.segments
+    markers = next(iter(qualities.values())).take.markers
     axis.boxplot(
-        [[1e3 * quality.position_noise[i] for quality in qualities.values()] for i in range(len(segments))],
-        tick_labels=[segment.removeprefix("unit_") for segment in segments],
+        [[1e3 * quality.position_noise[i] for quality in qualities.values()] for i in range(len(markers))],
+        tick_labels=[marker.removeprefix("unit_") for marker in markers],
         showfliers=False,
     )
-    axis.set(title="Noise per segment", xlabel="segment", ylabel="position (mm)", ylim=(0, 1.1 * axis.get_ylim()[1]))
+    axis.set(title="Noise per marker", xlabel="marker", ylabel="position (mm)", ylim=(0, 1.1 * axis.get_ylim()[1]))
 
 
 def _stamps(axis: Axes, qualities: dict[int, Quality]) -> None:
@@ -124,7 +124,7 @@ def _words(axis: Axes, qualities: list[Quality], refused: dict[str, str]) -> Non
 
 
 def _coverage(axes: Axes, qualities: list[Quality]) -> None:
-    """A band a trial, in it a row a segment: what was seen when. Of poses in steps each stands until the next."""
+    """A band a trial, in it a row a marker: what was seen when. Of poses in steps each stands until the next."""
     bins = int(max(quality.take.time[-1] for quality in qualities) / BIN) + 1
     bands, ticks, row = [], [], 0
     for quality in qualities:
@@ -132,10 +132,10 @@ def _coverage(axes: Axes, qualities: list[Quality]) -> None:
         place = (take.time / BIN).astype(int)
         frames = np.bincount(place, minlength=bins)
         pose = np.searchsorted(place, np.arange(bins), side="right") - 1
-        tall = 1 + 4 // len(take.segments)  # rows a segment
-        apart = 1 + len(take.segments) // 10  # empty rows to the next band
-        band = np.full((tall * len(take.segments) + apart, bins), np.nan)
-        for index in range(len(take.segments)):
+        tall = 1 + 4 // len(take.markers)  # rows a marker
+        apart = 1 + len(take.markers) // 10  # empty rows to the next band
+        band = np.full((tall * len(take.markers) + apart, bins), np.nan)
+        for index in range(len(take.markers)):
             good = np.isfinite(take.positions[:, index, 0])
             if is_stepwise(take.experiment):
                 share = good[pose]
@@ -145,7 +145,7 @@ def _coverage(axes: Axes, qualities: list[Quality]) -> None:
             level[place[-1] + 1 :] = np.nan
             band[tall * index : tall * (index + 1)] = level
         bands.append(band)
-        ticks.append(row + tall * len(take.segments) / 2)
+        ticks.append(row + tall * len(take.markers) / 2)
         row += len(band)
     extent = (0, bins * BIN, row, 0)
     colors = ListedColormap([UNSEEN, PARTLY, SEEN])
@@ -160,12 +160,12 @@ def _coverage(axes: Axes, qualities: list[Quality]) -> None:
     )
     axes.set_yticks(ticks, [quality.take.name for quality in qualities], fontsize=7)
     axes.set(xlabel="time (s)")
-    axes.set_title("Coverage: each trial's segments, base on top; red where unseen, yellow where in part")
+    axes.set_title("Coverage: each trial's markers, base on top; red where unseen, yellow where in part")
     axes.grid(False)
 
 
 def filter_figure(take: RawTrial, trial: Trial) -> Figure:
-    """One moving trial before and after the filter, at the segment that moves most."""
+    """One moving trial before and after the filter, at the marker that moves most."""
     base = average_base(take.base_positions, take.base_quaternions)
     moved, _ = to_base_frame(base, take.positions, None)
     figure, axes = plt.subplots(2, 1, figsize=(9, 6), sharex=True)
@@ -179,7 +179,7 @@ def filter_figure(take: RawTrial, trial: Trial) -> Figure:
         panel.axvline(trial.start, color=INITIAL, lw=1)
         for begin, end in stretches(~trial.measured[:, last]):
             panel.axvspan(trial.time[begin], trial.time[end], color=INITIAL, alpha=0.15, lw=0)
-    title = f"{trial.name}, segment {trial.segments[last]}: measured and filtered"
+    title = f"{trial.name}, marker {trial.markers[last]}: measured and filtered"
     axes[0].set(title=title, ylabel="position (mm)")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     axes[1].set(xlabel="time (s), line: detected start, shaded: not measured", ylabel="removed (mm)", ylim=(-2, 2))

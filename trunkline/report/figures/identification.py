@@ -63,7 +63,7 @@ def error_figure(curves: pd.DataFrame, floor: dict[str, float]) -> Figure:
 
 
 def distance_figure(table: pd.DataFrame, trial: str) -> Figure:
-    """Measured against simulated distances of a few segments over time."""
+    """Measured against simulated distances of a few markers over time."""
     figure, axes = plt.subplots(1, 2, figsize=(10, 4), sharey=True)
     models = [name for name in table.source.unique() if name != "measured"]
     for axis, model in zip(axes, models, strict=True):
@@ -71,7 +71,7 @@ def distance_figure(table: pd.DataFrame, trial: str) -> Figure:
             ("measured", {"color": MEASURED, "linewidth": 2.2, "alpha": 0.45}),
             (model, {"color": COLORS[model], "linewidth": 1.2}),
         ):
-            for number, (_, rows) in enumerate(table[table.source == source].groupby("segment", sort=False)):
+            for number, (_, rows) in enumerate(table[table.source == source].groupby("marker", sort=False)):
                 axis.plot(rows.time_s, rows.distance_mm, label=source if number == 0 else None, **style)
         axis.set(xlabel="time (s)", title=f"{trial}: {model} model", ylim=0)
         axis.legend(loc="lower right")
@@ -96,7 +96,7 @@ def path_figure(predictions: dict[str, Prediction]) -> Figure:
         low, high = axis.get_ylim()
         spare = max(0.0, NARROWEST - (high - low)) / 2
         axis.set_ylim(low - spare, high + spare)
-    axes[0].set_title(f"Last tracked segment in the base frame, {experiment.name}")
+    axes[0].set_title(f"Last marker in the base frame, {experiment.name}")
     axes[-1].set_xlabel("time (s)")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure

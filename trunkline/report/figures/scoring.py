@@ -51,7 +51,7 @@ def trial_figure(tables: dict[str, pd.DataFrame]) -> Figure:
     return figure
 
 
-def segment_figure(tables: dict[str, pd.DataFrame]) -> Figure:
+def marker_figure(tables: dict[str, pd.DataFrame]) -> Figure:
     """The position error from the base to the tip, a line a model: a panel for each kind in each of the `tables`."""
     panels = [(title, kind, rows) for title, table in tables.items() if len(table)
               for kind, rows in table.groupby("experiment", sort=False)]  # fmt: skip

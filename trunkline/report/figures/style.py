@@ -18,7 +18,7 @@ UNIT, UNIT_EDGE, TENDON = "#f3d9bd", "#8a5a2b", "#333333"
 BASE = "#000000"
 # Sets that are reached: by the rigid arm's mount, by the soft arm's tip, by the tip with both.
 RIGID, SOFT, HYBRID = IDENTIFIED, INITIAL, VALIDATE
-# What the cameras saw of a segment in a stretch of time.
+# What the cameras saw of a marker in a stretch of time.
 UNSEEN, PARTLY, SEEN = INITIAL, VALIDATE, "#d7e3ea"
 # Said without certainty, or beside the point.
 DOUBTFUL = "#999999"

@@ -150,7 +150,7 @@ def doubt_lines(model: mujoco.MjModel, session: Session | None) -> list[str]:
         lines.append(f"no trial of the session ({', '.join(sorted(kinds))}) tells {', '.join(unidentifiable)}")
     if weightless and model.nu and all(EXPERIMENTS[kind].static for kind in kinds):
         lines.append("without gravity and motion, stiffness and kp show in their ratio alone: identify one of them")
-    if len(session.segments or {}) == 1:
+    if len(session.markers or {}) == 1:
         lines.append("one tracked point does not tell in which shape the arm is, nor exchanged names of tendons")
     if not weightless and not kinds & {"static_tilt", "static_pull"} and model.nu:
         lines.append("nothing is tilted or held: stiffness comes with the masses and the motors' gain, as a ratio")
@@ -163,13 +163,13 @@ def _unknown(model: mujoco.MjModel, session: Session) -> list[str]:
     """Names that a session gives to what this arm has not, a line a key."""
     sites = [model.site(index).name for index in range(model.nsite)]
     available = {
-        "segments": [name.removesuffix("_center") for name in sites
+        "markers": [name.removesuffix("_center") for name in sites
                      if name.endswith("_center") and name != "base_center"],
         "tendons": [model.tendon(cable).name for cable in cables(model)],
     }
     available["motors"] = available["tendons"]
     declared = {
-        "segments": (session.segments or {}).values(),
+        "markers": (session.markers or {}).values(),
         "tendons": (session.tendons or {}).values(),
         "motors": session.coupling()[0],
     }

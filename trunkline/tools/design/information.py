@@ -115,7 +115,7 @@ def stage_information(
         model, experiments, fit = set_up(_possible(config, fitted), fitted, model)
         experiments = [e if is_static(e.kind) else e.shortened(FRAMES) for e in experiments]
     else:
-        experiments, fit = [], fit_of(config, trials[0].segments)
+        experiments, fit = [], fit_of(config, trials[0].markers)
     fitting = [candidate for candidate in chosen if candidate.kind in config.experiments]
     done = simulated(fitting, model, fit, grid.frame_rate)
     matrices = information(fit, model, [e for _, e in done], share)

@@ -25,7 +25,7 @@ def simulated(
     Args:
         fit: what will be identified from them; the twin is where its search would begin.
     """
-    planned = [_experiment(candidate, model, len(fit.segments), frame_rate) for candidate in chosen]
+    planned = [_experiment(candidate, model, len(fit.markers), frame_rate) for candidate in chosen]
     starts = _starts([e for e in planned if not is_static(e.kind)], model, fit)
     planned = [replace(e, start=starts.get(e.name, e.start)) for e in planned]
     done = []
@@ -40,7 +40,7 @@ def simulated(
     return done
 
 
-def _experiment(candidate: Candidate, model: mujoco.MjModel, segments: int, frame_rate: float) -> Experiment:
+def _experiment(candidate: Candidate, model: mujoco.MjModel, markers: int, frame_rate: float) -> Experiment:
     """Without what is measured."""
     static, hinges = is_static(candidate.kind), arm_hinges(model)
     start = _bent(candidate, model) if candidate.turn else np.full(hinges, np.nan if static else 0.0)
@@ -49,9 +49,9 @@ def _experiment(candidate: Candidate, model: mujoco.MjModel, segments: int, fram
     return Experiment(
         name=candidate.name, kind=candidate.kind, split=IDENTIFY, gravity=candidate.gravity, start=start,
         velocity=np.zeros(hinges), lead=step, controls=straight - candidate.pulls,
-        positions=np.zeros((len(candidate.pulls), segments, 3)),
-        measured=np.ones((len(candidate.pulls), segments), bool), frame_step=step,
-        fit=PoseFit(start, np.zeros(segments), 0, True), load=candidate.load,
+        positions=np.zeros((len(candidate.pulls), markers, 3)),
+        measured=np.ones((len(candidate.pulls), markers), bool), frame_step=step,
+        fit=PoseFit(start, np.zeros(markers), 0, True), load=candidate.load,
     )  # fmt: skip
 
 
@@ -88,11 +88,11 @@ def _before(experiment: Experiment) -> bytes:
 
 
 def _positions(experiments: list[Experiment], model: mujoco.MjModel, fit: Fit) -> list[np.ndarray]:
-    """Of the segments, m, NaN where the twin finds no rest or leaves the physics. Each (T, S, 3)."""
+    """Of the markers, m, NaN where the twin finds no rest or leaves the physics. Each (T, S, 3)."""
     return [tracks[0] for tracks in _twin(experiments, model, fit).positions]
 
 
 def _twin(experiments: list[Experiment], model: mujoco.MjModel, fit: Fit) -> Simulated:
     """The one candidate from which a search begins."""
     problem = fit.problem(model, experiments)
-    return Population(model, experiments, fit.segments).simulate(problem.fields(problem.start()[None]))
+    return Population(model, experiments, fit.markers).simulate(problem.fields(problem.start()[None]))

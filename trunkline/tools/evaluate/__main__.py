@@ -2,7 +2,7 @@
 
 Prints the errors of every trial and their means, beside what knows nothing of forces (the mean rest shape, the straight
 arm, the start held) and beside the noise floor. All in mm; of what stands beside, position / tip error. Writes
-metrics.json, trials.csv, segments.csv and two pictures. With --reference, how the errors changed: has the arm aged?
+metrics.json, trials.csv, markers.csv and two pictures. With --reference, how the errors changed: has the arm aged?
 """
 
 import argparse
@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from trunkline.errors import InputError, in_one_line
 from trunkline.files import file_digest
-from trunkline.identification.evaluation.error_tables import segment_table, trial_table
+from trunkline.identification.evaluation.error_tables import marker_table, trial_table
 from trunkline.identification.results.scoring import evaluate
 from trunkline.identification.simulate.checks import check_trials
 from trunkline.pipeline.stage import output_folder, write_metrics
@@ -65,7 +65,7 @@ def _run(args: argparse.Namespace) -> int:
     for session in written.namesakes(models["model"], trials):
         doubt = "the model has numbers for a session of that name, and was fitted to no trial of this one"
         print(f"evaluate: warning: session {session}: {doubt}", file=sys.stderr)
-    segments = trials[0].segments
+    markers = trials[0].markers
     for model in models.values():
         check_trials(trials, model)
     print(f"evaluate: simulating {len(trials)} trials", flush=True)
@@ -86,21 +86,21 @@ def _run(args: argparse.Namespace) -> int:
         print(f"\n* the model was fitted to these {len(fitted)} of {len(trials)} trials")
     if reference is not None:
         print("\n".join(["", *change_lines(reference, metrics)]))
-    _write(out, metrics, table, segment_table(predictions, segments), args.session.resolve().name)
+    _write(out, metrics, table, marker_table(predictions, markers), args.session.resolve().name)
     print(f"\nevaluate: written to {out}")
     return 0
 
 
-def _write(out: Path, metrics: dict, trials, segments, title: str) -> None:
-    from trunkline.report.figures.scoring import segment_figure, trial_figure  # pyplot takes long to import
+def _write(out: Path, metrics: dict, trials, markers, title: str) -> None:
+    from trunkline.report.figures.scoring import marker_figure, trial_figure  # pyplot takes long to import
     from trunkline.report.figures.style import save_figure
 
     with output_folder(out) as folder:
         write_metrics(folder, metrics)
         trials.to_csv(folder / "trials.csv", index=False, float_format="%.6g")
-        segments.to_csv(folder / "segments.csv", index=False, float_format="%.6g")
+        markers.to_csv(folder / "markers.csv", index=False, float_format="%.6g")
         save_figure(trial_figure({title: trials}), folder / "errors.png")
-        save_figure(segment_figure({title: segments}), folder / "segments.png")
+        save_figure(marker_figure({title: markers}), folder / "markers.png")
 
 
 if __name__ == "__main__":

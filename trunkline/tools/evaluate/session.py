@@ -46,10 +46,10 @@ def read_trials_of(folder: Path, root: Path, caller: str) -> tuple[list[Trial], 
         raise InputError(f"{folder}: found trials without {error}, expected filtered ones, or a session") from error
     if not trials:
         raise InputError(f"{folder}: found no trial, expected at least one")
-    segments = trials[0].segments
-    other = next((trial for trial in trials if trial.segments != segments), None)
+    markers = trials[0].markers
+    other = next((trial for trial in trials if trial.markers != markers), None)
     if other is not None:
-        mismatch = f"found {len(other.segments)} segments, expected the {len(segments)} of {trials[0].name}"
+        mismatch = f"found {len(other.markers)} markers, expected the {len(markers)} of {trials[0].name}"
         raise InputError(f"{folder}: trial {other.name}: {mismatch}")
     return trials, []
 

@@ -77,7 +77,7 @@ class Scorer:
         slope, curvature = np.zeros(len(self.parameters)), np.zeros((len(self.parameters),) * 2)
         if determined:
             bounds = {self.parameters[i]: _around(self.parameters[i], self.model) for i in determined}
-            problem = Problem(self.model, [experiment], trial.segments, bounds, self.loss.kind, self.loss)
+            problem = Problem(self.model, [experiment], trial.markers, bounds, self.loss.kind, self.loss)
             linear = linearise(problem, problem.start())
             if problem.diverged:
                 raise InputError(f"trial {trial.name}: the model does not survive it, expected one that stays together")

@@ -75,7 +75,7 @@ def main(arguments: list[str] | None = None) -> int:
         if lacking:
             continue
         arm, experiments, fit = to_identify_from(config, model, trials)
-        lines = described_lines(arm, experiments, fit) + up_lines(arm, experiments, fit.segments, ups)
+        lines = described_lines(arm, experiments, fit) + up_lines(arm, experiments, fit.markers, ups)
         print("\n".join(f"  {line}" for line in lines), flush=True)
         parameters, pairs = expected_identifiability(arm, experiments, fit, args.error / 100)
         for parameter in sorted(parameters, key=lambda parameter: -parameter.share):

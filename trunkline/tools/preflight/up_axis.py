@@ -32,7 +32,7 @@ def other_ups(takes: list[RawTrial]) -> dict[str, np.ndarray]:
 
 
 def up_lines(
-    model: mujoco.MjModel, experiments: list[Experiment], segments: tuple[str, ...], ups: dict[str, np.ndarray]
+    model: mujoco.MjModel, experiments: list[Experiment], markers: tuple[str, ...], ups: dict[str, np.ndarray]
 ) -> list[str]:
     """The axis with which the described arm is much nearer to some of the trials than with the one that is declared,
     and than a straight arm; none where there is no such axis.
@@ -48,12 +48,12 @@ def up_lines(
     def error(prediction: Prediction) -> float:
         return prediction.overall()["e_position_mm"]
 
-    declared = replay(model, tried, segments)
+    declared = replay(model, tried, markers)
     off, still = (error(Prediction(replayed, tried)) for replayed in (declared, straight(tried, declared)))
     errors = []
     for number in range(len(AXES)):
         turned = [replace(experiment, gravity=ups[experiment.name][number]) for experiment in tried]
-        errors.append(error(Prediction(replay(model, turned, segments), turned)))
+        errors.append(error(Prediction(replay(model, turned, markers), turned)))
     best = int(np.argmin(errors))
     if errors[best] > min(off, still) / BETTER:
         return []
