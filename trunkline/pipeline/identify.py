@@ -17,7 +17,7 @@ from trunkline.identification.fit.identify import Identification, identify, with
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.settings import IdentificationSettings
 from trunkline.identification.fit.setup import check_folds, check_parameters, set_up, with_every
-from trunkline.identification.parameters.parameters import PARAMETERS, parameter_named
+from trunkline.identification.parameters.parameters import NAMES, parameter_named
 from trunkline.identification.parameters.per_session import (
     make_room,
     names_in,
@@ -32,7 +32,7 @@ from trunkline.identification.simulate.checks import check_trials
 from trunkline.identification.simulate.experiment import Experiment
 from trunkline.identification.uncertainty.cross_validation import cross_validate
 from trunkline.identification.uncertainty.trial_diagnostics import trial_diagnostics
-from trunkline.model.elements import BACKLASH, CAPSTAN_FRICTION, RATE_LIMIT, numeric, switch_off
+from trunkline.model.arm_model import BACKLASH, CAPSTAN_FRICTION, RATE_LIMIT, ArmModel
 from trunkline.pipeline.inputs import read_spec
 from trunkline.pipeline.stage import output_folder, write_json, write_metrics
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_static
@@ -173,16 +173,16 @@ def compared_models(
         models["coarse"] = models["identified"]
     elif whole:
         extended = read_spec(CAD_MODEL)
-        make_room(extended, names_in(inputs.model, PARAMETERS))
+        make_room(extended, names_in(inputs.model, NAMES))
         models["coarse"] = with_parameters(extended.compile(), read_scalars(whole) | result.values)
         # rest shape and markers are no matter of scalars
         for field in ("qpos_spring", "tendon_lengthspring", "site_pos", "site_sameframe"):
             getattr(models["coarse"], field)[:] = getattr(inputs.model, field)
     # as in MuJoCo alone and in Unity: tendons without friction in their guide holes, winches without rate limit or play
     for name, numbers in {"smooth": (CAPSTAN_FRICTION,), "prompt": (RATE_LIMIT, BACKLASH)}.items():
-        if any(numeric(models["identified"], number) for number in numbers):
+        if any(ArmModel(models["identified"]).number(number) for number in numbers):
             models[name] = mujoco.MjModel.from_xml_string(mjcf)
-            switch_off(models[name], *numbers)
+            ArmModel(models[name]).switch_off(*numbers)
     return models
 
 

@@ -16,7 +16,8 @@ from trunkline.identification.fit.problem import Problem
 from trunkline.identification.fit.robust import reweighted
 from trunkline.identification.fit.search import Convergence, SearchResult, descend, search
 from trunkline.identification.fit.surrogate import Surrogate, surrogate
-from trunkline.identification.parameters.parameters import candidate_fields, follow_rest, parameter_named, set_fields
+from trunkline.identification.parameters.joints import follow_rest
+from trunkline.identification.parameters.parameters import candidate_fields, parameter_named, set_fields
 from trunkline.identification.simulate.experiment import Experiment
 from trunkline.identification.simulate.resting import RestShape, spring_references
 from trunkline.recordings.trials.experiments import is_static
