@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import count, takewhile
 from typing import TYPE_CHECKING, Literal
 
 import mujoco
@@ -79,6 +78,8 @@ def parameter_named(name: str) -> Parameter:
     if name in PARAMETERS:
         return PARAMETERS[name]
     stem, _, last = name.rpartition("_")
+    if stem not in NUMBERED or not (last == "*" or last.isdecimal()):
+        raise KeyError(name)
     make, first = NUMBERED[stem]
     return make(first if last == "*" else int(last))
 
@@ -88,8 +89,8 @@ def names_of(name: str, model: mujoco.MjModel) -> list[str]:
     if not name.endswith(EVERY):
         return [name]
     stem = name.removesuffix(EVERY)
-    names = (f"{stem}_{k}" for k in count(NUMBERED[stem][1]))
-    return list(takewhile(lambda each: parameter_named(each).belongs_to(model), names))
+    make, first = NUMBERED[stem]
+    return [f"{stem}_{k}" for k in range(first, MOST + 1) if make(k).belongs_to(model)]
 
 
 def parameters_of(model: mujoco.MjModel) -> dict[str, Parameter]:
