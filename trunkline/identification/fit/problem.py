@@ -9,12 +9,11 @@ import mujoco
 import numpy as np
 from pydantic import Field
 
-from trunkline.identification.parameters.joints import follow_rest
 from trunkline.identification.parameters.parameters import candidate_fields, parameter_named
 from trunkline.identification.parameters.per_session import values_in
 from trunkline.identification.simulate.experiment import Experiment, weights_for
 from trunkline.identification.simulate.loss import RESIDUALS, LossWeights, loss_of
-from trunkline.identification.simulate.resting import RestShape, spring_references
+from trunkline.identification.simulate.resting import RestShape, hang_in
 from trunkline.identification.simulate.simulated_sessions import Sessions
 from trunkline.model.arm_model import ArmModel
 from trunkline.recordings.trials.experiments import is_static
@@ -88,8 +87,7 @@ class Problem:
             model, values_in(session, values), {name: blocks[:, i] for i, name in enumerate(self.per_joint)}
         )
         if self.rest is not None:
-            fields["qpos_spring"] = spring_references(fields, model, self.rest)
-            follow_rest(fields, model)
+            hang_in(fields, model, self.rest)
         return fields
 
     def residuals(self, vectors: np.ndarray, near: np.ndarray | None = None, rough: bool = False) -> list[np.ndarray]:

@@ -13,7 +13,6 @@ from trunkline.identification.parameters.per_session import names_in, other_sess
 from trunkline.identification.simulate.experiment import Experiment, prepare
 from trunkline.identification.simulate.markers import with_measured_markers
 from trunkline.identification.simulate.resting import resting_shape
-from trunkline.recordings.trials.splits import IDENTIFY
 from trunkline.recordings.trials.trial import Trial
 
 EVERY_ANGLE = f"tendon_angle{EVERY}"
@@ -68,10 +67,3 @@ def check_parameters(stage: str, config: IdentificationSettings, model: mujoco.M
             parameter.read(model)
         except InputError as error:
             raise InputError(f"{where}: {error}") from error
-
-
-def check_folds(stage: str, folds: int, fitted: list[Experiment]) -> None:
-    """Refuse to leave out more groups of trials than there are trials to identify from."""
-    trials = sum(e.split == IDENTIFY for e in fitted)
-    if folds > trials:
-        raise InputError(f"{stage}.cross_validation_folds: found {folds}, expected at most {trials}, one a trial")

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.optimize import newton
 
 from trunkline.errors import InputError
+from trunkline.identification.parameters.joints import follow_rest
 from trunkline.identification.parameters.parameter import Fields
 from trunkline.identification.simulate.experiment import Experiment
 from trunkline.identification.simulate.pose_fit import fit_pose
@@ -40,6 +41,12 @@ def rest_shape(model: mujoco.MjModel, pose: np.ndarray, gravity: np.ndarray) -> 
     data.qpos[: len(pose)] = pose
     mujoco.mj_forward(model, data)
     return RestShape(np.array(pose), -data.qfrc_bias[: len(pose)])
+
+
+def hang_in(fields: Fields, model: mujoco.MjModel, rest: RestShape) -> None:
+    """Let the springs of each candidate be slack where it then rests in `rest`, in place."""
+    fields["qpos_spring"] = spring_references(fields, model, rest)
+    follow_rest(fields, model)
 
 
 def spring_references(fields: Fields, model: mujoco.MjModel, rest: RestShape) -> np.ndarray:
