@@ -28,7 +28,7 @@ from trunkline.identification.fit.problem import Bounds, Problem
 from trunkline.identification.fit.search import descend, search
 from trunkline.identification.fit.settings import IdentificationSettings
 from trunkline.identification.fit.surrogate import surrogate
-from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.identification.simulate.experiment import prepare
 from trunkline.model.arm.joints import Joints, MaxwellElement
 from trunkline.pipeline.config import load_config
@@ -98,7 +98,7 @@ def bounds_of(name: str) -> dict[str, Bounds]:
         own = settings_of(name).parameters[key]
         low = max(own.low, value / RANGE) if own.low < value else value / RANGE
         high = min(own.high, value * RANGE) if own.high > value else value * RANGE
-        found[key] = own if PARAMETERS[key].signed else Bounds(low, high)
+        found[key] = own if parameter_named(key).signed else Bounds(low, high)
     return found
 
 
@@ -144,11 +144,11 @@ def cover(name: str, is_matched: bool, repetitions: int) -> Coverage:
     model.opt.timestep = FRAME / STEPS
     truth = with_values(model, stage.true)
     clean = stage.trials(truth if is_matched else mismatched(truth), frames)
-    scaled = [key for key in stage.true if not PARAMETERS[key].signed]
+    scaled = [key for key in stage.true if not parameter_named(key).signed]
     expected = {
         key: value / MASS_FACTOR if key in FORCES and not is_matched else value for key, value in stage.true.items()
     }
-    exact = np.array([PARAMETERS[key].coordinate(value) for key, value in expected.items()])
+    exact = np.array([parameter_named(key).coordinate(value) for key, value in expected.items()])
     unit = np.array([1.0 if key in scaled else abs(value) for key, value in expected.items()])
     found = Coverage(list(stage.true), len(clean))
     with redirect_stdout(sys.stderr), progress(repetitions, f"coverage of {name}", "repetitions") as bar:

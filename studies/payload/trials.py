@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from trunkline.ar.hybrid.objects import GRIP, object_geoms
 from trunkline.ar.hybrid.worlds import HOOK_LENGTH
 from trunkline.frames import STANDARD_GRAVITY, rotation_from_wxyz, wxyz_from_rotation
-from trunkline.model.elements import actuators, unload_branches
+from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.motion import batch_of, hold, move
 from trunkline.model.simulation.rest import settle
 from trunkline.model.simulation.winch import Winches
@@ -138,13 +138,13 @@ def try_grasps(
     batch = batch_of(model, count)
     to_base = _set_up(batch, model, tries)
     place, gravity, geoms = batch.bind("qpos"), batch.expand("opt.gravity"), batch.expand("geom_pos")
-    motors = actuators(model)
+    motors = ArmModel(model).actuators
     straight = model.tendon_length0[model.actuator_trnid[motors, 0]]
     begun = np.zeros((count, len(motors))) if tries.before is None else tries.before
     initial = straight + np.where(begun > 0, -begun, 0.0 if tries.before is None else PAID_OUT)
     if tries.before is not None:
         place[:, : arm.nq] = settle(arm, initial, to_base.apply(model.opt.gravity)).qpos
-    unload_branches(model, place)
+    ArmModel(model).unload_branches(place)
     tie = _hang(batch, model, place[:, address : address + 7], to_base.apply(UP))
 
     steps, simulations = round(BLOCK / timestep), np.arange(count, dtype=np.int32)

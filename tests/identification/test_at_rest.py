@@ -14,7 +14,7 @@ from trunkline.identification.simulate.at_rest import shapes_at_rest
 from trunkline.identification.simulate.experiment import Experiment
 from trunkline.identification.simulate.pose_fit import PoseFit
 from trunkline.model.arm.tendons import Tendon
-from trunkline.model.elements import PRELOAD, WINDING, marker_sites, numbers_place, numeric_place
+from trunkline.model.arm_model import PRELOAD, WINDING, ArmModel
 from trunkline.model.simulation.rest import settle
 from trunkline.model.statics.chain import read_chain
 from trunkline.model.statics.equilibria import actuated
@@ -41,7 +41,8 @@ def path_of(model: mujoco.MjModel, pulls: np.ndarray, load: float = 0.0, gravity
 
 def tips(model: mujoco.MjModel, experiment: Experiment, values: dict[str, float] | None = None) -> np.ndarray:
     fields = candidate_fields(model, {k: np.array([v]) for k, v in (values or {"kp": 2000.0}).items()})
-    return shapes_at_rest(model, fields, [experiment], marker_sites(model, ("tip",)), None).positions[0][0, :, 0]
+    sites = ArmModel(model).marker_sites(("tip",))
+    return shapes_at_rest(model, fields, [experiment], sites, None).positions[0][0, :, 0]
 
 
 PULLS = np.random.default_rng(3).uniform(-0.002, 0.006, (5, 4))
@@ -87,8 +88,8 @@ def test_where_it_rests_depends_on_the_way_by_the_winch_s_play():
 
 def test_commands_draw_in_what_the_model_says():
     model, other = made(), made()
-    model.numeric_data[numeric_place(model, WINDING)] = 0.8
-    model.numeric_data[numbers_place(model, PRELOAD)] = [0.001, 0.0, -0.0005, 0.0]
+    model.numeric_data[ArmModel(model).places(WINDING)] = 0.8
+    model.numeric_data[ArmModel(model).places(PRELOAD)] = [0.001, 0.0, -0.0005, 0.0]
     places = tips(model, path_of(model, PULLS))
     drawn = 0.8 * PULLS + [0.001, 0.0, -0.0005, 0.0]
     np.testing.assert_allclose(places, tips(other, path_of(other, drawn)), atol=1e-9)

@@ -20,7 +20,7 @@ from trunkline.identification.simulate.experiment import own_starts, prepare
 from trunkline.identification.simulate.loss import LossWeights
 from trunkline.model.arm.guide_holes import GuideHoles, add_holes
 from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement, add_elements
-from trunkline.model.elements import arm_hinges, cables
+from trunkline.model.arm_model import ArmModel
 
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 
@@ -45,8 +45,8 @@ def test_half_the_step_moves_little_with_every_option_on():
     add_holes(spec, GuideHoles(0.2, 4))
     spec.option.timestep = FRAME / 4
     model = spec.compile()
-    model.dof_damping[: arm_hinges(model)] *= 4  # as the plant's
-    model.tendon_frictionloss[cables(model)] = plant.tendon_frictionloss[:] = 0
+    model.dof_damping[: ArmModel(model).hinge_count] *= 4  # as the plant's
+    model.tendon_frictionloss[ArmModel(model).cables] = plant.tendon_frictionloss[:] = 0
     experiments = [prepare(curl(plant, 30, frames=90), model, 90)]
     full, halved = (Prediction(replay(model, experiments, markers_of(model), f), experiments) for f in (1.0, 0.5))
     assert 0.3 < full.scores()["identify"]["e_internal_mm"] < 1.0  # 1 mm is 0.2 % of the arm's length

@@ -10,18 +10,19 @@ import pytest
 from tests.support.small_arm import small_spec
 from trunkline.errors import InputError
 from trunkline.identification.fit.setup import check_parameters
+from trunkline.identification.parameters.parameter import Parameter
 from trunkline.identification.parameters.parameters import (
     PARAMETERS,
-    Parameter,
     candidate_fields,
     names_of,
+    parameter_named,
+    parameters_of,
     set_fields,
-    unit_of_hinge,
 )
 from trunkline.identification.parameters.saving import save_model
 from trunkline.model.arm.guide_holes import GuideHoles, add_holes
 from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement, add_elements
-from trunkline.model.elements import BRANCH, PRELOAD, SECTIONS, WINDING, all_elements, arm_hinges
+from trunkline.model.arm_model import PRELOAD, SECTIONS, WINDING, ArmModel
 
 VALUES = {
     "joint_place": 0.3,
@@ -81,7 +82,7 @@ def model_with(values: dict[str, float], factors=None, model: mujoco.MjModel | N
     return model
 
 
-OWN = [name for name, parameter in PARAMETERS.items() if parameter.belongs_to(start_model())]
+OWN = list(parameters_of(start_model()))
 
 
 def test_every_parameter_has_a_case():
@@ -91,11 +92,11 @@ def test_every_parameter_has_a_case():
 @pytest.mark.parametrize("name", VALUES)
 def test_what_is_written_is_read(name):
     model = model_with({name: VALUES[name]})
-    assert PARAMETERS[name].read(model) == pytest.approx(VALUES[name])
+    assert parameter_named(name).read(model) == pytest.approx(VALUES[name])
     others = set(VALUES) - {name} - ({"joint_friction"} if name == "stiffness" else set())
     start = start_model()
     for other in others:  # nothing else moves
-        assert PARAMETERS[other].read(model) == pytest.approx(PARAMETERS[other].read(start)), other
+        assert parameter_named(other).read(model) == pytest.approx(parameter_named(other).read(start)), other
 
 
 @pytest.mark.parametrize("hinges", [(X, Y), (Y, X), (("x", (-1, 0, 0)), Y)])
@@ -115,15 +116,15 @@ def test_an_arm_is_bent_about_an_axis_however_it_is_drawn(hinges, about):
 def test_all_at_once_in_any_order():
     model = model_with(dict(reversed(VALUES.items())))
     for name, value in VALUES.items():
-        assert PARAMETERS[name].read(model) == pytest.approx(value), name
+        assert parameter_named(name).read(model) == pytest.approx(value), name
 
 
 def test_scaling_keeps_the_arm_s_proportions():
     start, model = start_model(), model_with({"stiffness": 2.5, "damping": 0.02})
-    arm, stiffer = slice(arm_hinges(start)), 2.5 / start.jnt_stiffness[0]
+    arm, stiffer = slice(ArmModel(start).hinge_count), 2.5 / start.jnt_stiffness[0]
     np.testing.assert_allclose(model.jnt_stiffness[arm] / start.jnt_stiffness[arm], stiffer)
     np.testing.assert_allclose(model.dof_damping[arm] / start.dof_damping[arm], 0.02 / start.dof_damping[0])
-    for part in all_elements(start, BRANCH):  # branches are as stiff beside their springs as before, and as slow
+    for part in ArmModel(start).branches:  # branches are as stiff beside their springs as before, and as slow
         np.testing.assert_allclose(model.tendon_stiffness[part.tendon] / start.tendon_stiffness[part.tendon], stiffer)
         np.testing.assert_allclose(model.dof_damping[part.branch] / start.dof_damping[part.branch], stiffer)
 
@@ -277,10 +278,10 @@ def test_a_unit_s_factor_is_shared_by_its_two_hinges():
     factors = np.linspace(0.9, 1.1, 8)
     model = model_with({}, {"stiffness": factors[None]})
     np.testing.assert_allclose(model.jnt_stiffness[:16] / start.jnt_stiffness[:16], np.repeat(factors, 2))
-    for element in all_elements(start, BRANCH):
+    for element in ArmModel(start).branches:
         grown = model.tendon_stiffness[element.tendon] / start.tendon_stiffness[element.tendon]
         np.testing.assert_allclose(grown, np.repeat(factors, 2))
-    assert unit_of_hinge(model).tolist() == [index // 2 for index in range(16)]
+    assert ArmModel(model).unit_of_hinge.tolist() == [index // 2 for index in range(16)]
 
 
 def test_hardening_makes_the_torque_k_times_q_plus_h_q_cubed():
@@ -314,11 +315,11 @@ def test_every_parameter_survives_saving(name):
     """Also one that is declared tomorrow: what it writes has a place in MJCF, alone or beside others."""
     spec = full_spec()
     model = spec.compile()
-    value = 1.3 * PARAMETERS[name].read(model) or 0.02
+    value = 1.3 * parameter_named(name).read(model) or 0.02
     set_fields(model, candidate_fields(model, {name: np.array([value])}))
     loaded = mujoco.MjModel.from_xml_string(save_model(spec, model))
-    assert PARAMETERS[name].read(loaded) == pytest.approx(value, rel=1e-5)
-    for field in PARAMETERS[name].fields:
+    assert parameter_named(name).read(loaded) == pytest.approx(value, rel=1e-5)
+    for field in parameter_named(name).fields:
         np.testing.assert_allclose(getattr(loaded, field), getattr(model, field), rtol=1e-5, atol=1e-9)
 
 
@@ -336,5 +337,5 @@ def test_a_saved_model_has_the_parameters():
     factors = {"stiffness": np.linspace(0.9, 1.1, 8)[None]}
     set_fields(model, candidate_fields(model, {k: np.array([v]) for k, v in VALUES.items()}, factors))
     loaded = mujoco.MjModel.from_xml_string(save_model(spec, model))
-    for name in {field for parameter in PARAMETERS.values() for field in parameter.fields}:
+    for name in {field for parameter in parameters_of(model).values() for field in parameter.fields}:
         np.testing.assert_allclose(getattr(loaded, name), getattr(model, name), rtol=1e-5, err_msg=name)

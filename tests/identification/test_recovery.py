@@ -8,7 +8,7 @@ from trunkline.identification.fit.fit import CoarseSearch, Fit, Method, Refineme
 from trunkline.identification.fit.identify import identify
 from trunkline.identification.fit.optimizers import LeastSquares
 from trunkline.identification.fit.problem import DIVERGED_LOSS, Bounds, Problem
-from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields, set_fields
+from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields, parameter_named, set_fields
 from trunkline.identification.simulate.experiment import prepare
 from trunkline.identification.simulate.loss import LossWeights
 from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement
@@ -121,7 +121,7 @@ def test_control_parameters_move_the_loss_the_right_way():
     experiments = [prepare(trial, model, 437) for trial in trials]
     spans = {name: Bounds(1e-4, 1e6) for name in ("kp", "kv", "force_range", "time_constant")}
     problem = Problem(model, experiments, markers_of(model), spans, "positions", WEIGHTS)
-    truth = np.log([PARAMETERS[name].read(model) for name in spans])
+    truth = np.log([parameter_named(name).read(model) for name in spans])
     candidates = truth + np.concatenate([np.zeros((1, 4)), np.diag(np.log([0.5, 3, 0.01, 2]))])
     losses = problem.losses(candidates)
     assert (losses[1:] > 10 * losses[0]).all()

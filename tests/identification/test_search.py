@@ -9,7 +9,7 @@ from trunkline.identification.fit.linearisation import linearise
 from trunkline.identification.fit.optimizers import DifferentialEvolution, LeastSquares
 from trunkline.identification.fit.problem import Bounds, Problem
 from trunkline.identification.fit.search import descend, search
-from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields, set_fields
+from trunkline.identification.parameters.parameters import candidate_fields, parameter_named, set_fields
 from trunkline.identification.simulate.experiment import prepare
 from trunkline.identification.simulate.loss import LossWeights
 
@@ -95,7 +95,7 @@ def test_differences_stay_within_the_bounds(problem):
 
 
 def test_a_problem_starts_at_the_model_s_own_values(problem):
-    expected = [np.log(PARAMETERS[name].read(problem.model)) for name in TRUE]
+    expected = [np.log(parameter_named(name).read(problem.model)) for name in TRUE]
     np.testing.assert_allclose(problem.start(), expected)
     hardening = Problem(
         problem.model, problem.experiments, problem.markers, {"hardening": Bounds(0.02, 20.0)}, "positions",

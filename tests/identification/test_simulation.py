@@ -17,7 +17,7 @@ from trunkline.identification.simulate.loss import position_error
 from trunkline.identification.simulate.population import Population
 from trunkline.identification.simulate.pose_fit import fit_pose
 from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement, add_elements
-from trunkline.model.elements import BRANCH, SLIDER, elements
+from trunkline.model.arm_model import ArmModel
 
 
 def seen_at(model, qpos, markers):
@@ -234,7 +234,7 @@ def test_what_joints_remember_begins_as_the_hand_left_it():
     )  # fmt: skip
     moving = InMotion(model, {0: experiment}, False, np.zeros(0, int), 1.0)
     batch = moving._batch({"jnt_stiffness": model.jnt_stiffness[None]}, [0])
-    branch, slider = elements(model, BRANCH), elements(model, SLIDER)
+    branch, slider = ArmModel(model).branches[0], ArmModel(model).sliders[0]
     np.testing.assert_allclose(batch.bind("qpos")[0, branch.branch], start)
     places = model.tendon_plasticadr[slider.tendon]
     np.testing.assert_allclose(batch.bind("plastic")[0, places], np.tile([0.08, 0.0], 8), atol=1e-12)

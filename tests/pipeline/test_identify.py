@@ -16,7 +16,7 @@ from tests.identification.test_stage import metrics_of, settings, truth_of
 from tests.report.certificate.sample import ASKED, INGESTED
 from tests.support.matched_plant import begin_project, curl, release, static_pull, tilt
 from tests.support.workbench import ROOT
-from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.pipeline.identify import CAD_MODEL, run
 from trunkline.pipeline.stage import write_json
 from trunkline.recordings.trials.splits import SPLITS
@@ -47,7 +47,7 @@ def project(tmp_path_factory):
         patch.setattr("trunkline.identification.fit.certainty.RESAMPLINGS", 500)
         patch.chdir(root)
         model = begin_project(root, 4)
-        true = {name: scale * PARAMETERS[name].read(model) for name, scale in SCALES.items()}
+        true = {name: scale * parameter_named(name).read(model) for name, scale in SCALES.items()}
         truth = truth_of(model, **SCALES)
         write_trials(FILTERED, [*session_of(truth, "monday", 0), *session_of(truth, "friday", 50)])
         ranges = {name: (value / 3, 3 * value) for name, value in true.items()}

@@ -14,7 +14,7 @@ from trunkline.ar.hybrid.worlds import SupportSurface, WorldGeometry
 from trunkline.frames import wxyz_from_rotation
 from trunkline.kinematics.panda.mounts import FixedMount
 from trunkline.model.arm.spiral import spiral_chain
-from trunkline.model.elements import arm_hinges
+from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.rest import settle
 
 BAR = GraspObject("cylinder", 0.04, 0.12, 0.1, "plastic")
@@ -70,7 +70,7 @@ def test_an_arm_begins_at_rest_under_its_first_pulls(models):
     tries = tries_of([(np.zeros(3), Rotation.identity())], before)
     tries.pulls[:] = before
     tries.poses[:, 0] += 0.5  # out of the way
-    hinges = slice(0, arm_hinges(models[1]))
+    hinges = slice(0, ArmModel(models[1]).hinge_count)
     bent = try_grasps(*models, tries, SHORT).qpos[0, hinges]
     straight = try_grasps(*models, replace(tries, before=None, pulls=0 * tries.pulls), SHORT).qpos[0, hinges]
     rest = settle(models[1], models[1].tendon_length0[:3] + [-0.05, PAID_OUT, PAID_OUT], np.array([0, 0, -9.81])).qpos

@@ -9,7 +9,7 @@ from trunkline.model.arm.material import TPU_95A_DENSITY, TPU_95A_MODULUS, unit_
 from trunkline.model.arm.mjcf import Solver, Tendons, build_spec
 from trunkline.model.arm.spiral import spiral_chain
 from trunkline.model.arm.tendons import even_routes
-from trunkline.model.elements import DIAGONAL
+from trunkline.model.arm_model import DIAGONAL
 
 
 def stump_spec(units: int = 7) -> mujoco.MjSpec:

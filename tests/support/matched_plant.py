@@ -14,17 +14,7 @@ from trunkline.frames import gravity_in_base, wxyz_from_rotation
 from trunkline.identification.parameters.saving import save_model
 from trunkline.identification.simulate.experiment import SLACK
 from trunkline.model.arm.joints import Joints, add_elements
-from trunkline.model.elements import (
-    BACKLASH,
-    BRANCH,
-    RATE_LIMIT,
-    SLIDER,
-    all_elements,
-    arm_hinges,
-    cables,
-    numeric,
-    unload_branches,
-)
+from trunkline.model.arm_model import BRANCH, ArmModel
 from trunkline.recordings.trials.trial import Trial
 
 FRAME = 1 / 120
@@ -36,8 +26,8 @@ def small_model(units: int = 6, joints: Joints | None = None, **motors: float) -
     add_elements(spec, joints or Joints(), 1e-5)
     spec.option.timestep = FRAME / 8
     model = spec.compile()
-    model.dof_damping[: arm_hinges(model)] *= 4
-    model.tendon_frictionloss[cables(model)] = 0.3
+    model.dof_damping[: ArmModel(model).hinge_count] *= 4
+    model.tendon_frictionloss[ArmModel(model).cables] = 0.3
     return model
 
 
@@ -75,18 +65,18 @@ def _trial(model, name, experiment, split, level, gravity, frames, start, pulls,
     model = model.__copy__()
     model.opt.gravity[:] = gravity
     data = mujoco.MjData(model)
-    lengths = model.tendon_length0[cables(model)] - pulls
+    lengths = model.tendon_length0[ArmModel(model).cables] - pulls
     data.qpos[: len(start)], data.act[:] = start, lengths[0]
     for motor in np.flatnonzero(model.actuator_history[:, 0]):
         sent = np.full((model.actuator_history[motor, 0], 1), lengths[0, motor])
         mujoco.mj_initCtrlHistory(model, data, motor, None, sent)
-    unload_branches(model, data.qpos)  # held for long before
-    for slider in all_elements(model, SLIDER):  # slipped on the way from the straight arm
+    ArmModel(model).unload_branches(data.qpos)  # held for long before
+    for slider in ArmModel(model).sliders:  # slipped on the way from the straight arm
         bend, give = data.qpos[slider.hinge], model.tendon_springyield[slider.tendon]
         for end in (0, 1):
             data.plastic[model.tendon_plasticadr[slider.tendon] + end] = bend - np.clip(bend, -give, give)
-    furthest = (numeric(model, RATE_LIMIT) or np.inf) * model.opt.timestep  # of a winch in a step
-    slack, drum, cable = numeric(model, BACKLASH) / 2, lengths[0], lengths[0]
+    furthest = (ArmModel(model).rate_limit or np.inf) * model.opt.timestep  # of a winch in a step
+    slack, drum, cable = ArmModel(model).backlash / 2, lengths[0], lengths[0]
     markers = markers_of(model)
     sites = [model.site(f"{s}_center").id for s in markers]
     positions, quaternions = np.empty((frames, len(sites), 3)), np.empty((frames, len(sites), 4))
@@ -149,7 +139,7 @@ def _rest_pose(model, tilt_deg, pulls) -> np.ndarray:
 
 def release(model, bend: float, split="identify", frames=120, noise=0.0, seed=0, substep=0.0, tilt_deg=0.0) -> Trial:
     """Let go from every y hinge at `bend` rad and every x hinge at half of it."""
-    start = np.tile([0.5 * bend, bend], arm_hinges(model) // 2)
+    start = np.tile([0.5 * bend, bend], ArmModel(model).hinge_count // 2)
     rng = np.random.default_rng(seed)
     return _trial(model, f"release_{bend:.2f}_{split}", "release", split, None,
                   gravity_in_base(np.radians(tilt_deg)), frames, start,

@@ -6,7 +6,7 @@ import pytest
 
 from tests.support.small_arm import small_spec
 from trunkline.model.arm.joints import Joints, add_elements
-from trunkline.model.elements import diagonal_lengths
+from trunkline.model.arm_model import ArmModel
 from trunkline.unity.linearize import Laws, compile_with, linearize
 
 
@@ -82,5 +82,5 @@ def test_a_round_joint_s_diagonals_come_back_too():
     restored = compile_with(spec.to_xml(), laws)
     assert (restored.tendon_stiffnesspoly == calibrated.tendon_stiffnesspoly).all()
     assert (restored.tendon_stiffness == calibrated.tendon_stiffness).all()
-    diagonals, _ = diagonal_lengths(calibrated, calibrated.qpos_spring)
+    diagonals, _ = ArmModel(calibrated).diagonal_lengths(calibrated.qpos_spring)
     np.testing.assert_allclose(restored.tendon_lengthspring[diagonals], calibrated.tendon_lengthspring[diagonals])

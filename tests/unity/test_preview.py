@@ -23,7 +23,7 @@ from trunkline.identification.stages import STAGES
 from trunkline.kinematics.panda.mounts import FixedMount
 from trunkline.model.arm.contact_geometry import read_geometry
 from trunkline.model.arm.spiral import spiral_chain
-from trunkline.model.elements import capstan_friction
+from trunkline.model.arm_model import ArmModel
 from trunkline.unity.package import CALIBRATED, MANIFEST, MODEL, write_tarball
 from trunkline.unity.twin import Trajectory, assemble
 from trunkline.unity.unpacked import arm_of, package_digest, read_package, robot_of
@@ -91,7 +91,7 @@ def test_the_grasped_object_is_touched(mjcf):
 def test_a_preview_needs_the_package_alone(files):
     assert package_digest(files)
     arm, robot = arm_of(files), robot_of(files)
-    assert capstan_friction(arm.compile()) > 0
+    assert ArmModel(arm.compile()).capstan_friction > 0
     assert robot == ROBOT
     twin = ComposedTwin(compose(arm, robot).compile(), arm.compile())
     result = preview(twin, way_of(twin.arm, robot.ready, 0.3), posterior_of(files), Holding(0.1), count=3)

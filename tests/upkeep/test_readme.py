@@ -7,7 +7,7 @@ import pytest
 import yaml
 from pydantic import TypeAdapter
 
-from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.parameters.parameters import NAMES
 from trunkline.pipeline.stage import write_json
 from trunkline.recordings.trials.splits import DECIDING, TEST, VALIDATE
 from upkeep.baseline import Baseline, baseline_file, renewed
@@ -153,7 +153,7 @@ def test_the_truth_table_says_what_the_model_lacks(judged):
     plants = {yaml.safe_load(file.read_text())["kind"] for file in ROOT.glob("demo/conf/record/plant/*.yaml")}
     assert set(LACKING) == plants
     named = {name for effects in LACKING.values() for effect in effects for name in (*effect.on, effect.unless) if name}
-    assert named <= set(PARAMETERS)
+    assert named <= set(NAMES)
 
 
 def test_scores_are_told_by_kind_and_together(tmp_path):

@@ -5,19 +5,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
-import numpy as np
 
 from trunkline.errors import InputError, existing
 from trunkline.identification.evaluation.baselines import references
-from trunkline.identification.evaluation.error_tables import TABLED, marker_table, trial_table
+from trunkline.identification.evaluation.error_tables import TABLED, trial_table
 from trunkline.identification.evaluation.evaluation import Prediction, halved_step, replay
 from trunkline.identification.evaluation.repeatability import repeatability
 from trunkline.identification.fit.fit import Fit
 from trunkline.identification.fit.identify import Identification, identify, with_parameters
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.settings import IdentificationSettings
-from trunkline.identification.fit.setup import check_folds, check_parameters, set_up, with_every
-from trunkline.identification.parameters.parameters import PARAMETERS, parameter_named
+from trunkline.identification.fit.setup import check_parameters, set_up, with_every
+from trunkline.identification.parameters.parameters import NAMES
 from trunkline.identification.parameters.per_session import (
     make_room,
     names_in,
@@ -32,11 +31,11 @@ from trunkline.identification.simulate.checks import check_trials
 from trunkline.identification.simulate.experiment import Experiment
 from trunkline.identification.uncertainty.cross_validation import cross_validate
 from trunkline.identification.uncertainty.trial_diagnostics import trial_diagnostics
-from trunkline.model.elements import BACKLASH, CAPSTAN_FRICTION, RATE_LIMIT, numeric, switch_off
+from trunkline.model.arm_model import BACKLASH, CAPSTAN_FRICTION, RATE_LIMIT, ArmModel
 from trunkline.pipeline.inputs import read_spec
 from trunkline.pipeline.stage import output_folder, write_json, write_metrics
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_static
-from trunkline.recordings.trials.splits import DECIDING, VALIDATE
+from trunkline.recordings.trials.splits import DECIDING, IDENTIFY, VALIDATE
 from trunkline.recordings.trials.trial import Trial, read_trials
 
 CAD_MODEL = Path("artifacts/build_mjcf/arm.xml")
@@ -104,7 +103,9 @@ def load(stage: str, config: IdentificationSettings, model_path: Path) -> FitInp
         model = spec.compile()
     model, experiments, settings = set_up(config, reported, model)
     inputs = FitInputs(spec, model, model_path == CAD_MODEL, config, reported, experiments, settings)
-    check_folds(stage, config.cross_validation_folds, inputs.fitted)
+    folds, most = config.cross_validation_folds, sum(e.split == IDENTIFY for e in inputs.fitted)
+    if folds > most:
+        raise InputError(f"{stage}.cross_validation_folds: found {folds}, expected at most {most}, one a trial")
     return inputs
 
 
@@ -173,16 +174,16 @@ def compared_models(
         models["coarse"] = models["identified"]
     elif whole:
         extended = read_spec(CAD_MODEL)
-        make_room(extended, names_in(inputs.model, PARAMETERS))
+        make_room(extended, names_in(inputs.model, NAMES))
         models["coarse"] = with_parameters(extended.compile(), read_scalars(whole) | result.values)
         # rest shape and markers are no matter of scalars
         for field in ("qpos_spring", "tendon_lengthspring", "site_pos", "site_sameframe"):
             getattr(models["coarse"], field)[:] = getattr(inputs.model, field)
     # as in MuJoCo alone and in Unity: tendons without friction in their guide holes, winches without rate limit or play
     for name, numbers in {"smooth": (CAPSTAN_FRICTION,), "prompt": (RATE_LIMIT, BACKLASH)}.items():
-        if any(numeric(models["identified"], number) for number in numbers):
+        if any(ArmModel(models["identified"]).number(number) for number in numbers):
             models[name] = mujoco.MjModel.from_xml_string(mjcf)
-            switch_off(models[name], *numbers)
+            ArmModel(models[name]).switch_off(*numbers)
     return models
 
 
@@ -198,8 +199,7 @@ def save(
         table["fitted_to"] = fingerprints([t for t in inputs.trials if t.experiment in config.experiments])
         write_json(folder / "parameters.json", table)
         write_metrics(folder, metrics)
-        write_tables(folder, predictions, markers)
-        write_plots(folder, result, bounds, markers, predictions, shapes=inputs.from_cad and rests)
+        write_tables(folder, result, bounds, markers, predictions, shapes=inputs.from_cad and rests)
 
 
 def has_factors(stage: str) -> bool:
@@ -247,49 +247,23 @@ def _gain(metrics: dict) -> dict[str, float]:
     }
 
 
-def write_tables(folder: Path, predictions: dict[str, Prediction], markers: tuple[str, ...]) -> None:
-    """Errors of every trial, and along the arm those of `validate`, beside baseline, CAD and noise floor."""
-    trial_table({name: predictions[name] for name in TABLED}).to_csv(folder / "trials.csv", **CSV)
-    validate = {name: prediction.of(lambda e: e.split == VALIDATE) for name, prediction in predictions.items()}
-    marker_table(validate, markers).to_csv(folder / "markers.csv", **CSV)
-
-
-def write_plots(
+def write_tables(
     folder: Path, result: Identification, bounds, markers, predictions: dict[str, Prediction], shapes: bool
 ) -> None:
-    """PNGs for people and CSV for `dvc plots`: of one shape a trial (`shapes`), or of motions."""
+    """Errors of every trial, and along the arm those of `validate`, beside baseline, CAD and noise floor; PNGs for
+    people and CSV for `dvc plots`, of one shape a trial (`shapes`), or of motions."""
     # pyplot and scipy.signal take long to import, so not before the first line
-    from trunkline.identification.results import curves
-    from trunkline.report.figures import identification as plots
-    from trunkline.report.figures.scoring import marker_figure
+    from trunkline.identification.results.curves import stage_tables
+    from trunkline.report.figures.identification import stage_figures
     from trunkline.report.figures.style import save_figure
 
-    curves.convergence_table(result).to_csv(folder / "convergence.csv", **CSV)
-    save_figure(plots.convergence_figure(result), folder / "convergence.png")
-    units = {name: parameter_named(name).unit for name in result.values}
-    save_figure(plots.parameter_figure(result, bounds, units, undetermined(result, bounds)), folder / "parameters.png")
+    trial_table({name: predictions[name] for name in TABLED}).to_csv(folder / "trials.csv", **CSV)
     validate = {name: prediction.of(lambda e: e.split == VALIDATE) for name, prediction in predictions.items()}
-    save_figure(marker_figure({"validate split": marker_table(validate, markers)}), folder / "markers.png")
-    compared = {name: validate[name] for name in ("cad", "identified")}
-    if shapes:
-        table = curves.shape_table(compared, markers)
-        table.to_csv(folder / "shapes.csv", **CSV)
-        save_figure(plots.shape_figure(table), folder / "shapes.png")
-        return
-    moving = {name: prediction.of(lambda e: not is_static(e.kind)) for name, prediction in validate.items()}
-    experiments = moving["identified"].experiments
-    if experiments:
-        errors = curves.error_curves({name: moving[name] for name in ("null", "null_held", *compared)})
-        errors.to_csv(folder / "errors.csv", **CSV)
-        floor = moving["noise_floor"].scores()[VALIDATE]
-        save_figure(plots.error_figure(errors, floor), folder / "errors.png")
-        kinds = [e for e in experiments if e.kind == experiments[-1].kind]
-        widest = max(kinds, key=lambda e: float(np.ptp(e.positions, axis=0).max()))
-        widest_alone = {name: moving[name].of(lambda e: e.name == widest.name) for name in compared}
-        table = curves.distance_table(widest_alone, markers)
-        table.to_csv(folder / "distances.csv", **CSV)
-        save_figure(plots.distance_figure(table, widest.name), folder / "distances.png")
-        save_figure(plots.path_figure(widest_alone), folder / "paths.png")
+    tables = stage_tables(result, validate, markers, shapes)
+    for name, table in tables.items():
+        table.to_csv(folder / f"{name}.csv", **CSV)
+    for name, figure in stage_figures(tables, result, bounds, undetermined(result, bounds), validate).items():
+        save_figure(figure, folder / f"{name}.png")
 
 
 def read_reported(config: IdentificationSettings) -> list[Trial]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from trunkline.model.elements import diagonal_lengths
+from trunkline.model.arm_model import ArmModel
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def linearize(spec: mujoco.MjSpec, angles: np.ndarray, speeds: np.ndarray) -> La
     Returns:
         Those that were replaced.
     """
-    diagonals, lengths = diagonal_lengths(spec.compile(), angles)
+    diagonals, lengths = ArmModel(spec.compile()).diagonal_lengths(angles)
     laws, tendons = {"stiffness": [], "damping": []}, []
     for joint, q, v in zip(spec.joints, angles.T, speeds.T, strict=True):
         for attribute, x, even in (("stiffness", q, q**2), ("damping", v, v * np.abs(v))):

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from trunkline.errors import InputError
 from trunkline.kinematics.panda.mounts import Robot
-from trunkline.model.elements import BRANCH, all_elements, cables
+from trunkline.model.arm_model import ArmModel
 from trunkline.unity.frame import unity_position
 from trunkline.unity.linearize import JointLaw, TendonLaw
 from trunkline.unity.plugin import VERSION
@@ -218,7 +218,7 @@ def names_of(model: mujoco.MjModel) -> Names:
     return Names(
         bodies=[model.body(i).name for i in range(1, model.nbody)],
         joints=[model.joint(i).name for i in range(model.njnt)],
-        tendons=[model.tendon(i).name for i in cables(model)],
+        tendons=ArmModel(model).cable_names,
         actuators=[model.actuator(i).name for i in range(model.nu)],
         sites=[model.site(i).name for i in range(model.nsite)],
     )
@@ -235,7 +235,7 @@ def branches_of(model: mujoco.MjModel) -> list[BranchBlock]:
     """Of all joints, the first of each, then the second."""
     return [
         BranchBlock(joint=model.joint(hinge).name, branch=model.joint(own_hinge).name, tie=model.tendon(tendon).name)
-        for element in all_elements(model, BRANCH)
+        for element in ArmModel(model).branches
         for hinge, own_hinge, tendon in zip(element.hinge, element.branch, element.tendon, strict=True)
     ]
 

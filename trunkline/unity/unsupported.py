@@ -3,15 +3,7 @@ manifest. `calibrated.xml` of the package keeps it all."""
 
 import mujoco
 
-from trunkline.model.elements import (
-    BACKLASH,
-    CAPSTAN_FRICTION,
-    RATE_LIMIT,
-    SLIP_LENGTH,
-    capstan_friction,
-    is_hole,
-    numeric,
-)
+from trunkline.model.arm_model import BACKLASH, CAPSTAN_FRICTION, RATE_LIMIT, SLIP_LENGTH, ArmModel
 
 
 def without_unsupported(spec: mujoco.MjSpec) -> dict[str, float]:
@@ -32,18 +24,18 @@ def without_dead_time(spec: mujoco.MjSpec) -> float:
 def without_rubbing(spec: mujoco.MjSpec) -> float:
     """Take the tendons by which cables rub from a model in place, as their friction has to follow the tension at every
     step; the coefficient μ, as it was."""
-    friction = capstan_friction(spec.compile())
-    for tendon in [tendon for tendon in spec.tendons if is_hole(tendon.name)]:
+    arm = ArmModel(spec.compile())
+    for tendon in [spec.tendons[number] for number in arm.guide_holes.flat]:
         spec.delete(tendon)
     for number in [number for number in spec.numerics if number.name in (CAPSTAN_FRICTION, SLIP_LENGTH)]:
         spec.delete(number)
-    return friction
+    return arm.capstan_friction
 
 
 def without_winches(spec: mujoco.MjSpec) -> dict[str, float]:
     """Take rate limit and backlash of the motors' winches from a model in place, as commands have to be shaped with
     them before they are sent; what they were by name, 0 for none."""
-    model, names = spec.compile(), (RATE_LIMIT, BACKLASH)
+    arm, names = ArmModel(spec.compile()), (RATE_LIMIT, BACKLASH)
     for number in [number for number in spec.numerics if number.name in names]:
         spec.delete(number)
-    return {name: numeric(model, name) for name in names}
+    return {name: arm.number(name) for name in names}

@@ -11,7 +11,7 @@ from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base, wxyz_from_rotation
 from trunkline.kinematics.panda.kinematics import mount_pose
 from trunkline.kinematics.panda.mounts import FixedMount
-from trunkline.model.elements import CAPSTAN_FRICTION, numeric
+from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.motion import batch_of, hold, move
 
 STEPS = 100
@@ -65,7 +65,7 @@ def test_the_arm_hangs_from_the_flange(arm):
     np.testing.assert_allclose(data.site("tip").xpos, position + 0.507 * rotation[:, 2], atol=1e-6)
     hole = data.site("base_tendon_1").xpos - position
     np.testing.assert_allclose(hole / np.linalg.norm(hole), rotation[:, 0], atol=1e-9)  # azimuth 0: over the mount's x
-    assert numeric(model, CAPSTAN_FRICTION) == numeric(arm.compile(), CAPSTAN_FRICTION) > 0
+    assert ArmModel(model).capstan_friction == ArmModel(arm.compile()).capstan_friction > 0
 
 
 def test_options_are_the_arms(arm):

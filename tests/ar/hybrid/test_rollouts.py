@@ -17,10 +17,10 @@ from trunkline.ar.hybrid.rollouts import CommandTrajectory, ComposedTwin, eased,
 from trunkline.ar.hybrid.worlds import SupportSurface, WorldGeometry
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
-from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields
+from trunkline.identification.parameters.parameters import candidate_fields, parameter_named, parameters_of
 from trunkline.kinematics.panda.mounts import FixedMount, PandaRobot
 from trunkline.model.arm.spiral import spiral_chain
-from trunkline.model.elements import actuators
+from trunkline.model.arm_model import ArmModel
 
 SIZE = {"length": 0.2, "base_width": 0.05, "tip_width": 0.02, "units": 6}
 SECONDS, PULL = 0.6, 0.02  # s, m
@@ -78,7 +78,7 @@ def test_a_future_is_an_arm_with_its_parameters(small, free):
     """The same as an arm that had them before it was put into the model."""
     values = {"stiffness": 1.3, "damping": 0.5, "relaxation": 1.5, "kp": 0.7, "capstan_friction": 2.0, "dead_time": 0.5}
     arm = free.arm
-    values = {name: factor * PARAMETERS[name].read(arm) for name, factor in values.items()}
+    values = {name: factor * parameter_named(name).read(arm) for name, factor in values.items()}
     columns = {k: np.array([v]) for k, v in values.items()}
     sampled = run(free, way_of(arm), PosteriorSamples(columns, np.ones(1), np.zeros((1, 3)), np.zeros(1)))
     changed, model = copy.copy(arm), copy.copy(free.model)
@@ -95,7 +95,7 @@ def test_a_future_is_an_arm_with_its_parameters(small, free):
 def test_every_parameter_has_its_place_in_the_composed_model(small, robot):
     """What the arm has in the fields of its parameters, the composed model has where they are carried over to."""
     model, arm = compose(small, hybrid_settings(robot=robot).robot).compile(), small.compile()
-    for field in {field for p in PARAMETERS.values() if p.belongs_to(arm) for field in p.fields} - {"body_quat"}:
+    for field in {field for p in parameters_of(arm).values() for field in p.fields} - {"body_quat"}:
         composed, alone = (
             getattr(model, field)[rows_of(field, model, arm)],
             getattr(arm, field)[rows_of(field, arm, arm)],
@@ -106,7 +106,7 @@ def test_every_parameter_has_its_place_in_the_composed_model(small, robot):
 
 def test_cables_motors_are_not_the_pandas(small):
     model = compose(small, hybrid_settings(robot="panda").robot).compile()
-    assert [model.actuator(number).name for number in actuators(model)] == [
+    assert [model.actuator(number).name for number in ArmModel(model).actuators] == [
         f"tendon_{number}_position" for number in (1, 2, 3)
     ]
 
@@ -270,7 +270,7 @@ def test_draws_have_the_doubts_spread(small):
     names, arm = ("kp", "damping"), small.compile()
     posterior = Posterior(names, np.array([0.3, 0.1]), np.array([[1, -0.7], [-0.7, 1]]), Contact(0.2, (0.01, 0.0, 0.0)))
     drawn = sample(posterior, arm, 20_000, 0)
-    logs = np.log([drawn.values[name] / PARAMETERS[name].read(arm) for name in names])
+    logs = np.log([drawn.values[name] / parameter_named(name).read(arm) for name in names])
     np.testing.assert_allclose(logs.std(axis=1), [0.3, 0.1], rtol=0.03)
     assert np.corrcoef(logs)[0, 1] == pytest.approx(-0.7, abs=0.02)
     assert np.log(drawn.friction).std() == pytest.approx(0.2, rel=0.03)

@@ -15,12 +15,18 @@ from tests.support.workbench import ROOT
 from trunkline.errors import InputError
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.setup import check_parameters
-from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields, set_fields
+from trunkline.identification.parameters.parameters import (
+    PARAMETERS,
+    candidate_fields,
+    parameter_named,
+    parameters_of,
+    set_fields,
+)
 from trunkline.identification.parameters.saving import save_model
 from trunkline.model.arm.from_file import FromFile
 from trunkline.model.arm.guide_holes import GuideHoles, add_holes
 from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement, add_elements
-from trunkline.model.elements import BACKLASH, BRANCH, PRELOAD, RATE_LIMIT, SECTIONS, WINDING, elements, hole_tendons
+from trunkline.model.arm_model import BACKLASH, PRELOAD, RATE_LIMIT, SECTIONS, WINDING, ArmModel
 from trunkline.model.statics.chain import read_chain
 from trunkline.pipeline.config import load_config
 
@@ -78,7 +84,7 @@ def arm_with_every_part() -> mujoco.MjSpec:
     return spec
 
 
-OWN = [name for name, parameter in PARAMETERS.items() if parameter.belongs_to(arm_with_every_part().compile())]
+OWN = list(parameters_of(arm_with_every_part().compile()))
 
 
 @pytest.mark.parametrize("name", OWN)
@@ -86,10 +92,10 @@ def test_it_can_be_identified(name):
     """Every parameter can be set in it and saved."""
     spec = arm_with_every_part()
     model = spec.compile()
-    value = 1.3 * PARAMETERS[name].read(model) or 0.02
+    value = 1.3 * parameter_named(name).read(model) or 0.02
     set_fields(model, candidate_fields(model, {name: np.array([value])}))
     saved = mujoco.MjModel.from_xml_string(save_model(spec, model))
-    assert PARAMETERS[name].read(saved) == pytest.approx(value, rel=1e-5)
+    assert parameter_named(name).read(saved) == pytest.approx(value, rel=1e-5)
 
 
 def test_what_the_settings_name_is_added_and_its_motors_stay_its_own(project):
@@ -97,10 +103,10 @@ def test_what_the_settings_name_is_added_and_its_motors_stay_its_own(project):
     names = "build_mjcf: {arm: four_links, joints: viscoelastic, holes: rubbing, solver: {timestep: 0.002}}"
     Path("params.yaml").write_text(names)
     added = cad_arm(project(TEXT)).spec.compile()
-    group = elements(added, BRANCH, 1)
-    assert (len(group.branch), len(elements(drawn, BRANCH, 1).branch)) == (8, 0)
+    group = ArmModel(added).branches[0]
+    assert (len(group.branch), len(ArmModel(drawn).branches)) == (8, 0)
     np.testing.assert_allclose(added.dof_armature[group.branch], 1e-5)
-    assert (hole_tendons(added).size, hole_tendons(drawn).size) == (12, 0)
+    assert (ArmModel(added).guide_holes.size, ArmModel(drawn).guide_holes.size) == (12, 0)
     for name in ("actuator_gainprm", "actuator_dynprm", "actuator_delay"):
         np.testing.assert_array_equal(getattr(added, name), getattr(drawn, name))
     assert added.opt.timestep == drawn.opt.timestep == 0.001

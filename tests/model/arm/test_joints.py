@@ -7,7 +7,7 @@ import pytest
 from tests.support.small_arm import small_spec
 from trunkline.identification.parameters.parameters import candidate_fields, set_fields
 from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement, add_elements
-from trunkline.model.elements import BRANCH, SLIDER, all_elements, arm_hinges, cables, unload_branches
+from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.rest import settle
 from trunkline.model.statics.chain import read_chain
 
@@ -113,21 +113,20 @@ def pair() -> tuple[mujoco.MjModel, mujoco.MjModel]:
 
 def test_elements_stand_after_the_arms_own(pair):
     plain, full = pair
-    assert arm_hinges(full) == arm_hinges(plain) == plain.njnt
-    assert cables(full) == cables(plain) == list(range(plain.ntendon))
-    for kind, count in ((BRANCH, 2), (SLIDER, 1)):
-        groups = all_elements(full, kind)
-        assert len(groups) == count
-        for group in groups:
-            np.testing.assert_array_equal(group.hinge, np.arange(plain.njnt))
+    assert ArmModel(full).hinge_count == ArmModel(plain).hinge_count == plain.njnt
+    assert ArmModel(full).cables.tolist() == ArmModel(plain).cables.tolist() == list(range(plain.ntendon))
+    branches, sliders = ArmModel(full).branches, ArmModel(full).sliders
+    assert (len(branches), len(sliders)) == (2, 1)
+    for group in (*branches, *sliders):
+        np.testing.assert_array_equal(group.hinge, np.arange(plain.njnt))
 
 
 def test_branches_that_have_given_way_bear_nothing():
     spec, poses = small_spec(), np.random.default_rng(1).uniform(-0.2, 0.2, (2, 3 * 16))
     add_elements(spec, Joints([MaxwellElement(0.3, 0.5), MaxwellElement(0.2, 2.0)]), ARMATURE)
     model = spec.compile()
-    arm = arm_hinges(model)
-    unload_branches(model, poses)
+    arm = ArmModel(model).hinge_count
+    ArmModel(model).unload_branches(poses)
     for pose in poses:
         data = mujoco.MjData(model)
         data.qpos[:] = pose

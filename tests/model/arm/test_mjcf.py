@@ -11,7 +11,7 @@ from trunkline.model.arm.material import TPU_95A_DENSITY, TPU_95A_MODULUS, unit_
 from trunkline.model.arm.mjcf import Solver, Tendons, build_spec, unit_name
 from trunkline.model.arm.spiral import spiral_chain
 from trunkline.model.arm.tendons import even_routes
-from trunkline.model.elements import BACKLASH, RATE_LIMIT, numeric, numeric_place
+from trunkline.model.arm_model import BACKLASH, ArmModel
 
 UNITS = 24
 CHAIN = spiral_chain(0.507, 0.080, 0.012, UNITS)
@@ -62,9 +62,9 @@ def test_numbers_of_winches_are_in_the_file_where_they_have_any():
     spec = small_spec(rate_limit=0.3)
     spec.compile()
     model = mujoco.MjModel.from_xml_string(spec.to_xml())
-    assert numeric(model, RATE_LIMIT) == 0.3
-    assert numeric_place(model, BACKLASH) is None
-    assert numeric(model, BACKLASH) == 0.0
+    assert ArmModel(model).rate_limit == 0.3
+    assert not ArmModel(model).places(BACKLASH).size
+    assert ArmModel(model).backlash == 0.0
 
 
 def test_tendon_lengths_at_rest_are_the_sum_of_straight_pieces(model):

@@ -12,7 +12,7 @@ from trunkline.identification.parameters.parameters import PARAMETERS, candidate
 from trunkline.identification.parameters.saving import save_model
 from trunkline.identification.simulate.resting import rest_shape, spring_references
 from trunkline.model.arm.joints import Joints, add_elements
-from trunkline.model.elements import diagonal_lengths
+from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.rest import settle
 from trunkline.model.statics.chain import read_chain
 from trunkline.model.statics.equilibria import actuated
@@ -66,7 +66,7 @@ def test_the_file_has_them(model):
     spec = mujoco.MjSpec.from_string(spec.to_xml())  # as a later stage reads it, with all lengths typed out
     saved = mujoco.MjModel.from_xml_string(save_model(spec, model))
     np.testing.assert_allclose(torques(saved, [0.2, 0.1]), torques(model, [0.2, 0.1]), rtol=1e-5)
-    tendons, _ = diagonal_lengths(model, model.qpos_spring)
+    tendons, _ = ArmModel(model).diagonal_lengths(model.qpos_spring)
     np.testing.assert_allclose(saved.tendon_lengthspring[tendons], model.tendon_lengthspring[tendons], atol=1e-6)
 
 

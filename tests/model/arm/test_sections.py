@@ -11,7 +11,7 @@ from trunkline.model.arm.guide_holes import GuideHoles, add_holes
 from trunkline.model.arm.mjcf import Actuation, Marker, Solver
 from trunkline.model.arm.sections import Section, Sections
 from trunkline.model.arm.tendons import Tendon
-from trunkline.model.elements import PRELOAD, SECTIONS, WINDING, cables, hole_tendons, numbers_place, numeric
+from trunkline.model.arm_model import WINDING, ArmModel
 
 SOLVER = Solver(0.002, 1e-5, [0.01, 1.0], [0.9, 0.95, 0.001, 0.5, 2.0], [0.01, 1.0], [0.9, 0.95, 0.001, 0.5, 2.0])
 ACTUATION = Actuation(friction=0.0, kp=2000.0, max_force=50.0, time_constant=0.02)
@@ -47,7 +47,7 @@ def test_each_section_has_units_of_its_own(model):
     mujoco.mj_forward(model, data)
     heights = [data.body(f"unit_{k:02d}").xpos[2] for k in range(1, 6)]
     np.testing.assert_allclose(heights, [0, -0.05, -0.1, -0.12, -0.14], atol=1e-12)
-    assert model.numeric_data[numbers_place(model, SECTIONS)].tolist() == [2, 3]
+    assert ArmModel(model).sections.tolist() == [2, 3]
 
 
 def test_cables_that_end_on_the_way_cannot_rub():
@@ -56,12 +56,12 @@ def test_cables_that_end_on_the_way_cannot_rub():
         add_holes(spec, GuideHoles(0.1, 2))
     whole = arm(tendons=TENDONS[1:]).build(ACTUATION, SOLVER, Path()).spec
     add_holes(whole, GuideHoles(0.1, 2))
-    assert hole_tendons(whole.compile()).shape == (2, 2)
+    assert ArmModel(whole.compile()).guide_holes.shape == (2, 2)
 
 
 def test_tendons_run_where_they_are_described(model):
     names = {"tendon_1": 3, "tendon_2": 6, "tendon_3": 6}  # the mount's hole, and one in each unit on the way
-    assert {model.tendon(t).name: int(model.tendon_num[t]) for t in cables(model)} == names
+    assert {model.tendon(t).name: int(model.tendon_num[t]) for t in ArmModel(model).cables} == names
     np.testing.assert_allclose(model.site("unit_02_tendon_1").pos[:2], [0.012, 0], atol=1e-12)
     np.testing.assert_allclose(model.site("base_tendon_2").pos[:2], [0, 0.012], atol=1e-12)
     np.testing.assert_allclose(model.site("unit_05_tendon_2").pos[:2], [0, 0.008], atol=1e-12)
@@ -72,8 +72,8 @@ def test_tendons_run_where_they_are_described(model):
 
 
 def test_pretension_is_told_in_metres_of_cable(model):
-    assert numeric(model, WINDING) == 1.0
-    np.testing.assert_allclose(model.numeric_data[numbers_place(model, PRELOAD)], [0, 0, 3.0 / 2000.0])
+    assert ArmModel(model).number(WINDING) == 1.0
+    np.testing.assert_allclose(ArmModel(model).preload, [0, 0, 3.0 / 2000.0])
 
 
 def test_a_marker_may_stick_out_and_sit_aside(model):

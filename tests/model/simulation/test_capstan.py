@@ -8,7 +8,7 @@ from tests.support.small_arm import small_spec
 from trunkline.identification.parameters.parameters import candidate_fields
 from trunkline.identification.parameters.saving import save_model
 from trunkline.model.arm.guide_holes import GuideHoles, add_holes
-from trunkline.model.elements import cables, capstan_friction, hole_tendons, switch_off_capstan_friction
+from trunkline.model.arm_model import CAPSTAN_FRICTION, ArmModel
 from trunkline.model.simulation.drive import drive
 from trunkline.model.simulation.motion import batch_of, hold, move
 from trunkline.model.simulation.rest import settle
@@ -36,7 +36,7 @@ def shares(speed: float, stretches: int) -> np.ndarray:
     batch = batch_of(model, 1)
     about_y = slice(1, None, 2)
     batch.bind("qpos")[0, about_y], batch.bind("qvel")[0, about_y] = -BEND, -speed
-    controls = np.tile(model.tendon_length0[cables(model)] + 0.3, (1, STEPS, 1))
+    controls = np.tile(model.tendon_length0[ArmModel(model).cables] + 0.3, (1, STEPS, 1))
     controls[:, :, 0] = 0.0
     hold(batch, model, controls[:, 0])
     pulled, friction = batch.bind("qfrc_actuator")[0], batch.bind("qfrc_constraint")[0]
@@ -59,13 +59,14 @@ def test_friction_taken_together_bends_as_much():
 def test_friction_acts_where_the_cable_does():
     """In a bent arm, the last unit's arms of every stretch's friction are those of the cable itself."""
     model = rubbing_arm(4)
-    controls = np.tile(model.tendon_length0[cables(model)] - [0.05, 0, 0], (1, 400, 1))
+    controls = np.tile(model.tendon_length0[ArmModel(model).cables] - [0.05, 0, 0], (1, 400, 1))
     batch = batch_of(model, 1)
     hold(batch, model, controls[:, 0])
     slope = batch.bind("ten_J")
     move(batch, controls, ())
-    last = model.tendon_adr[hole_tendons(model)] + model.tendon_num[hole_tendons(model)] - 1  # of the hinge y
-    for cable, entries in zip(cables(model), last, strict=True):
+    arm = ArmModel(model)
+    last = model.tendon_adr[arm.guide_holes] + model.tendon_num[arm.guide_holes] - 1  # of the hinge y
+    for cable, entries in zip(arm.cables, last, strict=True):
         row = model.ten_J_rowadr[cable] + model.ten_J_rownnz[cable] - 1
         assert abs(model.wrap_prm[entries[0]] / slope[0, row] - 1) > 0.02, "or the arm is straight"
         np.testing.assert_allclose(batch.expand("wrap_prm")[0, entries], slope[0, row], rtol=0.01)
@@ -75,7 +76,7 @@ def test_a_cable_without_tension_does_not_rub():
     model = rubbing_arm()
     batch = batch_of(model, 1)
     batch.bind("qvel")[:] = 1.0
-    controls = np.tile(model.tendon_length0[cables(model)] + 0.3, (1, 40, 1))
+    controls = np.tile(model.tendon_length0[ArmModel(model).cables] + 0.3, (1, 40, 1))
     hold(batch, model, controls[:, 0])
     move(batch, controls, ())
     assert (batch.expand("tendon_frictionloss") == 0).all()
@@ -84,7 +85,7 @@ def test_a_cable_without_tension_does_not_rub():
 def test_without_friction_holes_change_nothing():
     plain, smooth = rubbing_arm(0), rubbing_arm(4, 0.0)
     slid = rubbing_arm(4)
-    switch_off_capstan_friction(slid)
+    ArmModel(slid).switch_off(CAPSTAN_FRICTION)
     controls = np.tile(plain.tendon_length0[:3], (2, 200, 1))
     controls[1, :, 0] -= 0.03
     moved = [move(batch_of(model, 2), controls, ("qpos",))["qpos"] for model in (plain, smooth, slid, rubbing_arm(4))]
@@ -130,8 +131,8 @@ def test_the_coefficient_survives_its_file():
     spec = small_spec(UNITS)
     add_holes(spec, GuideHoles(0.2, 4))
     model = spec.compile()
-    assert hole_tendons(model).shape == (3, 4)
+    assert ArmModel(model).guide_holes.shape == (3, 4)
     model.numeric_data[:] = 0.35
     again = mujoco.MjModel.from_xml_string(save_model(spec, model))
-    assert capstan_friction(again) == pytest.approx(0.35)
-    assert capstan_friction(spec.compile()) == pytest.approx(0.35), "the spec holds it too"
+    assert ArmModel(again).capstan_friction == pytest.approx(0.35)
+    assert ArmModel(spec.compile()).capstan_friction == pytest.approx(0.35), "the spec holds it too"

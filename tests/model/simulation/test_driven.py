@@ -5,7 +5,7 @@ import pytest
 
 from tests.support.small_arm import small_spec
 from trunkline.model.arm.joints import JenkinsElement, Joints, add_elements
-from trunkline.model.elements import BACKLASH, CAPSTAN_FRICTION, SLIDER, all_elements, cables, numeric_place, switch_off
+from trunkline.model.arm_model import BACKLASH, CAPSTAN_FRICTION, ArmModel
 from trunkline.model.simulation.drive import LOOK, NEAR, Driven, has_friction
 
 A_LITTLE = 1e-12
@@ -41,14 +41,14 @@ def plain():
     spec.add_numeric(name=CAPSTAN_FRICTION, data=[0.2], size=1)
     model = spec.compile()
     model.tendon_frictionloss[:], model.dof_frictionloss[:] = 0, 0
-    for slider in all_elements(model, SLIDER):
+    for slider in ArmModel(model).sliders:
         model.tendon_stiffness[slider.tendon] = 0
-    switch_off(model, CAPSTAN_FRICTION, BACKLASH)
+    ArmModel(model).switch_off(CAPSTAN_FRICTION, BACKLASH)
     return model
 
 
 def set_cable(model):
-    model.tendon_frictionloss[cables(model)[0]] = 0.1
+    model.tendon_frictionloss[ArmModel(model).cables[0]] = 0.1
 
 
 def set_joint(model):
@@ -56,15 +56,15 @@ def set_joint(model):
 
 
 def set_slider(model):
-    model.tendon_stiffness[all_elements(model, SLIDER)[0].tendon] = 0.2
+    model.tendon_stiffness[ArmModel(model).sliders[0].tendon] = 0.2
 
 
 def set_holes(model):
-    model.numeric_data[numeric_place(model, CAPSTAN_FRICTION)] = 0.2
+    model.numeric_data[ArmModel(model).places(CAPSTAN_FRICTION)] = 0.2
 
 
 def set_winches(model):
-    model.numeric_data[numeric_place(model, BACKLASH)] = 3e-4
+    model.numeric_data[ArmModel(model).places(BACKLASH)] = 3e-4
 
 
 @pytest.mark.parametrize("rubs", [set_cable, set_joint, set_slider, set_holes, set_winches])

@@ -22,7 +22,7 @@ from trunkline.identification.simulate.experiment import prepare
 from trunkline.identification.simulate.loss import LossWeights
 from trunkline.identification.simulate.population import Population
 from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement
-from trunkline.model.elements import arm_hinges, cables, switch_off_cables, unload_branches
+from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation import motion
 from trunkline.model.simulation.divergence import CountingBatch
 from trunkline.model.simulation.motion import batch_of, hold, move
@@ -69,9 +69,9 @@ def varied(batch: Batch, model: mujoco.MjModel, kind: str) -> np.ndarray:
         wound = np.minimum(np.arange(steps) * model.opt.timestep / 0.2, 1)
         controls[:, :, 0] = straight[0] - np.outer(np.linspace(0.01, 0.03, count), wound)
     else:
-        angles, hinges = batch.bind("qpos"), arm_hinges(model)
+        angles, hinges = batch.bind("qpos"), ArmModel(model).hinge_count
         angles[:, :hinges] = np.tile([0.02, 0.04], hinges // 2)
-        unload_branches(model, angles)
+        ArmModel(model).unload_branches(angles)
     hold(batch, model, controls[:, 0])
     return controls
 
@@ -123,7 +123,7 @@ def test_a_dead_time_that_takes_samples_as_they_are_is_refused(warp):
 
 def test_cables_cut_down_to_a_point_are_refused(warp):
     model = small_model()
-    switch_off_cables(model)
+    ArmModel(model).switch_off_cables()
     with pytest.raises(InputError, match="found a cable cut down to a point"):
         batch_of(model, 2, rough=True)
 
@@ -227,7 +227,7 @@ def test_a_population_is_where_mujoco_has_it(library, trials, load, friction):
     where they are slack and rub on nothing."""
     model, experiments = trials
     model = model.__copy__()
-    model.tendon_frictionloss[cables(model)] = friction
+    model.tendon_frictionloss[ArmModel(model).cables] = friction
     experiments = [replace(experiment, load=load * (i > 0)) for i, experiment in enumerate(experiments)]
     fields = candidate_fields(model, {"damping": np.linspace(0.02, 0.05, 3), "joint_place": np.linspace(0, 0.2, 3)})
     ours, theirs = (Population(model, experiments, markers_of(model)).simulate(fields, rough=r) for r in (False, True))

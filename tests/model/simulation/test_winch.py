@@ -6,7 +6,7 @@ import pytest
 from tests.support.matched_plant import small_model
 from trunkline.frames import gravity_in_base
 from trunkline.identification.parameters.parameters import candidate_fields
-from trunkline.model.elements import BACKLASH, RATE_LIMIT, switch_off
+from trunkline.model.arm_model import BACKLASH, RATE_LIMIT, ArmModel
 from trunkline.model.simulation.drive import LOOK, drive, has_friction
 from trunkline.model.simulation.motion import batch_of
 from trunkline.model.simulation.rest import settle
@@ -79,7 +79,7 @@ def test_simulations_have_the_model_s_numbers_or_their_own_and_go_on_where_they_
 
 def test_without_numbers_commands_are_delivered_as_they_are():
     commands, off = np.ones((1, 5, 3)), small_model(rate_limit=0.1, backlash=0.002)
-    switch_off(off, RATE_LIMIT, BACKLASH)
+    ArmModel(off).switch_off(RATE_LIMIT, BACKLASH)
     for model in (small_model(), off):
         winches = Winches(batch_of(model, 1), np.zeros((1, 3)))
         assert winches.idle

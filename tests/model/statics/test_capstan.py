@@ -8,7 +8,7 @@ from tests.support.bent_chain import hardening_stump, stump, stump_spec
 from trunkline.frames import gravity_in_base
 from trunkline.kinematics.dataset.sampling import pull_directions
 from trunkline.model.arm.guide_holes import GuideHoles, add_holes
-from trunkline.model.elements import SLIP
+from trunkline.model.arm_model import SLIP
 from trunkline.model.simulation.drive import drive
 from trunkline.model.statics.capstan import eliminate, solve_eliminated
 from trunkline.model.statics.chain import read_chain

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from tests.support.bent_chain import hardening_stump
-from trunkline.model.elements import cables
+from trunkline.model.arm_model import ArmModel
 from trunkline.model.statics import energy
 from trunkline.model.statics.chain import read_chain
 from trunkline.model.statics.factor import factorize, new_factor, solve
@@ -102,10 +102,10 @@ def test_lengths_and_their_gradients_are_mujocos(model, chain):
     mujoco.mj_forward(model, data)
     state = new_state(chain.units, 3)
     place(chain, q, state)
-    np.testing.assert_allclose(state.lengths, data.ten_length[cables(model)], rtol=0, atol=1e-14)
+    np.testing.assert_allclose(state.lengths, data.ten_length[ArmModel(model).cables], rtol=0, atol=1e-14)
     jacobian = np.zeros((model.ntendon, model.nv))
     mujoco.mju_sparse2dense(jacobian, data.ten_J, model.ten_J_rownnz, model.ten_J_rowadr, model.ten_J_colind)
-    np.testing.assert_allclose(state.jacobian, jacobian[cables(model)], rtol=0, atol=1e-14)
+    np.testing.assert_allclose(state.jacobian, jacobian[ArmModel(model).cables], rtol=0, atol=1e-14)
 
 
 def test_passive_torques_are_mujocos(model, chain):

@@ -20,7 +20,7 @@ from pydantic import Field
 from scipy.stats import norm
 
 from trunkline.errors import InputError, existing
-from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.parameters.parameters import NAMES, parameter_named
 
 Z95 = float(norm.ppf(0.975))
 # In the arm's own file these turn the body `base`, and a composed model has none of it
@@ -79,14 +79,14 @@ def sample(posterior: Posterior, arm: mujoco.MjModel, count: int, seed: int) -> 
         InputError: naming a parameter that the arm has not.
     """
     for name in posterior.names:
-        if not PARAMETERS[name].belongs_to(arm):
+        if not parameter_named(name).belongs_to(arm):
             raise InputError(f"{name}: found an arm without its part, expected one of which it is a parameter")
     rng = np.random.default_rng(seed)
     values, vectors = np.linalg.eigh(posterior.correlation)
     off = rng.normal(size=(count, len(values))) * np.sqrt(np.maximum(values, 0)) @ vectors.T * posterior.deviation
     drawn = {}
     for name, column in zip(posterior.names, off.T, strict=True):
-        parameter = PARAMETERS[name]
+        parameter = parameter_named(name)
         drawn[name] = np.asarray(parameter.value(parameter.coordinate(parameter.read(arm)) + column))
     contact = posterior.contact
     friction = np.exp(contact.friction * rng.normal(size=count))
@@ -110,8 +110,8 @@ def posterior_of(stages: list[dict], contact: Contact | None = None) -> Posterio
         for name, row in stage["parameters"].items():
             if name in OF_THE_MARKER:
                 continue
-            if name not in PARAMETERS:
-                raise InputError(f"parameters.{name}: found no such parameter, expected one of {', '.join(PARAMETERS)}")
+            if name not in NAMES:
+                raise InputError(f"parameters.{name}: found no such parameter, expected one of {', '.join(NAMES)}")
             identified[name] = (number, _deviation(name, row["interval_95_given_model"]))
     names = tuple(identified)
     correlation = np.eye(len(names))
@@ -130,7 +130,7 @@ def read_posterior(files: list[Path], contact: Contact | None = None) -> Posteri
 
 def _deviation(name: str, interval: list[float | None]) -> float:
     low, high = interval
-    if low is None or high is None or not low <= high or (low <= 0 and not PARAMETERS[name].signed):
+    if low is None or high is None or not low <= high or (low <= 0 and not parameter_named(name).signed):
         raise InputError(f"parameters.{name}.interval_95_given_model: found {interval}, expected two numbers that rise")
-    ends = PARAMETERS[name].coordinate(np.array([low, high]))
+    ends = parameter_named(name).coordinate(np.array([low, high]))
     return float(ends[1] - ends[0]) / (2 * Z95)

@@ -24,10 +24,10 @@ from trunkline.ar.hybrid.string import EYE, STRING
 from trunkline.ar.hybrid.torques import joint_torques, servo_commands
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
-from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields
+from trunkline.identification.parameters.parameters import candidate_fields, parameter_named
 from trunkline.identification.parameters.saving import ELEMENTS
 from trunkline.kinematics.panda.shipped import JOINTS
-from trunkline.model.elements import actuators, unload_branches
+from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.motion import batch_of, hold, move
 from trunkline.model.simulation.winch import Winches
 
@@ -116,7 +116,7 @@ def rollouts(twin: ComposedTwin, trajectory: CommandTrajectory, samples: Posteri
         InputError: the plan has another number of joints or cables than the model.
     """
     model, count = twin.model, len(samples)
-    joints, motors = panda_joints(model), actuators(model)
+    joints, motors = panda_joints(model), ArmModel(model).actuators
     if trajectory.joints.shape[1:] != (len(joints),) or trajectory.commands.shape[1:] != (len(motors),):
         raise InputError(
             f"plan: found {trajectory.joints.shape[1]} joints and {trajectory.commands.shape[1]} cables, "
@@ -201,7 +201,7 @@ def _set_parameters(batch: Batch, twin: ComposedTwin, samples: PosteriorSamples)
         return
     for name, values in candidate_fields(twin.arm, samples.values).items():
         batch.expand(name)[:, rows_of(name, twin.model, twin.arm)] = values[:, rows_of(name, twin.arm, twin.arm)]
-    if any("jnt_pos" in PARAMETERS[name].fields for name in samples.values):
+    if any("jnt_pos" in parameter_named(name).fields for name in samples.values):
         batch.set_const()
 
 
@@ -231,7 +231,7 @@ def _place(
         places[:] = start
     else:
         places[:, model.jnt_qposadr[panda_joints(model)]] = trajectory.joints[0]
-        unload_branches(model, places)
+        ArmModel(model).unload_branches(places)
     joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, "object")
     if joint < 0:
         return

@@ -27,7 +27,7 @@ from trunkline.ar.teleop.rigid_ik import RigidIK
 from trunkline.ar.teleop.trajectory import limits_of
 from trunkline.ar.teleop.vectors import DOWN
 from trunkline.kinematics.panda.shipped import JOINTS
-from trunkline.model.elements import actuators
+from trunkline.model.arm_model import ArmModel
 from trunkline.unity import unpacked
 
 SEARCH = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])  # rad, where the search for the ready pose begins
@@ -87,7 +87,7 @@ def make(
 def subject_of(simulation: Simulation, hardware: Hardware | None = None) -> Subject:
     """Whom a log is about: the simulated robot, or the real one, of which a twin is drawn."""
     model = simulation.twin.model
-    tendons = tuple(model.tendon(number).name for number in model.actuator_trnid[actuators(model), 0])
+    tendons = tuple(model.tendon(number).name for number in model.actuator_trnid[ArmModel(model).actuators, 0])
     site = model.site("tip")
     x, y, z = (float(value) for value in site.pos)
     tip = model.body(site.bodyid[0]).name, (x, y, z)

@@ -29,7 +29,7 @@ from trunkline.ar.teleop.plan import Plan
 from trunkline.ar.teleop.trajectory import MotionLimits
 from trunkline.compute.processes import leave_signals_to_parent, parent_pid
 from trunkline.kinematics.panda.shipped import JOINTS
-from trunkline.model.elements import actuators
+from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.capstan import REFRESH, capstan_friction_of
 from trunkline.model.simulation.motion import batch_of, hold
 from trunkline.model.simulation.winch import Winches
@@ -66,7 +66,7 @@ class TwinPlant:
         self.tick = self.steps * model.opt.timestep
         if simulation.twin.start is not None:
             self.batch.bind("qpos")[:] = simulation.twin.start
-        self._joints, self._motors = panda_joints(model), actuators(model)
+        self._joints, self._motors = panda_joints(model), ArmModel(model).actuators
         self._servos = [model.actuator(f"{name}_position").id for name in JOINTS]
         self._ratio = -model.actuator_biasprm[self._servos, 2] / model.actuator_gainprm[self._servos, 0]
         off = mujoco.mjtDisableBit

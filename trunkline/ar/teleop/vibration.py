@@ -19,7 +19,7 @@ import numpy as np
 from trunkline.ar.teleop.planner import ShaperOf
 from trunkline.ar.teleop.shaping import Shaper, Shaping, shaper_of
 from trunkline.frames import STANDARD_GRAVITY
-from trunkline.model.elements import unload_branches
+from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.rest import base_frame, settle
 
 STEP = 1e-5  # rad, rad/s and m, of the differences
@@ -55,7 +55,7 @@ def vibration_modes(
     model.opt.gravity[:] = base_frame(model)[1] @ gravity
     data = mujoco.MjData(model)
     pose = rest.qpos[0]
-    unload_branches(model, pose)
+    ArmModel(model).unload_branches(pose)
     data.qpos[:] = pose
     inputs = data.act if model.na else data.ctrl
     with_state = model.actuator_actadr >= 0 if model.na else np.ones(model.nu, dtype=bool)

@@ -17,7 +17,7 @@ from trunkline.identification.simulate.loss import (
 )
 from trunkline.identification.simulate.resting import LAST, STILL
 from trunkline.identification.simulate.simulated_sessions import Sessions
-from trunkline.model.elements import marker_sites
+from trunkline.model.arm_model import ArmModel
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_static, is_stepwise
 from trunkline.recordings.trials.splits import SPLITS
 
@@ -78,7 +78,7 @@ def replay(
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     length = float(np.linalg.norm(data.site("tip").xpos - data.site("base_center").xpos))
-    tip = int(np.argmax(model.site_bodyid[marker_sites(model, markers)]))
+    tip = int(np.argmax(model.site_bodyid[ArmModel(model).marker_sites(markers)]))
     straight = marker_positions(model, markers, model.qpos0)
     return Replay([positions[0] for positions in simulated.positions], length, tip, straight)
 
@@ -88,7 +88,7 @@ def marker_positions(model: mujoco.MjModel, markers: tuple[str, ...], qpos: np.n
     data = mujoco.MjData(model)
     data.qpos[: len(qpos)] = qpos
     mujoco.mj_kinematics(model, data)
-    return data.site_xpos[marker_sites(model, markers)]
+    return data.site_xpos[ArmModel(model).marker_sites(markers)]
 
 
 def scores(

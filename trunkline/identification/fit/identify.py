@@ -16,9 +16,10 @@ from trunkline.identification.fit.problem import Problem
 from trunkline.identification.fit.robust import reweighted
 from trunkline.identification.fit.search import Convergence, SearchResult, descend, search
 from trunkline.identification.fit.surrogate import Surrogate, surrogate
-from trunkline.identification.parameters.parameters import candidate_fields, follow_rest, parameter_named, set_fields
+from trunkline.identification.parameters.parameter import Fields
+from trunkline.identification.parameters.parameters import candidate_fields, parameter_named, set_fields
 from trunkline.identification.simulate.experiment import Experiment
-from trunkline.identification.simulate.resting import RestShape, spring_references
+from trunkline.identification.simulate.resting import RestShape, hang_in
 from trunkline.recordings.trials.experiments import is_static
 from trunkline.recordings.trials.splits import IDENTIFY
 
@@ -211,8 +212,8 @@ def with_parameters(
         )
         set_fields(changed, fields)
     if rest is not None:
-        fields = {"qpos_spring": spring_references({}, changed, rest)}
-        follow_rest(fields, changed)
+        fields: Fields = {}
+        hang_in(fields, changed, rest)
         set_fields(changed, fields)
     return changed
 

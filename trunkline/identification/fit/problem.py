@@ -9,13 +9,13 @@ import mujoco
 import numpy as np
 from pydantic import Field
 
-from trunkline.identification.parameters.parameters import candidate_fields, follow_rest, parameter_named, unit_of_hinge
+from trunkline.identification.parameters.parameters import candidate_fields, parameter_named
 from trunkline.identification.parameters.per_session import values_in
 from trunkline.identification.simulate.experiment import Experiment, weights_for
 from trunkline.identification.simulate.loss import RESIDUALS, LossWeights, loss_of
-from trunkline.identification.simulate.resting import RestShape, spring_references
+from trunkline.identification.simulate.resting import RestShape, hang_in
 from trunkline.identification.simulate.simulated_sessions import Sessions
-from trunkline.model.elements import capstan_friction
+from trunkline.model.arm_model import ArmModel
 from trunkline.recordings.trials.experiments import is_static
 
 DIVERGED_LOSS = 1e3  # finite, and with sensible weights far above the loss of any arm that stays in one piece
@@ -67,12 +67,12 @@ class Problem:
             self.trial_weights = np.ones(len(self.experiments))
         self._sessions = Sessions(self.model, self.experiments, self.markers, self.step_factor)
         self._last: tuple[np.ndarray, list[np.ndarray]] | None = None  # candidate that was alone, and where it rests
-        self.units = int(unit_of_hinge(self.model).max()) + 1
+        self.units = int(ArmModel(self.model).unit_of_hinge.max()) + 1
 
     @property
     def rubs(self) -> bool:
         """Whether cables that rub on their holes move the arm in any trial."""
-        rubbing = capstan_friction(self.model) > 0
+        rubbing = ArmModel(self.model).capstan_friction > 0
         return rubbing and any(not is_static(e.kind) and not e.slack(self.model) for e in self.experiments)
 
     def fields(
@@ -87,8 +87,7 @@ class Problem:
             model, values_in(session, values), {name: blocks[:, i] for i, name in enumerate(self.per_joint)}
         )
         if self.rest is not None:
-            fields["qpos_spring"] = spring_references(fields, model, self.rest)
-            follow_rest(fields, model)
+            hang_in(fields, model, self.rest)
         return fields
 
     def residuals(self, vectors: np.ndarray, near: np.ndarray | None = None, rough: bool = False) -> list[np.ndarray]:

@@ -8,13 +8,11 @@ from trunkline.errors import InputError
 from trunkline.identification.fit.fit import Fit
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.settings import IdentificationSettings
-from trunkline.identification.parameters.parameters import EVERY, PARAMETERS, names_of, parameter_named
+from trunkline.identification.parameters.parameters import EVERY, names_of, parameter_named
 from trunkline.identification.parameters.per_session import names_in, other_sessions
 from trunkline.identification.simulate.experiment import Experiment, prepare
 from trunkline.identification.simulate.markers import with_measured_markers
 from trunkline.identification.simulate.resting import resting_shape
-from trunkline.model.elements import BACKLASH, PRELOAD, RATE_LIMIT, WINDING
-from trunkline.recordings.trials.splits import IDENTIFY
 from trunkline.recordings.trials.trial import Trial
 
 EVERY_ANGLE = f"tendon_angle{EVERY}"
@@ -53,7 +51,8 @@ def with_every(config: IdentificationSettings, model: mujoco.MjModel) -> Identif
     spans: dict[str, Bounds] = {}
     for name, span in config.parameters.items():
         for parameter in names_of(name, model) or [name]:
-            middle = PARAMETERS[parameter].read(model) if name == EVERY_ANGLE else 0.0
+            has_middle = name == EVERY_ANGLE and parameter != name
+            middle = parameter_named(parameter).read(model) if has_middle else 0.0
             spans[parameter] = Bounds(middle + span.low, middle + span.high)
     return replace(config, parameters=spans)
 
@@ -63,38 +62,8 @@ def check_parameters(stage: str, config: IdentificationSettings, model: mujoco.M
     for name in config.parameters:
         parameter, where = parameter_named(name), f"params.yaml: {stage}.parameters.{name}"
         if not parameter.belongs_to(model):
-            raise InputError(f"{where}: {_lacking(parameter.part)}")
+            raise InputError(f"{where}: {parameter.part.lacking}")
         try:
             parameter.read(model)
         except InputError as error:
             raise InputError(f"{where}: {error}") from error
-
-
-def _lacking(part: str) -> str:
-    if part == "tendons":
-        reason = "found it for an arm without tendons, expected parameters of joints alone"
-        return f"{reason}; such an arm's pipeline ends with `dvc repro identify_damping`"
-    if part.startswith("motor "):
-        return f"found it for an arm without {part}, expected a ratio for each motor that it has but the first"
-    if part == "dead time":
-        reason = "found it for motors without, expected build_mjcf.actuation.dead_time of more than 0"
-        return f"{reason}; of an arm that comes as MJCF, expected `delay` and `nsample` of its actuators in that file"
-    if part in (RATE_LIMIT, BACKLASH):
-        return f"found it for winches without, expected build_mjcf.actuation.{part} of more than 0"
-    kind = part.partition(" ")[0]
-    if kind in (WINDING, PRELOAD):
-        return "found it for evenly spread tendons, expected tendons that are described one by one in build_mjcf.arm"
-    if kind == "tendon":
-        return f"found it for an arm without {part}, expected one for each tendon that it has"
-    if kind == "section":
-        return f"found it for an arm without {part}, expected build_mjcf.arm of the kind sections"
-    if part == "holes":
-        return "found it for cables that do not rub, expected build_mjcf.holes: rubbing"
-    return f"found it for joints without {part}, expected build_mjcf.joints with one"
-
-
-def check_folds(stage: str, folds: int, fitted: list[Experiment]) -> None:
-    """Refuse to leave out more groups of trials than there are trials to identify from."""
-    trials = sum(e.split == IDENTIFY for e in fitted)
-    if folds > trials:
-        raise InputError(f"{stage}.cross_validation_folds: found {folds}, expected at most {trials}, one a trial")

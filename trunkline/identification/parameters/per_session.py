@@ -6,7 +6,7 @@ The model is the first session's. What another has is a number in the MJCF, call
 import mujoco
 import numpy as np
 
-from trunkline.identification.parameters.parameters import PARAMETERS, SESSION_MARK, candidate_fields, set_fields
+from trunkline.identification.parameters.parameters import SESSION_MARK, candidate_fields, parameter_named, set_fields
 from trunkline.recordings.trials.splits import IDENTIFY
 from trunkline.recordings.trials.trial import Trial, sessions_of
 
@@ -54,7 +54,7 @@ def make_room(spec: mujoco.MjSpec, names: dict[str, str]) -> None:
     model = spec.compile()
     for name, shared in names.items():
         if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, name) < 0:
-            spec.add_numeric(name=name, size=1, data=[PARAMETERS[shared].read(model)])
+            spec.add_numeric(name=name, size=1, data=[parameter_named(shared).read(model)])
 
 
 def unidentifiable_per_session(names: dict[str, str], trials: list[Trial], kinds: list[str]) -> list[str]:

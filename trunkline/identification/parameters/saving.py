@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from trunkline.identification.parameters.parameters import PARAMETERS, PER_JOINT
+from trunkline.identification.parameters.parameters import EVERY_NAME, PARAMETERS, PER_JOINT, parameter_named
 
 # shape at rest, where diagonals are slack in it, and markers: measured rather than searched for
 STRUCTURE = ("qpos_spring", "tendon_lengthspring", "site_pos")
@@ -50,7 +50,7 @@ def save_model(spec: mujoco.MjSpec, model: mujoco.MjModel) -> str:
         ValueError: naming the field of a parameter that has no place in MJCF.
     """
     before = spec.compile()
-    fields = {field for parameter in PARAMETERS.values() for field in parameter.fields}
+    fields = {field for name in (*PARAMETERS, *EVERY_NAME) for field in parameter_named(name).fields}
     fields |= {field for names, _ in PER_JOINT.values() for field in names}
     for field in sorted(fields | set(STRUCTURE)):
         prefix, _, name = field.partition("_")

@@ -9,8 +9,8 @@ has it, and cables tight or slack where commands are 0: a model that says so (`w
 import mujoco
 import numpy as np
 
-from trunkline.identification.parameters.parameters import Fields
-from trunkline.model.elements import PRELOAD, WINDING, numbers_place, numeric_place
+from trunkline.identification.parameters.parameter import Fields
+from trunkline.model.arm_model import PRELOAD, WINDING, ArmModel
 
 
 def wound(model: mujoco.MjModel, controls: np.ndarray) -> np.ndarray:
@@ -20,11 +20,12 @@ def wound(model: mujoco.MjModel, controls: np.ndarray) -> np.ndarray:
 
 def wound_by_each(model: mujoco.MjModel, fields: Fields, controls: np.ndarray) -> np.ndarray:
     """As `wound`, by every candidate: (E, T, nu) of E trials → (E C, T, nu), a trial's candidates one after another."""
-    place, count = numeric_place(model, WINDING), len(next(iter(fields.values())))
+    arm, count = ArmModel(model), len(next(iter(fields.values())))
     each = np.repeat(controls, count, axis=0)
-    if place is None:
+    scale = arm.places(WINDING)
+    if not len(scale):
         return each
     numbers = fields.get("numeric_data", np.repeat(model.numeric_data[None], count, axis=0))
     numbers = np.tile(numbers, (len(controls), 1))[:, None]
     straight = model.tendon_length0[model.actuator_trnid[:, 0]]
-    return straight - numbers[..., [place]] * (straight - each) - numbers[..., numbers_place(model, PRELOAD)]
+    return straight - numbers[..., scale] * (straight - each) - numbers[..., arm.places(PRELOAD)]

@@ -5,13 +5,42 @@ import pandas as pd
 from scipy.signal import butter, sosfiltfilt
 
 from trunkline.frames import tilt_of_gravity
-from trunkline.identification.evaluation.error_tables import LABELS
+from trunkline.identification.evaluation.error_tables import LABELS, marker_table
 from trunkline.identification.evaluation.evaluation import Prediction
 from trunkline.identification.fit.identify import Identification
 from trunkline.identification.simulate.loss import distances
+from trunkline.recordings.trials.experiments import is_static
 
 ERROR_CUTOFF = 6.0  # Hz, of the low-pass over error curves, as the paper filters its figure
 SHOWN_MARKERS = 5
+DRAWN = ("cad", "identified")  # models beside what was measured
+
+
+def stage_tables(
+    result: Identification, validate: dict[str, Prediction], markers: tuple[str, ...], shapes: bool
+) -> dict[str, pd.DataFrame]:
+    """By name: convergence, errors along the arm (`markers`), and of one shape a trial `shapes`, or of motions `errors`
+    and of the widest of them `distances`.
+
+    Args:
+        validate: what models and baselines predict of that split.
+    """
+    tables = {"convergence": convergence_table(result), "markers": marker_table(validate, markers)}
+    if shapes:
+        return tables | {"shapes": shape_table({name: validate[name] for name in DRAWN}, markers)}
+    moving = {name: prediction.of(lambda e: not is_static(e.kind)) for name, prediction in validate.items()}
+    if not moving["identified"].experiments:
+        return tables
+    errors = error_curves({name: moving[name] for name in ("null", "null_held", *DRAWN)})
+    return tables | {"errors": errors, "distances": distance_table(widest_motion(validate), markers)}
+
+
+def widest_motion(validate: dict[str, Prediction]) -> dict[str, Prediction]:
+    """Predictions of the one trial, of the last kind with motion, in which a marker comes furthest."""
+    moving = [e for e in validate["identified"].experiments if not is_static(e.kind)]
+    kind = [e for e in moving if e.kind == moving[-1].kind]
+    widest = max(kind, key=lambda e: float(np.ptp(e.positions, axis=0).max()))
+    return {name: validate[name].of(lambda e: e.name == widest.name) for name in DRAWN}
 
 
 def convergence_table(identification: Identification) -> pd.DataFrame:

@@ -6,10 +6,11 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from trunkline.identification.parameters.parameters import Fields, set_fields
+from trunkline.identification.parameters.parameter import Fields
+from trunkline.identification.parameters.parameters import set_fields
 from trunkline.identification.parameters.spool_scale import wound
 from trunkline.identification.simulate.experiment import Experiment
-from trunkline.model.elements import BACKLASH, actuators, arm_hinges, numeric
+from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.winch import wind
 from trunkline.model.statics.chain import read_chain
 from trunkline.model.statics.equilibria import actuated
@@ -40,7 +41,7 @@ def shapes_at_rest(
         fields: of the candidates, as `parameters.candidate_fields`.
         sites: numbers of the markers' sites. Shape (S,).
     """
-    count = len(next(iter(fields.values())))
+    arm, count = ArmModel(model), len(next(iter(fields.values())))
     candidate_model, data = copy.copy(model), mujoco.MjData(model)
     trial = np.repeat(np.arange(len(experiments)), [e.frames for e in experiments])  # of each of R rows
     starts = np.concatenate([_starts(e) for e in experiments])
@@ -49,15 +50,14 @@ def shapes_at_rest(
         starts = np.where(np.isfinite(nearby), nearby, starts)
     gravity, loads = (np.array([getattr(e, name) for e in experiments])[trial] for name in ("gravity", "load"))
     places = np.full((count, len(trial), len(sites), 3), np.nan)
-    angles, iterations = np.full((len(trial), arm_hinges(model)), np.nan), 0
+    angles, iterations = np.full((len(trial), arm.hinge_count), np.nan), 0
     for candidate in range(count):
         set_fields(candidate_model, fields, candidate)
         if "jnt_pos" in fields:  # what softens joint limits follows, as when such a model is compiled
             mujoco.mj_setConst(candidate_model, data)
         chain = read_chain(candidate_model).smooth
         mujoco.mj_kinematics(candidate_model, data)
-        base = candidate_model.body("base").id
-        turned = gravity @ data.xmat[base].reshape(3, 3)  # into the mount's frame, which may be tilted
+        turned = gravity @ data.xmat[arm.base_body].reshape(3, 3)  # into the mount's frame, which may be tilted
         sent = np.concatenate([_sent(candidate_model, e) for e in experiments])
         qpos = np.full(angles.shape, np.nan)
         for load in np.unique(loads):
@@ -94,8 +94,8 @@ def _starts(experiment: Experiment) -> np.ndarray:
 def _sent(model: mujoco.MjModel, experiment: Experiment) -> np.ndarray:
     """Lengths of cable at which the motors of `model` stand, m: what winches with backlash have delivered by each
     frame, of a trial that has several. Shape (T, K)."""
-    controls = wound(model, experiment.controls)[:, actuators(model)]
-    play = numeric(model, BACKLASH)
+    arm = ArmModel(model)
+    controls, play = wound(model, experiment.controls)[:, arm.actuators], arm.backlash
     if play and experiment.frames > 1:
         first = controls[:1].copy()
         controls = wind(controls[None], first, first.copy(), np.array([np.inf]), np.array([play]))[0]

@@ -9,7 +9,7 @@ from trunkline.errors import InputError
 from trunkline.identification.parameters.per_session import model_in
 from trunkline.identification.simulate.loss import LossWeights
 from trunkline.identification.simulate.pose_fit import PoseFit, fit_pose
-from trunkline.model.elements import arm_hinges, cables
+from trunkline.model.arm_model import ArmModel
 from trunkline.recordings.trials.experiments import is_static, is_stepwise
 from trunkline.recordings.trials.trial import Trial
 
@@ -159,7 +159,7 @@ def _start(trial: Trial, model: mujoco.MjModel, frame: int) -> tuple[PoseFit, np
         return fit, fit.qpos, _velocity(trial, model, frame)
     if trial.swaying:
         return fit, *_extrapolated(trial, model, frame)
-    return fit, fit.qpos, np.zeros(arm_hinges(model))
+    return fit, fit.qpos, np.zeros(ArmModel(model).hinge_count)
 
 
 def start_frames(trial: Trial) -> tuple[int, int]:
@@ -233,7 +233,7 @@ def check_names(trial: Trial, model: mujoco.MjModel) -> None:
     that it leaves out may have pulled."""
     sites = [model.site(i).name for i in range(model.nsite)]
     units = [name.removesuffix("_center") for name in sites if name.endswith("_center") and name != "base_center"]
-    tendons = [model.tendon(i).name for i in cables(model)]
+    tendons = ArmModel(model).cable_names
     for key, used, names in (("markers", trial.markers, units), ("tendons", trial.tendons, tendons)):
         unknown = [name for name in used if name not in names]
         if unknown:

@@ -7,17 +7,10 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from trunkline.identification.parameters.parameters import Fields
+from trunkline.identification.parameters.parameter import Fields
 from trunkline.identification.parameters.spool_scale import wound_by_each
 from trunkline.identification.simulate.experiment import Experiment
-from trunkline.model.elements import (
-    SLIDER,
-    all_elements,
-    cables,
-    switch_off_cables,
-    switch_off_capstan_friction,
-    unload_branches,
-)
+from trunkline.model.arm_model import CAPSTAN_FRICTION, ArmModel
 from trunkline.model.simulation.load import hang
 from trunkline.model.simulation.motion import batch_of, by_warp, hold, move
 from trunkline.model.simulation.winch import Winches
@@ -121,8 +114,9 @@ class InMotion:
     def _remember(self, batch: Batch) -> None:
         """Joints' branches and sliders as long after a straight arm was bent into the start pose."""
         angles = batch.bind("qpos")
-        unload_branches(self._model, angles)
-        for element in all_elements(self._model, SLIDER):
+        arm = ArmModel(self._model)
+        arm.unload_branches(angles)
+        for element in arm.sliders:
             bend, give = angles[:, element.hinge], batch.expand("tendon_springyield")[:, element.tendon]
             place = self._model.tendon_plasticadr[element.tendon]
             for end in (0, 1):  # of the spring's length at rest
@@ -132,11 +126,11 @@ class InMotion:
 def _without_idle(model: mujoco.MjModel, slack: bool, fields: Fields, whole: bool = False) -> mujoco.MjModel:
     """A copy of the model without what moves nothing where all cables are slack and takes most of a step: their
     friction on the holes, and, but for `whole`, the cables themselves."""
-    model = copy.copy(model)
+    arm = ArmModel(copy.copy(model))
     parts = (model.tendon_frictionloss, model.tendon_stiffness, model.tendon_damping)
-    bare = "tendon_frictionloss" not in fields and not any(values[cables(model)].any() for values in parts)
+    bare = "tendon_frictionloss" not in fields and not any(values[arm.cables].any() for values in parts)
     if slack and bare and not whole:
-        switch_off_cables(model)
+        arm.switch_off_cables()
     elif slack:
-        switch_off_capstan_friction(model)
-    return model
+        arm.switch_off(CAPSTAN_FRICTION)
+    return arm.model

@@ -5,7 +5,7 @@ import numpy as np
 
 from trunkline.identification.simulate.experiment import measured_pose, start_frames
 from trunkline.identification.simulate.pose_fit import POSITION_SIGMA, PoseProblem, fit_pose
-from trunkline.model.elements import marker_sites
+from trunkline.model.arm_model import ArmModel
 from trunkline.recordings.trials.splits import IDENTIFY
 from trunkline.recordings.trials.trial import Trial
 
@@ -17,7 +17,7 @@ def with_measured_markers(model: mujoco.MjModel, trials: list[Trial]) -> mujoco.
     """A copy of `model` whose tracked sites are where the trials to identify from saw them in their start poses."""
     model = model.__copy__()
     fitted = [trial for trial in trials if trial.split == IDENTIFY]
-    sites = marker_sites(model, fitted[0].markers)
+    sites = ArmModel(model).marker_sites(fitted[0].markers)
     model.site_sameframe[sites] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE  # else a site at its body's origin stays there
     moved = np.zeros((len(sites), 3))
     straight = model.site_pos[sites].copy()

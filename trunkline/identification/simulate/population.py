@@ -6,11 +6,11 @@ import mujoco
 import numpy as np
 
 from trunkline.compute.scheduler import cuts, pieces, spread
-from trunkline.identification.parameters.parameters import Fields
+from trunkline.identification.parameters.parameter import Fields
 from trunkline.identification.simulate.at_rest import shapes_at_rest
 from trunkline.identification.simulate.experiment import Experiment
 from trunkline.identification.simulate.in_motion import InMotion
-from trunkline.model.elements import arm_hinges, marker_sites
+from trunkline.model.arm_model import ArmModel
 from trunkline.recordings.trials.experiments import is_static
 
 
@@ -63,7 +63,7 @@ class Population:
         self, model: mujoco.MjModel, experiments: list[Experiment], markers: tuple[str, ...], step_factor: float = 1.0
     ):
         self._model = model
-        self._sites = marker_sites(model, markers)
+        self._sites = ArmModel(model).marker_sites(markers)
         self._experiments = experiments
         # longest first, as `InMotion` has them
         order = sorted(range(len(experiments)), key=lambda i: -experiments[i].frames)
@@ -89,7 +89,7 @@ class Population:
         diverged = np.zeros(len(next(iter(fields.values()))), dtype=bool)
         for result in positions:
             diverged |= ~np.isfinite(result).all(axis=(1, 2, 3))
-        unknown = np.full((1, arm_hinges(self._model)), np.nan)
+        unknown = np.full((1, ArmModel(self._model).hinge_count), np.nan)
         angles = [results[0].rests.get(i, unknown) for i in every]
         return Simulated(positions, diverged, sum(part.steps for part in results), angles)
 

@@ -7,7 +7,7 @@ import numpy as np
 from mujoco import minimize
 
 from trunkline.frames import rotation_from_wxyz
-from trunkline.model.elements import arm_hinges, marker_sites
+from trunkline.model.arm_model import ArmModel
 
 POSITION_SIGMA = 0.5e-3  # m, what a tracked position is trusted to
 ROTATION_SIGMA = np.radians(1.0)  # what a tracked orientation is trusted to, axis misalignment included
@@ -55,14 +55,14 @@ class PoseProblem:
         quaternions: np.ndarray | None = None,
     ):
         self.model, self.data = model, mujoco.MjData(model)
-        self.sites = marker_sites(model, markers)
+        self.sites = ArmModel(model).marker_sites(markers)
         self.positions = positions
         self._targets = None if quaternions is None else rotation_from_wxyz(quaternions).as_matrix()
         measured = np.flatnonzero(np.isfinite(positions).all(axis=1))
         # the chain numbers its bodies from the base
         self.measured = measured[np.argsort(model.site_bodyid[self.sites[measured]])]
         self.hinges = int(np.bincount(model.jnt_bodyid).max())  # of each joint
-        self.angles = arm_hinges(model)
+        self.angles = ArmModel(model).hinge_count
         rows = np.eye(self.angles, k=self.hinges)[: -self.hinges] - np.eye(self.angles)[: -self.hinges]
         self._smooth = rows / BEND_CHANGE_SIGMA
 

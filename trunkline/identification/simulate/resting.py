@@ -7,10 +7,11 @@ import numpy as np
 from scipy.optimize import newton
 
 from trunkline.errors import InputError
-from trunkline.identification.parameters.parameters import Fields
+from trunkline.identification.parameters.joints import follow_rest
+from trunkline.identification.parameters.parameter import Fields
 from trunkline.identification.simulate.experiment import Experiment
 from trunkline.identification.simulate.pose_fit import fit_pose
-from trunkline.model.elements import DIAGONAL, HINGE_SHARE, elements
+from trunkline.model.arm_model import HINGE_SHARE, ArmModel
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.recordings.trials.splits import IDENTIFY
 
@@ -42,6 +43,12 @@ def rest_shape(model: mujoco.MjModel, pose: np.ndarray, gravity: np.ndarray) -> 
     return RestShape(np.array(pose), -data.qfrc_bias[: len(pose)])
 
 
+def hang_in(fields: Fields, model: mujoco.MjModel, rest: RestShape) -> None:
+    """Let the springs of each candidate be slack where it then rests in `rest`, in place."""
+    fields["qpos_spring"] = spring_references(fields, model, rest)
+    follow_rest(fields, model)
+
+
 def spring_references(fields: Fields, model: mujoco.MjModel, rest: RestShape) -> np.ndarray:
     """Joint angles q_0 at which each candidate's springs are slack, so that it rests in `rest`. Shape (C, nq).
 
@@ -53,8 +60,8 @@ def spring_references(fields: Fields, model: mujoco.MjModel, rest: RestShape) ->
     arm = len(rest.pose)  # hinges; those of Maxwell branches come after them and have no springs
     poly = springs["jnt_stiffnesspoly"][:, :arm]
     load, share = rest.load, 1.0
-    if diagonals := elements(model, DIAGONAL).hinge.tolist():
-        share, pairs = HINGE_SHARE, np.array(diagonals)[:, None] + np.arange(2)
+    if diagonals := ArmModel(model).diagonals:
+        share, pairs = HINGE_SHARE, diagonals[0].hinge[:, None] + np.arange(2)
         load = np.zeros(arm)
         load[pairs] = np.linalg.norm(rest.load[pairs], axis=1)[:, None]
     a, b, c, load = np.broadcast_arrays(springs["jnt_stiffness"][:, :arm], poly[..., 0], poly[..., 1] / share, load)

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 
-from trunkline.identification.parameters.parameters import Fields
+from trunkline.identification.parameters.parameter import Fields
 from trunkline.identification.parameters.per_session import model_in
 from trunkline.identification.simulate.experiment import Experiment
 from trunkline.identification.simulate.population import Population, Simulated

@@ -8,7 +8,7 @@ from trunkline.compute.scheduler import spread_rows
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.kinematics.dataset.columns import DOWN, command_columns, tension_columns
-from trunkline.model.elements import capstan_friction
+from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.rest import settle
 from trunkline.model.statics.chain import Chain
 from trunkline.model.statics.hysteresis import friction_band, model_friction
@@ -53,5 +53,5 @@ def _settled(
     (n, 3), which of them rested (n,), and how far apart friction may hold them, m (n,)."""
     (model, chain), (tensions, commands, gravity) = fixed, rows
     settled = settle(model, commands[:, model.actuator_trnid[:, 0]], gravity)
-    band = friction_band(chain, tensions, gravity, *model_friction(model), capstan=capstan_friction(model))
+    band = friction_band(chain, tensions, gravity, *model_friction(model), capstan=ArmModel(model).capstan_friction)
     return settled.position, settled.rested, band.width

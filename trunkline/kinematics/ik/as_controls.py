@@ -15,7 +15,7 @@ from pydantic import Field, PositiveFloat
 from trunkline.kinematics.dataset.columns import POSE
 from trunkline.kinematics.dataset.sampling import around_the_arm, in_sections, sections
 from trunkline.kinematics.ik.inputs import draw_gravity, gravity_of, position_of
-from trunkline.model.elements import BACKLASH, SLIDER, actuators, all_elements, capstan_friction, numeric
+from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.drive import drive, has_friction
 from trunkline.model.simulation.rest import base_frame, settle
 from trunkline.model.statics.chain import Chain
@@ -88,7 +88,7 @@ def draw_targets(
     """
     gravity, commands = draw_commands(chain, sampled, deepest, count, rng, others_pay_out)
     rest = settle(model, commands[:, model.actuator_trnid[:, 0]], _gravity_vectors(gravity), PATIENCE)
-    tensions = rest.tensions[:, actuators(model)]
+    tensions = rest.tensions[:, ArmModel(model).actuators]
     near_limit = ~(tensions < NEAR_LIMIT * chain.max_tension).all(axis=1)
     targets = np.column_stack([gravity, rest.position, rest.quaternion])[rest.rested & ~near_limit]
     return Drawn(targets, int((rest.rested & near_limit).sum()), int((~rest.rested).sum()))
@@ -202,8 +202,9 @@ def score(
         sent = Reached(**{name: np.concatenate([vars(part)[name] for part in parts]) for name in vars(timed)})
         seconds = timed.time_to_rest()
     tendons, joints = model_friction(model)
-    dry = {"tendons_n": tendons.max(), "joints_nm": joints.max(), "sliders": len(all_elements(model, SLIDER))}
-    dry |= {"capstan": capstan_friction(model), "backlash_m": numeric(model, BACKLASH)}
+    arm = ArmModel(model)
+    dry = {"tendons_n": tendons.max(), "joints_nm": joints.max(), "sliders": len(arm.sliders)}
+    dry |= {"capstan": arm.capstan_friction, "backlash_m": arm.backlash}
     on_model = {
         **drawn.counts(),
         "frictionless": settled(model, ask, targets).metrics(chain.length) | {"seconds_to_rest": timed.time_to_rest()},

@@ -18,7 +18,7 @@ import numpy as np
 from pydantic import Field
 
 from trunkline.errors import InputError
-from trunkline.model.elements import CAPSTAN_FRICTION, SLIP, SLIP_LENGTH, arm_hinges, hole_name, stretch_edges
+from trunkline.model.arm_model import CAPSTAN_FRICTION, HOLE, SLIP, SLIP_LENGTH, ArmModel, stretch_edges
 
 RIGID_TIME, RIGID = 0.004, 0.999  # s and impedance of the friction: nearer to rigid than MuJoCo's own 0.02 and 0.95
 
@@ -47,7 +47,7 @@ def add_holes(spec: mujoco.MjSpec, holes: GuideHoles) -> None:
     straight = spec.compile()
     data = mujoco.MjData(straight)
     mujoco.mj_forward(straight, data)
-    units = len(np.unique(straight.jnt_bodyid[: arm_hinges(straight)]))
+    units = len(ArmModel(straight).unit_bodies)
     for cable in cables:
         arms = _moment_arms(straight, data, straight.tendon(cable.name).id)
         if len(arms) < units:
@@ -56,7 +56,7 @@ def add_holes(spec: mujoco.MjSpec, holes: GuideHoles) -> None:
         edges = stretch_edges(len(arms), holes.stretches)
         for number, (begin, end) in enumerate(pairwise(edges), start=1):
             rubbing = spec.add_tendon(
-                name=hole_name(cable.name, number), solref_friction=[RIGID_TIME, 1],
+                name=f"{cable.name}_{HOLE}_{number}", solref_friction=[RIGID_TIME, 1],
                 solimp_friction=[RIGID, RIGID, 0.001, 0.5, 2],
             )  # fmt: skip
             for unit in arms[(begin + end) // 2 :]:

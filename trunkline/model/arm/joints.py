@@ -18,7 +18,7 @@ import mujoco
 from pydantic import Field
 
 from trunkline.errors import InputError
-from trunkline.model.elements import BRANCH, DIAGONAL, DIAGONAL_SHARE, HINGE_SHARE, SLIDER, TIE
+from trunkline.model.arm_model import BRANCH, DIAGONAL, DIAGONAL_SHARE, HINGE_SHARE, SLIDER, TIE
 
 LIGHT = 1e-9  # kg and kg m², what MuJoCo wants of a body that moves; its damping makes it follow, not its inertia
 

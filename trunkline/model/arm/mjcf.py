@@ -16,7 +16,7 @@ from trunkline.frames import STANDARD_GRAVITY
 from trunkline.model.arm.geometry import ChainGeometry
 from trunkline.model.arm.material import UnitProperties
 from trunkline.model.arm.tendons import Route
-from trunkline.model.elements import BACKLASH, PRELOAD, RATE_LIMIT, SECTIONS, WINDING
+from trunkline.model.arm_model import BACKLASH, PRELOAD, RATE_LIMIT, SECTIONS, WINDING
 
 TENDON_RGBA = (0.15, 0.15, 0.15, 1)
 LONGEST_DEAD_TIME = 0.2  # s; what a motor remembers of its commands

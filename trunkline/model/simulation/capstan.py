@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from trunkline.model.elements import CAPSTAN_FRICTION, actuators, cables, hole_tendons, numeric_place, stretch_edges
+from trunkline.model.arm_model import CAPSTAN_FRICTION, ArmModel, stretch_edges
 
 REFRESH = 1 / 120  # s between new limits: the motors' tensions and the bends change little within
 CREEP = 1e-3  # m/s of sliding below which s is less than ±1
@@ -28,11 +28,11 @@ class CapstanFriction:
 
     def __init__(self, batch: Batch, longest: float | None = None) -> None:
         model = batch.model
-        self._batch, self._tendons = batch, hole_tendons(model)
-        self._actuators = actuators(model)
+        arm = ArmModel(model)
+        self._batch, self._tendons, self._actuators = batch, arm.guide_holes, arm.actuators
         self._hinges = _hinges(model)
         self._begins = stretch_edges(self._hinges.shape[1], self._tendons.shape[1])[:-1]
-        self._place = numeric_place(model, CAPSTAN_FRICTION)
+        self._place = arm.places(CAPSTAN_FRICTION)
         if longest is None:
             timestep = batch.expanded("opt.timestep")
             longest = float(np.max(model.opt.timestep if timestep is None else timestep))
@@ -53,7 +53,7 @@ class CapstanFriction:
     def refresh(self, ids) -> None:
         """Set limits and arms for the next `steps` steps of the simulations `ids`, from their last one."""
         bends = np.linalg.norm(self._angles[ids][:, self._hinges], axis=3)  # (B, K, n)
-        turns = self._friction[ids, self._place, None, None] * np.add.reduceat(bends, self._begins, axis=2)
+        turns = self._friction[ids][:, self._place, None] * np.add.reduceat(bends, self._begins, axis=2)
         side = np.clip(-self._speed[ids][:, self._tendons] / CREEP, -1, 1)  # (B, K, P)
         falls = side * turns
         tension = np.maximum(-self._force[ids][:, self._actuators], 0)[..., None]
@@ -69,19 +69,19 @@ class CapstanFriction:
 
 def capstan_friction_of(batch: Batch, longest: float | None = None) -> CapstanFriction | None:
     """What sets the limits of a batch, None if nothing in it rubs; `longest` as in `CapstanFriction`."""
-    if not hole_tendons(batch.model).size:
+    arm = ArmModel(batch.model)
+    if not arm.guide_holes.size:
         return None
     values = batch.expanded("numeric_data")
     values = batch.model.numeric_data[None] if values is None else values
-    return CapstanFriction(batch, longest) if values[:, numeric_place(batch.model, CAPSTAN_FRICTION)].any() else None
+    return CapstanFriction(batch, longest) if values[:, arm.places(CAPSTAN_FRICTION)].any() else None
 
 
 def _hinges(model: mujoco.MjModel) -> np.ndarray:
     """Addresses of the two angles of each unit along each cable. Shape (K, n, 2)."""
-    addresses = []
-    for cable in cables(model):
-        path = slice(model.tendon_adr[cable], model.tendon_adr[cable] + model.tendon_num[cable])
-        units = model.body_weldid[model.site_bodyid[model.wrap_objid[path]]][1:]
+    arm, addresses = ArmModel(model), []
+    for cable in arm.cables:
+        units = model.body_weldid[model.site_bodyid[arm.cable_sites(cable)]][1:]
         addresses.append(model.jnt_qposadr[model.body_jntadr[units][:, None] + np.arange(2)])
     return np.array(addresses)
 
@@ -93,7 +93,7 @@ def _arms(model: mujoco.MjModel, tendons: np.ndarray) -> tuple[np.ndarray, np.nd
         tendons: by which cables rub. Shape (K, P).
     """
     entries, slopes = [], []
-    for cable, stretches in zip(cables(model), tendons, strict=True):
+    for cable, stretches in zip(ArmModel(model).cables, tendons, strict=True):
         row = model.ten_J_rowadr[cable] + np.arange(model.ten_J_rownnz[cable])
         place = dict(zip(model.ten_J_colind[row].tolist(), row.tolist(), strict=True))
         for tendon in stretches:

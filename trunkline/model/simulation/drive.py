@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from trunkline.model.elements import BACKLASH, CAPSTAN_FRICTION, SLIDER, all_elements, numeric, switch_off
+from trunkline.model.arm_model import BACKLASH, CAPSTAN_FRICTION, ArmModel
 from trunkline.model.simulation.motion import batch_of, hold, move
 from trunkline.model.simulation.rest import base_frame, come_to_rest, longest_step, relax
 from trunkline.model.simulation.winch import Winches
@@ -50,8 +50,9 @@ class Driven:
 def has_friction(model: mujoco.MjModel) -> bool:
     """Whether where the model rests depends on how it came there: friction of tendons or hinges, sliders, holes,
     backlash of winches."""
-    sliding = any(model.tendon_stiffness[slider.tendon].any() for slider in all_elements(model, SLIDER))
-    sliding = sliding or numeric(model, CAPSTAN_FRICTION) or numeric(model, BACKLASH)
+    arm = ArmModel(model)
+    sliding = any(model.tendon_stiffness[slider.tendon].any() for slider in arm.sliders)
+    sliding = sliding or arm.capstan_friction or arm.backlash
     return bool(sliding or model.tendon_frictionloss.any() or model.dof_frictionloss.any())
 
 
@@ -87,8 +88,9 @@ def drive(
     model.opt.timestep = longest_step(model)
     if not friction:
         model.tendon_frictionloss[:], model.dof_frictionloss[:] = 0, 0
-        switch_off(model, CAPSTAN_FRICTION, BACKLASH)
-        for slider in all_elements(model, SLIDER):
+        arm = ArmModel(model)
+        arm.switch_off(CAPSTAN_FRICTION, BACKLASH)
+        for slider in arm.sliders:
             model.tendon_stiffness[slider.tendon] = 0
     if calm and has_friction(model):
         raise ValueError("found friction in a model to be calmed, expected none: where it rests depends on its way")

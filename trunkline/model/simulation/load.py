@@ -6,6 +6,7 @@ from mujoco.batch import Batch
 from scipy.spatial.transform import Rotation
 
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
+from trunkline.model.arm_model import ArmModel
 
 INERTIAL = ("body_mass", "body_ipos", "body_iquat", "body_inertia")
 
@@ -24,7 +25,7 @@ def hang(batch: Batch, model: mujoco.MjModel, loads: np.ndarray, individual: tup
     for name in INERTIAL:
         if name not in individual:
             batch.expand(name)[:] = getattr(model, name)
-    site = model.site("tip").id
+    site = ArmModel(model).tip_site
     body, chosen = model.site_bodyid[site], np.flatnonzero(loads)
     masses, centres, turns, inertias = (batch.expand(name)[chosen, body] for name in INERTIAL)
     together = masses + loads[chosen]

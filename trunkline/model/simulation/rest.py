@@ -14,7 +14,7 @@ from mujoco.batch import Batch
 from scipy.spatial.transform import Rotation
 
 from trunkline.frames import wxyz_from_rotation
-from trunkline.model.elements import BRANCH, SLIDER, all_elements, arm_hinges, switch_off_capstan_friction
+from trunkline.model.arm_model import CAPSTAN_FRICTION, ArmModel
 from trunkline.model.simulation.motion import batch_of, hold
 
 LONGEST_STEP = 0.005  # s
@@ -55,7 +55,7 @@ def settle(
     """
     model = copy.copy(model)
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    switch_off_capstan_friction(model)
+    ArmModel(model).switch_off(CAPSTAN_FRICTION)
     batch = batch_of(model, len(commands))
     origin, to_world = base_frame(model)
     batch.expand("opt.gravity")[:] = gravity @ to_world.T
@@ -103,7 +103,8 @@ def relax(batch: Batch, model: mujoco.MjModel) -> float:
     # a step never throws the arm past where its motors pull; their own damping ends where a tendon is slack
     pull = batch.expand("actuator_gainprm")[:, :, 0]
     batch.expand("tendon_damping")[:, model.actuator_trnid[:, 0]] = timestep * pull
-    for group in (*all_elements(model, BRANCH), *all_elements(model, SLIDER)):
+    arm = ArmModel(model)
+    for group in (*arm.branches, *arm.sliders):
         batch.expand("tendon_stiffness")[:, group.tendon] = 0
     return timestep
 
@@ -142,7 +143,7 @@ def lead_to_rest(batch: Batch, ids: np.ndarray) -> tuple[np.ndarray, int]:
     Returns:
         Those that stay, and how often forces were computed.
     """
-    hinges, looks = arm_hinges(batch.model), 0
+    hinges, looks = ArmModel(batch.model).hinge_count, 0
     place, push = batch.bind("qpos"), batch.bind("qacc")
     batch.bind("qvel")[ids] = 0
     begun, there, going = place[ids].copy(), np.zeros(len(ids), dtype=bool), np.arange(len(ids))

@@ -12,7 +12,7 @@ The latter is the play operator (M. A. Krasnosel'skii, A. V. Pokrovskii, Systems
 import numpy as np
 from mujoco.batch import Batch
 
-from trunkline.model.elements import BACKLASH, RATE_LIMIT, numeric, numeric_place
+from trunkline.model.arm_model import BACKLASH, RATE_LIMIT, ArmModel
 
 
 class Winches:
@@ -40,10 +40,10 @@ class Winches:
 
 def _numbers(batch: Batch, name: str) -> np.ndarray:
     """What each simulation has for the number of this name, 0 where the model has none. Shape (B,)."""
-    values, place = batch.expanded("numeric_data"), numeric_place(batch.model, name)
-    if values is None or place is None:
-        return np.full(batch.nsim, numeric(batch.model, name))
-    return values[:, place].copy()
+    values, places = batch.expanded("numeric_data"), ArmModel(batch.model).places(name)
+    if values is None or not len(places):
+        return np.full(batch.nsim, ArmModel(batch.model).number(name))
+    return values[:, places[0]].copy()
 
 
 def wind(

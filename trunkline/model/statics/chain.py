@@ -11,9 +11,9 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
-from trunkline.model.elements import DIAGONAL, actuators, all_elements, cables, capstan_friction, slip_length
+from trunkline.model.arm_model import ArmModel
 from trunkline.model.statics.limits import limit_angles, limit_energies, limit_gains, limit_impedances
-from trunkline.model.statics.supported import require_supported, unit_bodies
+from trunkline.model.statics.supported import require_supported
 from trunkline.model.statics.tendon_paths import tendon_crossings, tendon_holes
 
 FORCE_ROUNDING = 1e-3  # share by which a tension may exceed the motors' force and count as within it
@@ -123,7 +123,8 @@ def read_chain(model: mujoco.MjModel, tip_site: str = "tip") -> Chain:
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
 
-    units = unit_bodies(model)
+    arm = ArmModel(model)
+    units = arm.unit_bodies
     base = model.body_parentid[units[0]]
     to_base = data.xmat[base].reshape(3, 3).T
     joints = model.body_jntadr[units][:, None] + np.arange(2)  # (n, 2)
@@ -132,7 +133,6 @@ def read_chain(model: mujoco.MjModel, tip_site: str = "tip") -> Chain:
     holes = tendon_holes(model, data, units)
     hole_in, hole_out, crosses, fixed_length = tendon_crossings(holes, data, base, to_base, anchors)
     gains, impedances = limit_gains(model, joints), limit_impedances(model, joints)
-    order = actuators(model)
     tip, tip_quaternion = _tip(model, data, tip_site, units, base, to_base)
     diagonal, slack = _diagonals(model, joints)
     return Chain(
@@ -153,10 +153,10 @@ def read_chain(model: mujoco.MjModel, tip_site: str = "tip") -> Chain:
         hole_out=hole_out,
         crosses=crosses,
         fixed_length=fixed_length,
-        gain=model.actuator_gainprm[order, 0],
-        max_tension=_max_tensions(model, order),
-        capstan=capstan_friction(model),
-        slip=slip_length(model),
+        gain=model.actuator_gainprm[arm.actuators, 0],
+        max_tension=_max_tensions(arm),
+        capstan=arm.capstan_friction,
+        slip=arm.slip_length,
         tip=tip - anchors[-1],
         tip_quaternion=tip_quaternion,
     )
@@ -176,16 +176,16 @@ def _unit_inertials(model: mujoco.MjModel, data: mujoco.MjData, units: np.ndarra
 def _diagonals(model: mujoco.MjModel, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """`diagonal` and `slack` of units with the hinges `joints` (n, 2), see `Chain`."""
     stiffness, slack = np.zeros(joints.shape), np.zeros(joints.shape)
-    for column, group in enumerate(all_elements(model, DIAGONAL)):
+    for column, group in enumerate(ArmModel(model).diagonals):
         units = np.searchsorted(joints[:, 0], group.hinge)
         stiffness[units, column] = model.tendon_stiffnesspoly[group.tendon, 1]
         slack[units, column] = model.tendon_lengthspring[group.tendon, 0]
     return stiffness, slack
 
 
-def _max_tensions(model: mujoco.MjModel, order: np.ndarray) -> np.ndarray:
-    force = -model.actuator_forcerange[order, 0]
-    tendon_limit = np.where(model.tendon_actfrclimited, -model.tendon_actfrcrange[:, 0], np.inf)[cables(model)]
+def _max_tensions(arm: ArmModel) -> np.ndarray:
+    force, model = -arm.model.actuator_forcerange[arm.actuators, 0], arm.model
+    tendon_limit = np.where(model.tendon_actfrclimited, -model.tendon_actfrcrange[:, 0], np.inf)[arm.cables]
     return np.minimum(force, tendon_limit)
 
 

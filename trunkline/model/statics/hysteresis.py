@@ -13,10 +13,9 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from trunkline.model.elements import SLIDER, all_elements, cables
+from trunkline.model.arm_model import ArmModel
 from trunkline.model.statics.chain import Chain
 from trunkline.model.statics.equilibria import Equilibrium, equilibrium_paths, follow
-from trunkline.model.statics.supported import unit_bodies
 
 BACK = 0.98  # share of the tensions from which the direction of the way in is taken
 
@@ -42,11 +41,12 @@ class Band:
 def model_friction(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
     """Dry friction of the tendons, N, shape (K,), and of the units' joints, N m, shape (n, 2). A joint's sliders count
     with the torque at which they slip: so much they bear against its way, once it has bent by more than their yield."""
-    joints = model.body_jntadr[unit_bodies(model)][:, None] + np.arange(2)
+    arm = ArmModel(model)
+    joints = model.body_jntadr[arm.unit_bodies][:, None] + np.arange(2)
     torque = model.dof_frictionloss[model.jnt_dofadr]
-    for slider in all_elements(model, SLIDER):
+    for slider in arm.sliders:
         torque[slider.hinge] += model.tendon_stiffness[slider.tendon] * model.tendon_springyield[slider.tendon]
-    return model.tendon_frictionloss[cables(model)], torque[joints]
+    return model.tendon_frictionloss[arm.cables], torque[joints]
 
 
 def friction_band(

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 
 from trunkline.errors import InputError
-from trunkline.model.elements import BRANCH, DIAGONAL, SLIDER, all_elements, cables, hole_tendons
+from trunkline.model.arm_model import ArmModel
 
 _POSITION_DYNAMICS = (
     mujoco.mjtDyn.mjDYN_NONE,
@@ -53,7 +53,7 @@ def _require_unbranched_hinges(model: mujoco.MjModel) -> None:
             raise InputError(f"model: joint {name!r}: found type {kind}, expected hinge")
         if model.jnt_actfrclimited[joint]:
             raise InputError(f"model: joint {name!r}: found an actuator force range, expected none")
-    units = unit_bodies(model)
+    units = ArmModel(model).unit_bodies
     for index, body in enumerate(units):
         name, joints, first = model.body(body).name, model.body_jntnum[body], model.body_jntadr[body]
         if joints != 2:
@@ -66,13 +66,6 @@ def _require_unbranched_hinges(model: mujoco.MjModel) -> None:
         if parent != expected:
             actual, wanted = model.body(parent).name, model.body(expected).name
             raise InputError(f"model: body {name!r}: found parent {actual!r}, expected {wanted!r}: no branches")
-
-
-def unit_bodies(model: mujoco.MjModel) -> np.ndarray:
-    """Bodies that have joints, base first, but those of Maxwell branches, which bear nothing at rest. Bodies without
-    joints belong to the unit they are welded to."""
-    branches = [model.jnt_bodyid[group.branch] for group in all_elements(model, BRANCH)]
-    return np.setdiff1d(np.flatnonzero(model.body_jntnum > 0), np.concatenate([[], *branches]).astype(int))
 
 
 def _require_no_contacts(model: mujoco.MjModel) -> None:
@@ -98,8 +91,8 @@ def _geom_name(model: mujoco.MjModel, geom: int) -> str:
 
 
 def _require_site_tendons(model: mujoco.MjModel) -> None:
-    parts = [group.tendon for kind in (BRANCH, SLIDER, DIAGONAL) for group in all_elements(model, kind)]
-    parts.append(hole_tendons(model).ravel())
+    arm = ArmModel(model)
+    parts = [group.tendon for group in (*arm.branches, *arm.sliders, *arm.diagonals)] + [arm.guide_holes.ravel()]
     for tendon in np.setdiff1d(np.arange(model.ntendon), np.concatenate(parts)):
         name = model.tendon(tendon).name
         path = slice(model.tendon_adr[tendon], model.tendon_adr[tendon] + model.tendon_num[tendon])
@@ -135,7 +128,7 @@ def _require_pulling_actuators(model: mujoco.MjModel) -> None:
         if not model.actuator_forcelimited[actuator] or high > 0 or low >= 0:
             raise InputError(f"model: actuator {name!r}: found force range {low:g} {high:g}, expected -F 0: it pulls")
     pulled = model.actuator_trnid[:, 0] if model.nu else np.zeros(0, int)
-    for tendon in cables(model):
+    for tendon in ArmModel(model).cables:
         count = int(np.sum(pulled == tendon))
         if count != 1:
             raise InputError(f"model: tendon {model.tendon(tendon).name!r}: found {count} actuators, expected 1")

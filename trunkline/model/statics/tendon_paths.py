@@ -4,19 +4,18 @@ import mujoco
 import numpy as np
 
 from trunkline.errors import InputError
-from trunkline.model.elements import cables
+from trunkline.model.arm_model import ArmModel
 
 
 def tendon_holes(model: mujoco.MjModel, data: mujoco.MjData, units: np.ndarray):
     """Per tendon its name and its sites as (unit index, -1 for the base; world position)."""
     index_of = {0: -1} | {int(body): index for index, body in enumerate(units)}
-    holes = []
-    for tendon in cables(model):
-        start = model.tendon_adr[tendon]
-        sites = model.wrap_objid[start : start + model.tendon_num[tendon]]
+    arm, holes = ArmModel(model), []
+    for tendon, name in zip(arm.cables, arm.cable_names, strict=True):
+        sites = arm.cable_sites(tendon)
         bodies = model.body_weldid[model.site_bodyid[sites]]
         path = [(index_of[int(b)], data.site_xpos[s]) for b, s in zip(bodies, sites, strict=True)]
-        holes.append((model.tendon(tendon).name, path))
+        holes.append((name, path))
     return holes
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from trunkline.identification.parameters.parameters import candidate_fields, set_fields
 from trunkline.identification.parameters.spool_scale import wound
 from trunkline.identification.simulate.experiment import SLACK
-from trunkline.model.elements import actuators
+from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.rest import base_frame
 from trunkline.model.statics.chain import Chain, read_chain
 from trunkline.model.statics.equilibria import Equilibrium, actuated
@@ -32,7 +32,7 @@ class StaticArm:
     def rest(self, poses: StaticPoses, near: np.ndarray | None = None) -> Equilibrium:
         """Where it rests, in the middle of what friction can hold, in the mount's frame: as it comes there from without
         pull, or beside the joint angles `near` (N, nq), rad, where an arm that is like it rests."""
-        order = actuators(self.model)
+        order = ArmModel(self.model).actuators
         controls = np.empty_like(poses.commands)
         controls[:, order] = poses.commands
         sent = wound(self.model, controls)[:, order]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.report.certificate.arms import StaticArm, arm_of, arms_with
 from trunkline.report.certificate.discrepancy import Discrepancy, discrepancy
 from trunkline.report.certificate.identified import Identified
@@ -134,7 +134,7 @@ def budget(inputs: Inputs, poses: StaticPoses, arms: int, each: int, rng: np.ran
     if inputs.lacking:
         offsets = offsets + lacking_draws(inputs.lacking, ways, tips - arm.origin, draws, rng)
     sources = [
-        UncertaintySource(name, f"t, {degrees:.0f} degrees of freedom", deviation * PARAMETERS[name].scale,
+        UncertaintySource(name, f"t, {degrees:.0f} degrees of freedom", deviation * parameter_named(name).scale,
                           _axis_unit(name), degrees, np.linalg.norm(move, axis=1))
         for name, deviation, degrees, move
         in zip(parameters.names, parameters.deviation, parameters.degrees, moves, strict=True)
@@ -175,5 +175,5 @@ def radius_of(offsets: np.ndarray) -> np.ndarray:
 
 def _axis_unit(name: str) -> str:
     """Of what is uncertain of a parameter: a share of itself, or its unit."""
-    parameter = PARAMETERS[name]
+    parameter = parameter_named(name)
     return parameter.unit if parameter.signed else "relative"

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtrit
 
-from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.parameters.parameters import parameter_named
 
 
 @dataclass
@@ -29,7 +29,7 @@ class Identified:
     def values(self, z: np.ndarray) -> dict[str, np.ndarray]:
         """By name, from z of shape (D, P), no further out than the range."""
         clipped = np.clip(z, self.low, self.high)
-        return {name: PARAMETERS[name].value(clipped[:, i]) for i, name in enumerate(self.names)}
+        return {name: parameter_named(name).value(clipped[:, i]) for i, name in enumerate(self.names)}
 
     def draw(self, count: int, rng: np.random.Generator) -> np.ndarray:
         """Of the multivariate t distribution (JCGM 101, 6.4.9; JCGM 102, 5.3.2), shape (count, P). Its scale matrix is
@@ -55,7 +55,7 @@ def identified(tables: dict[str, dict]) -> Identified:
     degrees = np.array([max(len(table["fitted_to"]) - 1, 1) for _, _, table in rows], float)
     z, half, low, high = [], [], [], []
     for name, _, table in rows:
-        row, axis = table["parameters"][name], PARAMETERS[name].coordinate
+        row, axis = table["parameters"][name], parameter_named(name).coordinate
         interval, searched = axis(row["interval_95_given_model"]), axis(row["range"])
         z.append(float(axis(row["value"])))
         half.append(float(np.max(np.abs(interval - z[-1]))))  # the longer side, as the range may cut the other

@@ -9,7 +9,7 @@ from trunkline.frames import STANDARD_GRAVITY, tilt_of_gravity
 from trunkline.identification.parameters.per_session import model_in
 from trunkline.identification.simulate.experiment import SLACK, commanded_lengths
 from trunkline.kinematics.dataset.sampling import around_the_arm
-from trunkline.model.elements import actuators
+from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.rest import base_frame
 from trunkline.model.statics.chain import Chain
 from trunkline.recordings.trials.experiments import is_static
@@ -69,7 +69,7 @@ def _pulls(trial: Trial) -> np.ndarray:
 
 def posed(trials: list[Trial], model: mujoco.MjModel) -> StaticPoses:
     """The poses of trials at rest, the last one of each, with gravity as the mount of `model` has it."""
-    order = actuators(model)
+    order = ArmModel(model).actuators
     commands = [commanded_lengths(trial, model)[-1][order] for trial in trials]
     gravity = np.array([_gravity(trial, model) for trial in trials]).reshape(-1, 3)
     return StaticPoses(gravity, np.array(commands).reshape(-1, model.nu))

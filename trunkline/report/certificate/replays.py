@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from trunkline.identification.evaluation.evaluation import Prediction
-from trunkline.model.elements import marker_sites
+from trunkline.model.arm_model import ArmModel
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 
 UNIT = 5e-5  # m, of a number: ± 1.6 m
@@ -21,7 +21,7 @@ def packed(prediction: Prediction, model: mujoco.MjModel, markers: tuple[str, ..
     Each trial has its measured frames, then its simulated ones; a frame has the mount and then the markers from the
     base on, a point its x, y and z in 16 bits.
     """
-    sites = marker_sites(model, markers)
+    sites = ArmModel(model).marker_sites(markers)
     order = np.argsort(np.linalg.norm(prediction.replay.straight, axis=1))
     site_geoms = [model.geom_bodyid == body for body in model.site_bodyid[sites[order]]]
     radii = [model.geom_size[shapes, 0].max(initial=THINNEST) for shapes in site_geoms]

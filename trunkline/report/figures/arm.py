@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from trunkline.model.elements import arm_hinges, cables
+from trunkline.model.arm_model import ArmModel
 from trunkline.report.figures.style import IDENTIFIED, INITIAL, TENDON, UNIT, UNIT_EDGE, VALIDATE
 
 SLIMMEST = 0.2  # half of the side view's width over its height: ticks need room
@@ -22,7 +22,7 @@ def arm_figure(model: mujoco.MjModel) -> Figure:
     panels = figure.subplot_mosaic([["side", "mass"], ["side", "stiffness"]], width_ratios=[1, 2])
     side, mass, stiffness = (panels[name] for name in ("side", "mass", "stiffness"))
     _side_view(side, model, data)
-    jointed = np.unique(model.jnt_bodyid[: arm_hinges(model)])
+    jointed = ArmModel(model).unit_bodies
     numbers = np.arange(1, len(jointed) + 1)
     mass.plot(numbers, model.body_mass[jointed] * 1000, "o-", color=IDENTIFIED)
     stiffness.plot(numbers, model.jnt_stiffness[model.body_jntadr[jointed]], "s-", color=INITIAL)
@@ -49,9 +49,9 @@ def _side_view(side: Axes, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         load = body.name == "tip_load"
         face, label = (VALIDATE, f"load, {_in_words(body.mass[0])}") if load else (UNIT, None)
         side.fill(*(corners + [x, z]).T * 1000, facecolor=face, edgecolor=UNIT_EDGE, linewidth=0.6, label=label)
-    for number, tendon in enumerate(cables(model)):
-        path = slice(model.tendon_adr[tendon], model.tendon_adr[tendon] + model.tendon_num[tendon])
-        sites = data.site_xpos[model.wrap_objid[path]]
+    arm = ArmModel(model)
+    for number, cable in enumerate(arm.cables):
+        sites = data.site_xpos[arm.cable_sites(cable)]
         label = None if number else "tendons"
         side.plot(sites[:, 0] * 1000, sites[:, 2] * 1000, color=TENDON, linewidth=0.8, label=label)
     tracked = tracked_points(model)

@@ -6,7 +6,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from trunkline.identification.evaluation.error_tables import LABELS
-from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.report.figures.style import DOUBTFUL, IDENTIFIED, INITIAL, MEASURED
 
 ACROSS = 4  # panels
@@ -58,7 +58,7 @@ def _parameter(axis, rows: pd.DataFrame, arms: list[str], name: str) -> None:
     for chosen, color in ((~beyond, IDENTIFIED), (beyond, INITIAL)):
         ends = np.abs(np.stack([values - low, high - values]))[:, chosen]
         axis.errorbar(places[chosen], values[chosen], ends, fmt="o", color=color, ms=4, capsize=2, lw=1.2)
-    if not PARAMETERS[name].signed and high.max() / low.min() > 3:
+    if not parameter_named(name).signed and high.max() / low.min() > 3:
         axis.set_yscale("log")
     unit = rows.unit.iloc[0]
     axis.set_title(name + (f" ({unit})" if unit else ""), fontsize=9)

@@ -9,13 +9,38 @@ from matplotlib.ticker import MaxNLocator
 from trunkline.identification.evaluation.error_tables import LABELS
 from trunkline.identification.evaluation.evaluation import Prediction
 from trunkline.identification.fit.identify import Identification
+from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.parameters.parameters import parameter_named
-from trunkline.report.figures.scoring import MODELS
+from trunkline.identification.results.curves import widest_motion
+from trunkline.recordings.trials.experiments import is_static
+from trunkline.recordings.trials.splits import VALIDATE
+from trunkline.report.figures.scoring import MODELS, marker_figure
 from trunkline.report.figures.style import DOUBTFUL, IDENTIFIED, LEAST_WIDTH, MEASURED
 
 LEAST_FALL = 4.0  # highest over lowest value of an axis of losses, at least
 NARROWEST = 60.0  # mm, of an axis: noise shall not look like motion
 COLORS = {label: color for label, (color, *_) in MODELS.items()}
+
+
+def stage_figures(
+    tables: dict[str, pd.DataFrame], result: Identification, bounds: dict[str, Bounds], undetermined: list[str],
+    validate: dict[str, Prediction],
+) -> dict[str, Figure]:  # fmt: skip
+    """By name; `tables` as `stage_tables` gives them, and `validate` as it takes it."""
+    figures = {
+        "convergence": convergence_figure(result),
+        "parameters": parameter_figure(result, bounds, undetermined),
+        "markers": marker_figure({"validate split": tables["markers"]}),
+    }
+    if "shapes" in tables:
+        figures["shapes"] = shape_figure(tables["shapes"])
+    if "errors" in tables:
+        moving = validate["noise_floor"].of(lambda e: not is_static(e.kind))
+        widest = widest_motion(validate)
+        figures["errors"] = error_figure(tables["errors"], moving.scores()[VALIDATE])
+        figures["distances"] = distance_figure(tables["distances"], widest["identified"].experiments[0].name)
+        figures["paths"] = path_figure(widest)
+    return figures
 
 
 def convergence_figure(identification: Identification) -> Figure:
@@ -123,7 +148,7 @@ def shape_figure(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def parameter_figure(identification: Identification, bounds, units: dict[str, str], undetermined: list[str]) -> Figure:
+def parameter_figure(identification: Identification, bounds: dict[str, Bounds], undetermined: list[str]) -> Figure:
     """Each scalar with its 95 % interval within its range, grey if that is open or a bound, and per-joint factors."""
     panels, count = 1 + bool(identification.factors), len(identification.values)
     figure, axes = plt.subplots(1, panels, figsize=(6.5 * panels, max(1.4 + 0.42 * count, 2.4)), squeeze=False)
@@ -135,7 +160,7 @@ def parameter_figure(identification: Identification, bounds, units: dict[str, st
         axes[0, 0].errorbar(place, row, xerr=width, fmt="o", color=DOUBTFUL if doubt else IDENTIFIED, capsize=4)
         side = "left" if place < 0.2 else "right" if place > 0.8 else "center"
         axes[0, 0].annotate(
-            f"{value:.4g} {units[name]} {doubt}".strip(),
+            f"{value:.4g} {parameter_named(name).unit} {doubt}".strip(),
             (place, row),
             xytext=(0, 7),
             textcoords="offset points",

@@ -8,7 +8,7 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.identification.evaluation.error_tables import TABLED
-from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.identification.stages import STAGES
 from trunkline.recordings.trials.splits import TEST, VALIDATE
 
@@ -78,7 +78,7 @@ def drift(now: Results, before: Results) -> dict[str, Drift]:
     """Of the parameters that both have."""
     drifts = {}
     for name in now.parameters.keys() & before.parameters.keys():
-        parameter, new, old = PARAMETERS[name], now.parameters[name], before.parameters[name]
+        parameter, new, old = parameter_named(name), now.parameters[name], before.parameters[name]
         scale = parameter.scale if parameter.signed else 1.0
         change = float(parameter.coordinate(new.value) - parameter.coordinate(old.value)) * scale
         mine, theirs = (float(np.ptp(parameter.coordinate([row.low, row.high]))) / 2 * scale for row in (new, old))

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from trunkline.identification.evaluation.error_tables import LABELS, TABLED, pair
-from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.tools.batch.results import Drift, Results
 
 
@@ -39,7 +39,7 @@ def parameter_table(fleet: list[Results], drifts: dict[str, dict[str, Drift]]) -
 
 def drift_words(name: str, change: Drift) -> str:
     """Such as `**-5.1 % ± 1.2**`, in bold where it is beyond what both intervals leave open."""
-    if PARAMETERS[name].signed:
+    if parameter_named(name).signed:
         text = f"{change.change:+.2g} ± {change.half_width:.2g}"
     else:
         size, width = 100 * np.expm1(change.change), 100 * np.exp(change.change) * change.half_width

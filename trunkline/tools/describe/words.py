@@ -5,17 +5,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from trunkline.identification.parameters.parameters import PARAMETERS
-from trunkline.model.elements import (
-    BACKLASH,
-    PRELOAD,
-    RATE_LIMIT,
-    actuators,
-    arm_hinges,
-    cables,
-    numbers_place,
-    numeric,
-)
+from trunkline.identification.parameters.parameters import parameters_of
+from trunkline.model.arm_model import ArmModel
 from trunkline.recordings.session.session import Session
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 
@@ -49,7 +40,7 @@ class Unit:
 def units_of(model: mujoco.MjModel) -> list[Unit]:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    bodies = np.unique(model.jnt_bodyid[: arm_hinges(model)])
+    bodies = ArmModel(model).unit_bodies
     places = np.vstack([data.xpos[bodies], data.site("tip").xpos])
     lengths = np.linalg.norm(np.diff(places, axis=0), axis=1)
     units = []
@@ -93,14 +84,13 @@ def tendon_lines(model: mujoco.MjModel) -> list[str]:
     mujoco.mj_forward(model, data)
     jacobian = np.zeros((model.ntendon, model.nv))
     mujoco.mju_sparse2dense(jacobian, data.ten_J, model.ten_J_rownnz, model.ten_J_rowadr, model.ten_J_colind)
-    preload = model.numeric_data[numbers_place(model, PRELOAD)]
-    bodies = _bodies(model)
+    arm, bodies = ArmModel(model), _bodies(model)
     lines = [f"{model.nu} tendons"]
-    for index, (cable, motor) in enumerate(zip(cables(model), actuators(model), strict=True)):
-        sites = _sites(model, cable)
+    for index, (cable, motor) in enumerate(zip(arm.cables, arm.actuators, strict=True)):
+        sites = arm.cable_sites(cable)
         first, last = model.site_pos[sites[0]], model.site_pos[sites[-1]]
         end = bodies.get(model.site_bodyid[sites[-1]], 0)
-        arms = np.hypot(*jacobian[cable, : arm_hinges(model)].reshape(-1, 2).T)
+        arms = np.hypot(*jacobian[cable, : arm.hinge_count].reshape(-1, 2).T)
         crossed = arms[arms > 0]
         apart = [1e3 * np.hypot(*place[:2]) for place in (first, last)]
         away = f"{apart[0]:.3g} mm" if np.isclose(*apart, rtol=ALIKE) else f"{apart[0]:.3g} to {apart[1]:.3g} mm"
@@ -110,9 +100,9 @@ def tendon_lines(model: mujoco.MjModel) -> list[str]:
             f"{1e3 * np.radians(1) * crossed.sum():.3g} mm for 1° of each joint that it crosses",
             f"{model.actuator_gainprm[motor, 0]:.4g} N/m up to {-model.actuator_forcerange[motor, 0]:.4g} N",
         ]  # fmt: skip
-        if len(preload) and preload[index]:
-            facts.append(f"{preload[index] * model.actuator_gainprm[motor, 0]:.3g} N at command 0")
-        lines.append(f"  {model.tendon(cable).name}: {', '.join(facts)}")
+        if len(arm.preload) and arm.preload[index]:
+            facts.append(f"{arm.preload[index] * model.actuator_gainprm[motor, 0]:.3g} N at command 0")
+        lines.append(f"  {arm.cable_names[index]}: {', '.join(facts)}")
     return lines
 
 
@@ -132,8 +122,9 @@ def marker_lines(model: mujoco.MjModel) -> list[str]:
 
 def doubt_lines(model: mujoco.MjModel, session: Session | None) -> list[str]:
     """What to know before any log is recorded, or of a session."""
+    arm = ArmModel(model)
     lines = [*_hardly_meant(model), "masses are as described: no log tells them; weigh the arm"]
-    angles = np.sort([_angle(model, cable) for cable in cables(model)])
+    angles = np.sort([_angle(model, cable) for cable in arm.cables])
     if len(angles):
         gaps = np.diff(np.append(angles, angles[0] + 360))
         if gaps.max() >= WIDEST:
@@ -143,9 +134,9 @@ def doubt_lines(model: mujoco.MjModel, session: Session | None) -> list[str]:
         return lines
     lines += _unknown(model, session)
     kinds, weightless = {trial.experiment for trial in session.trials}, session.frame.gravity == "none"
-    names = [name for name, parameter in PARAMETERS.items() if parameter.belongs_to(model)]
     experiments = [EXPERIMENTS[kind] for kind in kinds]
-    unidentifiable = [name for name in names if not any(map(PARAMETERS[name].identifiable_from, experiments))]
+    parameters = parameters_of(model).items()
+    unidentifiable = [name for name, each in parameters if not any(map(each.identifiable_from, experiments))]
     if unidentifiable:
         lines.append(f"no trial of the session ({', '.join(sorted(kinds))}) tells {', '.join(unidentifiable)}")
     if weightless and model.nu and all(EXPERIMENTS[kind].static for kind in kinds):
@@ -154,7 +145,7 @@ def doubt_lines(model: mujoco.MjModel, session: Session | None) -> list[str]:
         lines.append("one tracked point does not tell in which shape the arm is, nor exchanged names of tendons")
     if not weightless and not kinds & {"static_tilt", "static_pull"} and model.nu:
         lines.append("nothing is tilted or held: stiffness comes with the masses and the motors' gain, as a ratio")
-    if numeric(model, RATE_LIMIT) == 0 and numeric(model, BACKLASH) == 0 and model.nu and "motion" in kinds:
+    if arm.rate_limit == 0 and arm.backlash == 0 and model.nu and "motion" in kinds:
         lines.append("winches are taken to wind as they are told: `rate_limit` and `backlash` of `actuation` are 0")
     return lines
 
@@ -165,7 +156,7 @@ def _unknown(model: mujoco.MjModel, session: Session) -> list[str]:
     available = {
         "markers": [name.removesuffix("_center") for name in sites
                      if name.endswith("_center") and name != "base_center"],
-        "tendons": [model.tendon(cable).name for cable in cables(model)],
+        "tendons": ArmModel(model).cable_names,
     }
     available["motors"] = available["tendons"]
     declared = {
@@ -190,10 +181,10 @@ def _hardly_meant(model: mujoco.MjModel) -> list[str]:
         more = f" (and {len(dense) - 1} more)" if len(dense) > 1 else ""
         has = f"has {densities[dense[0] - 1]:.3g} kg/m³, more than lead"
         lines.append(f"unit {dense[0]}{more} {has}: is its mass in kg, its width in m?")
-    preload = model.numeric_data[numbers_place(model, PRELOAD)]
-    for index, (cable, motor) in enumerate(zip(cables(model), actuators(model), strict=True)):
-        name = model.tendon(cable).name
-        for site in _sites(model, cable):
+    arm = ArmModel(model)
+    preload = arm.preload
+    for index, (name, cable, motor) in enumerate(zip(arm.cable_names, arm.cables, arm.actuators, strict=True)):
+        for site in arm.cable_sites(cable):
             unit, apart = bodies.get(model.site_bodyid[site], 0), 1e3 * np.hypot(*model.site_pos[site, :2])
             if unit and apart > units[unit - 1].width / 2:
                 wide = units[unit - 1].width
@@ -210,13 +201,9 @@ def _hardly_meant(model: mujoco.MjModel) -> list[str]:
 
 def _bodies(model: mujoco.MjModel) -> dict[int, int]:
     """The number of the unit, from 1, that each of the arm's bodies is."""
-    return {int(body): k for k, body in enumerate(np.unique(model.jnt_bodyid[: arm_hinges(model)]), start=1)}
-
-
-def _sites(model: mujoco.MjModel, cable: int) -> np.ndarray:
-    return model.wrap_objid[model.tendon_adr[cable] : model.tendon_adr[cable] + model.tendon_num[cable]]
+    return {int(body): k for k, body in enumerate(ArmModel(model).unit_bodies, start=1)}
 
 
 def _angle(model: mujoco.MjModel, cable: int) -> float:
-    x, y = model.site_pos[model.wrap_objid[model.tendon_adr[cable]]][:2]
+    x, y = model.site_pos[ArmModel(model).cable_sites(cable)[0], :2]
     return float(np.degrees(np.arctan2(y, x)))

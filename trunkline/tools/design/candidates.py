@@ -9,7 +9,7 @@ import numpy as np
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.identification.simulate.experiment import SLACK
 from trunkline.kinematics.dataset.sampling import around_the_arm
-from trunkline.model.elements import actuators
+from trunkline.model.arm_model import ArmModel
 from trunkline.model.statics.chain import read_chain
 from trunkline.tools.design.settings import Recordable
 
@@ -88,7 +88,7 @@ def _release(turn: float, side: float, load: float, grid: Recordable, slack: np.
 def _motored(grid: Recordable, model: mujoco.MjModel, kinds: tuple[str, ...], frames: int) -> list[Candidate]:
     """Pulls and curls of one tendon and of two neighbours, and motions to all sides."""
     chain = read_chain(model)
-    order = actuators(model)[around_the_arm(chain)]  # motors, as their tendons lie around the arm
+    order = ArmModel(model).actuators[around_the_arm(chain)]  # motors, as their tendons lie around the arm
     names = [model.tendon(model.actuator_trnid[motor, 0]).name for motor in range(model.nu)]
     length = float(np.linalg.norm(chain.offset, axis=1).sum() + np.linalg.norm(chain.tip))
     groups = [(motor,) for motor in order]

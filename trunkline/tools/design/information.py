@@ -22,7 +22,7 @@ from trunkline.identification.fit.settings import IdentificationSettings
 from trunkline.identification.fit.setup import fit_of, set_up, with_every
 from trunkline.identification.simulate.experiment import Experiment
 from trunkline.identification.uncertainty.identifiability import NUMBERS, TWO_SIDED, Identifiability
-from trunkline.model.elements import actuators
+from trunkline.model.arm_model import ArmModel
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_static
 from trunkline.recordings.trials.splits import IDENTIFY
 from trunkline.recordings.trials.trial import Trial
@@ -91,7 +91,7 @@ def shares_of(model: mujoco.MjModel, experiments: list[Experiment], share: float
     shares = np.full(len(experiments), share)
     pulled = [i for i, e in enumerate(experiments) if is_static(e.kind) and not e.slack(model)]
     if pulled:
-        order = actuators(model)
+        order = ArmModel(model).actuators
         commands = np.array([experiments[i].controls[-1][order] for i in pulled])
         bands = arm_of(model).friction(StaticPoses(np.array([experiments[i].gravity for i in pulled]), commands))
         tips = np.array([np.linalg.norm(experiments[i].positions[-1], axis=1).max() for i in pulled])

@@ -9,7 +9,7 @@ from trunkline.identification.fit.fit import Fit
 from trunkline.identification.simulate.experiment import Experiment
 from trunkline.identification.simulate.population import Population, Simulated
 from trunkline.identification.simulate.pose_fit import PoseFit
-from trunkline.model.elements import arm_hinges
+from trunkline.model.arm_model import ArmModel
 from trunkline.recordings.trials.experiments import is_static
 from trunkline.recordings.trials.splits import IDENTIFY
 from trunkline.tools.design.candidates import Candidate
@@ -42,7 +42,7 @@ def simulated(
 
 def _experiment(candidate: Candidate, model: mujoco.MjModel, markers: int, frame_rate: float) -> Experiment:
     """Without what is measured."""
-    static, hinges = is_static(candidate.kind), arm_hinges(model)
+    static, hinges = is_static(candidate.kind), ArmModel(model).hinge_count
     start = _bent(candidate, model) if candidate.turn else np.full(hinges, np.nan if static else 0.0)
     straight = model.tendon_length0[model.actuator_trnid[:, 0]]
     step = 0.0 if static else 1 / frame_rate
@@ -57,7 +57,7 @@ def _experiment(candidate: Candidate, model: mujoco.MjModel, markers: int, frame
 
 def _bent(candidate: Candidate, model: mujoco.MjModel) -> np.ndarray:
     """Joint angles, rad, of an arm that is bent by `turn` towards `side`, every unit by the same. Shape (n,)."""
-    hinges = arm_hinges(model)
+    hinges = ArmModel(model).hinge_count
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     # about this axis a hanging arm swings towards the side

@@ -14,7 +14,7 @@ import numpy as np
 from trunkline.errors import InputError
 from trunkline.identification.fit.linearisation import linearise
 from trunkline.identification.fit.problem import Bounds, Problem
-from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.identification.simulate.experiment import prepare
 from trunkline.identification.simulate.loss import Loss
 from trunkline.recordings.trials.experiments import EXPERIMENTS
@@ -72,7 +72,7 @@ class Scorer:
     def score(self, trial: Trial) -> Score:
         """Raises InputError where the trial is not of this arm, or the model does not survive it."""
         kind = EXPERIMENTS[trial.experiment]
-        determined = [i for i, name in enumerate(self.parameters) if PARAMETERS[name].identifiable_from(kind)]
+        determined = [i for i, name in enumerate(self.parameters) if parameter_named(name).identifiable_from(kind)]
         experiment = prepare(trial, self.model, self.frames, self.command_delay)
         slope, curvature = np.zeros(len(self.parameters)), np.zeros((len(self.parameters),) * 2)
         if determined:
@@ -89,13 +89,14 @@ class Scorer:
 
 def watched_in(model: mujoco.MjModel, names: tuple[str, ...] = WATCHED) -> tuple[str, ...]:
     """Those of `names` that the arm has."""
-    return tuple(name for name in names if PARAMETERS[name].belongs_to(model) and _present(name, model))
+    return tuple(name for name in names if parameter_named(name).belongs_to(model) and _present(name, model))
 
 
 def _present(name: str, model: mujoco.MjModel) -> bool:
-    return PARAMETERS[name].signed or PARAMETERS[name].read(model) > 0
+    return parameter_named(name).signed or parameter_named(name).read(model) > 0
 
 
 def _around(name: str, model: mujoco.MjModel) -> Bounds:
-    value = PARAMETERS[name].read(model)
-    return Bounds(value - AROUND, value + AROUND) if PARAMETERS[name].signed else Bounds(value / AROUND, value * AROUND)
+    parameter = parameter_named(name)
+    value = parameter.read(model)
+    return Bounds(value - AROUND, value + AROUND) if parameter.signed else Bounds(value / AROUND, value * AROUND)

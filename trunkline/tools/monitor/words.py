@@ -5,7 +5,7 @@ from collections import Counter
 import numpy as np
 import pandas as pd
 
-from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.tools.monitor.attribution import Attribution, Change
 from trunkline.tools.monitor.baseline import LEAST, Baseline
 from trunkline.tools.monitor.control_chart import Chart, Charted
@@ -18,7 +18,7 @@ HARDLY = 100.0  # %, of a change that one trial does not tell from none
 def amount(name: str, size: float, half_width: float | None = None) -> str:
     """A change of a parameter, such as `stiffness -5.2 % ± 0.8`; size: where it is searched."""
     unit, scale = shown_in(name)
-    if PARAMETERS[name].signed:
+    if parameter_named(name).signed:
         value, width = size * scale, None if half_width is None else half_width * scale
     else:
         value, width = 100 * np.expm1(size), None if half_width is None else 100 * np.exp(size) * half_width
@@ -34,7 +34,7 @@ def _short(value: float) -> str:
 def shown_in(name: str) -> tuple[str, float]:
     """The unit in which changes of a parameter are printed, and how many of it a step of 1 is where it is searched (for
     ln(value), in which a step is a share, to first order)."""
-    parameter = PARAMETERS[name]
+    parameter = parameter_named(name)
     if not parameter.signed:
         return "%", 100.0
     return ("°", float(np.degrees(parameter.scale))) if parameter.unit == "rad" else (parameter.unit, parameter.scale)

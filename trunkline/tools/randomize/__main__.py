@@ -18,7 +18,7 @@ import numpy as np
 
 from trunkline.errors import InputError, in_one_line
 from trunkline.files import file_digest, written_whole
-from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.identification.stages import STAGES
 from trunkline.program import program_name
 from trunkline.report.certificate.identified import identified
@@ -97,7 +97,7 @@ def _lines(table: dict) -> list[str]:
     lines = []
     for name, row in table["parameters"].items():
         low, high = row["interval_95"]
-        unit = f" {row['unit']}" if PARAMETERS[name].unit else ""
+        unit = f" {row['unit']}" if parameter_named(name).unit else ""
         lines.append(f"{name:{width}}  {row['centre']:.4g}{unit}, 95 of 100 from {low:.4g} to {high:.4g}")
     return lines
 

@@ -6,7 +6,8 @@ import mujoco
 import numpy as np
 
 from trunkline.errors import InputError
-from trunkline.identification.parameters.parameters import PARAMETERS, Fields, candidate_fields
+from trunkline.identification.parameters.parameter import Fields
+from trunkline.identification.parameters.parameters import candidate_fields, parameter_named
 from trunkline.tools.randomize.randomization import Randomization
 
 OWN = "numeric_data"  # numbers that MuJoCo only keeps: Trunkline's stepper reads them, others would not
@@ -24,7 +25,7 @@ def drawn_fields(model: mujoco.MjModel, values: dict[str, np.ndarray]) -> Fields
     Returns:
         Field to its values, shape (n, ...). To the last bit those of `model` where the values are what it has.
     """
-    extended = {name: np.append(PARAMETERS[name].read(model), drawn) for name, drawn in values.items()}
+    extended = {name: np.append(parameter_named(name).read(model), drawn) for name, drawn in values.items()}
     fields = candidate_fields(model, extended)
     # rounding: what is written and what is in the model differ by it, so only the difference is added
     return {name: getattr(model, name) + (written[1:] - written[0]) for name, written in fields.items()}
@@ -49,9 +50,9 @@ def of_model(model: mujoco.MjModel, drawn: Randomization, where: str) -> Randomi
     """
     centre = []
     for name, stated in zip(drawn.names, drawn.centre, strict=True):
-        parameter = PARAMETERS[name]
+        parameter = parameter_named(name)
         if not parameter.belongs_to(model):
-            raise InputError(f"{where}: {name}: found no {parameter.part}, expected the model that was identified")
+            raise InputError(f"{where}: {name}: found an arm without its part, expected the model that was identified")
         centre.append(value := parameter.read(model))
         if abs(value - stated) > NEAR * abs(stated) + NEAR**2:
             unit = f" {parameter.unit}" if parameter.unit else ""

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from trunkline.errors import InputError
-from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.parameters.parameters import NAMES, parameter_named
 from trunkline.tools.randomize.fields import OWN
 from trunkline.tools.randomize.randomization import MOST, Randomization
 
@@ -19,8 +19,8 @@ def to_table(drawn: Randomization, fields: dict[str, dict[str, int]], model: dic
     parameters, (low, high) = {}, drawn.interval
     for i, name in enumerate(drawn.names):
         parameters[name] = {
-            "unit": PARAMETERS[name].unit,
-            "distribution": NORMAL if PARAMETERS[name].signed else LOGNORMAL,
+            "unit": parameter_named(name).unit,
+            "distribution": NORMAL if parameter_named(name).signed else LOGNORMAL,
             "centre": float(drawn.centre[i]),
             "sd": float(drawn.deviation[i]),
             f"interval_{MOST}": [float(low[i]), float(high[i])],
@@ -62,7 +62,7 @@ def read_randomization(path: Path) -> tuple[Randomization, dict[str, str]]:
             block = slice(first, first + len(group["parameters"]))
             covariance[block, block], first = group["covariance"], block.stop
         groups = [rows[name]["group"] for name in names]
-        if unknown := [name for name in names if name not in PARAMETERS]:
+        if unknown := [name for name in names if name not in NAMES]:
             raise InputError(f"{path}: parameters: found {unknown[0]!r}, expected one that can be identified")
         return Randomization(names, groups, centre, covariance, limits[:, 0], limits[:, 1], table["arms"]), table[
             "model"

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.stats import norm
 
 from trunkline.errors import InputError
-from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.report.certificate.identified import Identified
 
 TRIES = 100  # rounds of draws in which all must fall within the limits
@@ -38,7 +38,7 @@ class Randomization:
     @property
     def normal(self) -> np.ndarray:
         """Which are. Shape (P,)."""
-        return np.array([PARAMETERS[name].signed for name in self.names])
+        return np.array([parameter_named(name).signed for name in self.names])
 
     @property
     def deviation(self) -> np.ndarray:
@@ -87,7 +87,7 @@ class Randomization:
 
 def of_arm(estimates: Identified) -> Randomization:
     """Of one arm: the estimates with their standard uncertainties, and correlations within a stage."""
-    parameters = [PARAMETERS[name] for name in estimates.names]
+    parameters = [parameter_named(name) for name in estimates.names]
     scales = np.array([parameter.scale if parameter.signed else 1.0 for parameter in parameters])
     deviation = estimates.deviation * scales
     centre, low, high = (
