@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from trunkline.unity.package import read_tarball
+from trunkline.twin.package import read_tarball
 from trunkline.unity.twin import CSHARP
 from upkeep.results import recorded
 

@@ -18,7 +18,7 @@ from trunkline.kinematics.ik.refine import refine
 from trunkline.model.simulation.rest import settle
 from trunkline.model.statics.chain import read_chain
 from trunkline.model.statics.equilibria import equilibrium, forward
-from trunkline.pipeline.inputs import read_model
+from trunkline.model_files import read_model
 from upkeep.results import recorded
 
 SETTLED, SOLVED, DIRECTIONS, STEPS = 48, 1000, 72, 100

@@ -18,7 +18,7 @@ from trunkline.kinematics.ik.inference import ask
 from trunkline.kinematics.ik.refine import refine
 from trunkline.model.statics.chain import read_chain
 from trunkline.model.statics.equilibria import equilibrium
-from trunkline.pipeline.inputs import read_model
+from trunkline.model_files import read_model
 from upkeep.results import recorded
 
 MODEL = Path("artifacts/identify_control/arm.xml")

@@ -18,19 +18,19 @@ import numpy as np
 from trunkline.ar.hybrid.compose import Placed, compose
 from trunkline.ar.hybrid.grasps import CABLES, Grasp, object_in_base
 from trunkline.ar.hybrid.objects import GraspObject
-from trunkline.ar.hybrid.posterior import read_posterior
 from trunkline.ar.hybrid.preview import Holding, nominal, preview
 from trunkline.ar.hybrid.rollouts import CommandTrajectory, ComposedTwin
 from trunkline.ar.hybrid.settings import HybridModelSettings
+from trunkline.ar.hybrid.uncertainty import uncertainty_of
 from trunkline.ar.hybrid.worlds import WorldGeometry
 from trunkline.ar.teleop.minimum_jerk import minimum_jerk
 from trunkline.compute.threads import thread_count
-from trunkline.identification.stages import STAGES
 from trunkline.kinematics.panda.kinematics import mount_pose
 from trunkline.kinematics.panda.mounts import PandaRobot
 from trunkline.model.arm.contact_geometry import read_geometry
+from trunkline.model_files import read_spec
 from trunkline.pipeline.config import PROJECT, load_folder
-from trunkline.pipeline.inputs import read_spec
+from trunkline.twin.twin import Twin
 from upkeep.results import recorded
 
 STEPS = (1 / 480, 1 / 240, 1 / 200)  # s; joint limits and contacts, of 0.01 s, allow no longer one than 5 ms
@@ -55,7 +55,7 @@ class Placing:
 @recorded("preview")
 def main(path: Path, count: int) -> None:
     twin, way = grasp(path)
-    doubts = read_posterior([path.parents[1] / stage / "parameters.json" for stage in STAGES])
+    doubts = uncertainty_of(list(Twin.load(path).provenance.tables.values()))
     holding = Holding(LET_GO, sag=0.25)
     list(nominal(twin, CommandTrajectory(way.step, way.joints[:100], way.commands[:100])))  # names are looked up once
     print(f"{path}: {twin.model.nv} degrees of freedom, {count} futures of {LENGTH:g} s, {thread_count()} threads")

@@ -19,8 +19,8 @@ from trunkline.compute.cluster import VARIABLE
 from trunkline.compute.processes import end_with_parent
 from trunkline.compute.scheduler import arriving, elsewhere
 from trunkline.errors import InputError
-from trunkline.unity.unpacked import package_digest
-from trunkline.unity.unpacked import read_package as read_files
+from trunkline.twin.package import package_digest
+from trunkline.twin.package import read_package as read_files
 from upkeep.provenance import REHEARSAL, SHOWN, stage_code
 
 

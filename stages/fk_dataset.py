@@ -6,7 +6,7 @@ from trunkline.compute.progress import progress
 from trunkline.kinematics.dataset.gather import Sampling, gather
 from trunkline.kinematics.dataset.report import summary, unevenness_table
 from trunkline.model.statics.chain import read_chain
-from trunkline.pipeline.inputs import read_model
+from trunkline.model_files import read_model
 from trunkline.pipeline.stage import output_folder, run_stage, write_metrics
 from trunkline.report.figures.dataset import density_figure, deviation_figure
 from trunkline.report.figures.style import save_figure

@@ -14,8 +14,9 @@ from trunkline.pipeline.stage import output_folder, run_stage, write_metrics
 from trunkline.report.figures.package import roundtrip_figure
 from trunkline.report.figures.style import save_figure
 from trunkline.settings import settings
+from trunkline.twin.package import MANIFEST, read_tarball
 from trunkline.unity.comparison import curled, read_models
-from trunkline.unity.package import MANIFEST, read_tarball, write_tarball
+from trunkline.unity.package import write_tarball
 from trunkline.unity.proof import started
 from trunkline.unity.readers import refusals
 from trunkline.unity.sources import read_sources

@@ -11,7 +11,7 @@ from trunkline.kinematics.reachability.sampled import read_tips
 from trunkline.kinematics.reachability.survey import SurveySettings, survey
 from trunkline.kinematics.sdf.mesh import write_obj
 from trunkline.model.statics.chain import read_chain
-from trunkline.pipeline.inputs import read_model
+from trunkline.model_files import read_model
 from trunkline.pipeline.stage import output_folder, run_stage, write_metrics
 from trunkline.report.figures.maps import heldout_figure, maps_figure, slices_figure
 from trunkline.report.figures.style import save_figure

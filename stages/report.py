@@ -5,18 +5,18 @@ from pathlib import Path
 
 from trunkline.errors import existing
 from trunkline.identification.stages import STAGES
-from trunkline.pipeline.inputs import load_rig, read_model
+from trunkline.pipeline.inputs import load_rig
 from trunkline.pipeline.stage import output_folder, run_stage, write_json, write_metrics
 from trunkline.recordings.trials.splits import DECIDING
 from trunkline.recordings.trials.trial import read_trials
-from trunkline.report.certificate.certificate import CertificateSettings, certify, digest_of_code, digests
+from trunkline.report.certificate.certificate import CertificateSettings, certify, digest_of_code
 from trunkline.report.certificate.page import page
 from trunkline.report.figures.certificate import pose_figure, uncertainty_figure
 from trunkline.report.figures.style import save_figure
 from trunkline.settings import read_yaml, settings
+from trunkline.twin.twin import Twin
 
 ARTIFACTS, TRIALS = Path("artifacts"), Path("data/processed/filter")
-MODEL = ARTIFACTS / "identify_control/arm.xml"
 CHECKOUT = Path(__file__).resolve().parent.parent
 
 
@@ -28,17 +28,12 @@ class Config(CertificateSettings):
 
 
 def main(config: Config) -> None:
-    def read(stage: str, name: str = "metrics") -> dict:
-        return json.loads(existing(ARTIFACTS / stage / f"{name}.json").read_text())
-
     bring = None if config.rig is None else load_rig("report.rig", config.rig, "bring")
-    tables = {stage: read(stage, "parameters") for stage in STAGES}
-    metrics = {stage: read(stage) for stage in (*STAGES, "score", "ingest", "filter")}
-    certificate = certify(config, read_model(MODEL), read_trials(TRIALS, DECIDING), tables, metrics, bring)
-    facts = certificate.facts | {
-        "files": digests([MODEL, *(ARTIFACTS / s / "parameters.json" for s in STAGES)]),
-        "code": digest_of_code(CHECKOUT, code()),
-    }
+    files = {stage: ARTIFACTS / stage / "metrics.json" for stage in (*STAGES, "score", "ingest", "filter")}
+    metrics = {stage: json.loads(existing(file).read_text()) for stage, file in files.items()}
+    twin = Twin.load(ARTIFACTS)
+    certificate = certify(config, twin, read_trials(TRIALS, DECIDING), metrics, bring)
+    facts = certificate.facts | {"files": twin.provenance.files, "code": digest_of_code(CHECKOUT, code())}
     with output_folder(ARTIFACTS / "report") as folder:
         budget = certificate.budget
         save_figure(uncertainty_figure(budget.tips, budget.radius), folder / "uncertainty.png", 110)

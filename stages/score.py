@@ -1,6 +1,5 @@
 """Score the identified models on the trials of the split `test`: the only stage that reads them."""
 
-import json
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -8,10 +7,10 @@ import pandas as pd
 from pydantic import Field
 
 from trunkline.compute.progress import progress
-from trunkline.errors import existing
 from trunkline.identification.evaluation.error_tables import marker_table, trial_table
 from trunkline.identification.results.scoring import Compared, score
-from trunkline.pipeline.inputs import read_spec
+from trunkline.identification.stages import MODEL, TABLE, read_table
+from trunkline.model_files import read_spec
 from trunkline.pipeline.stage import output_folder, run_stage, write_metrics
 from trunkline.recordings.trials.splits import IDENTIFY, TEST
 from trunkline.recordings.trials.trial import read_trials, sessions_of
@@ -38,9 +37,8 @@ def main(config: Config) -> None:
     metrics, of_trials, along, unscored = {}, {}, {}, {trial.experiment for trial in trials if trial.split == TEST}
     with progress(len(config.stages), "score", "stages") as bar:
         for stage in config.stages:
-            folder = ARTIFACTS / stage
-            identified = read_spec(folder / "arm.xml").compile()
-            compared = Compared(**json.loads(existing(folder / "parameters.json").read_text())["compared"])
+            identified = read_spec(ARTIFACTS / stage / MODEL).compile()
+            compared = Compared(**read_table(ARTIFACTS / stage / TABLE)["compared"])
             models = {"cad": cad, "initial": initial, "identified": identified}
             metrics[stage], predictions = score(models, trials, compared, config.floor_poses)
             of_trials[stage], along[stage] = trial_table(predictions), marker_table(predictions, trials[0].markers)

@@ -10,7 +10,8 @@ from trunkline.kinematics.ik.inputs import inputs_of
 from trunkline.kinematics.ik.learn import Learning, learn
 from trunkline.kinematics.ik.report import histogram, summary
 from trunkline.model.statics.chain import read_chain
-from trunkline.pipeline.inputs import load_rig, read_model
+from trunkline.model_files import read_model
+from trunkline.pipeline.inputs import load_rig
 from trunkline.pipeline.stage import output_folder, run_stage, write_metrics
 from trunkline.report.figures.network import error_map_figure, learning_figure, tip_error_figure
 from trunkline.report.figures.style import save_figure

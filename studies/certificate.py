@@ -15,19 +15,19 @@ from pathlib import Path
 import numpy as np
 
 from demo.rig import ROOT, bring
-from stages.report import ARTIFACTS, MODEL, STAGES, TRIALS
+from stages.report import ARTIFACTS, TRIALS
 from stages.report import Config as Report
 from studies.rows import Rows, digest
 from trunkline.errors import in_one_line
 from trunkline.model.statics.chain import read_chain
 from trunkline.pipeline.config import load_config
-from trunkline.pipeline.inputs import read_model
 from trunkline.recordings.trials.splits import DECIDING
 from trunkline.recordings.trials.trial import read_trials
 from trunkline.report.certificate.budget import Budget, budget
 from trunkline.report.certificate.certificate import inputs_of
 from trunkline.report.certificate.coverage import is_inside, pulls_of
 from trunkline.report.certificate.poses import conditions_of, draw_poses
+from trunkline.twin.twin import Twin
 from upkeep.results import recorded
 
 COUNT, SEED, BATCH = 500, 20, 20
@@ -52,8 +52,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="studies.certificate", description=__doc__)
     parser.add_argument("--poses", type=int, default=COUNT, help=f"stop after so many of {COUNT}")
     arguments = parser.parse_args()
-    model, trials = read_model(MODEL), read_trials(TRIALS, DECIDING)
-    chain, conditions = read_chain(model), conditions_of(trials)
+    twin, trials = Twin.load(ARTIFACTS), read_trials(TRIALS, DECIDING)
+    chain, conditions = read_chain(twin.arm), conditions_of(trials)
     rng = np.random.default_rng(SEED)
     poses = draw_poses(chain, conditions, COUNT, rng)
     pulls, back = pulls_of(chain, poses), rng.random(COUNT) < 0.5
@@ -66,12 +66,11 @@ def main() -> int:
             for index, place in enumerate(tips.tolist(), start=first):
                 rows.add(str(index), **dict(zip("xyz", place, strict=True)))
     asked = load_config(Report, "report")
-    tables = {stage: json.loads((ARTIFACTS / stage / "parameters.json").read_text()) for stage in STAGES}
     ingested = json.loads((ARTIFACTS / "ingest/metrics.json").read_text())
     kept = list(rows.read().values())
     with recorded("certificate", keep=len(kept) == COUNT, origin=rows.origin):
         draws = np.random.default_rng(asked.seed)
-        inputs = inputs_of(model, trials, tables, ingested, asked.arms, draws)
+        inputs = inputs_of(twin, trials, ingested, asked.arms, draws)
         found = budget(inputs, poses[: len(kept)], asked.arms, asked.each, draws)
         tips = np.array([[float(row[axis]) for axis in "xyz"] for row in kept])
         loose = np.max(pulls[: len(kept)], axis=1) <= 0

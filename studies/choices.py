@@ -34,9 +34,9 @@ from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.settings import IdentificationSettings
 from trunkline.identification.fit.setup import set_up
 from trunkline.identification.simulate.experiment import Experiment
+from trunkline.model_files import read_spec
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.identify import CAD_MODEL, TRIALS, doubts, read_reported
-from trunkline.pipeline.inputs import read_spec
 from trunkline.recordings.trials.experiments import is_static
 from trunkline.recordings.trials.splits import VALIDATE
 from trunkline.recordings.trials.trial import Trial

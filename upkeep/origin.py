@@ -18,8 +18,8 @@ from pathlib import Path
 import yaml
 
 from trunkline.errors import InputError
-from trunkline.unity.package import MANIFEST as PACKED
-from trunkline.unity.package import read_tarball
+from trunkline.twin.package import MANIFEST as PACKED
+from trunkline.twin.package import read_tarball
 from upkeep.provenance import MANIFEST, SHOWN, package_of
 
 ROOMS = ("trunkline", "upkeep", "demo", "rehearsal", "studies", "benchmarks", "qualification", "stages", "tests")
@@ -27,7 +27,8 @@ ROOMS = ("trunkline", "upkeep", "demo", "rehearsal", "studies", "benchmarks", "q
 # What surrounds every result (load, show, refuse, write) and never changes a number. Also of tests/pipeline.
 INERT = (
     "trunkline/compute/",  # where it runs: the same bits
-    *("trunkline/errors.py", "trunkline/files.py", "trunkline/startup_notice.py", "trunkline/settings.py"),
+    *("trunkline/errors.py", "trunkline/files.py", "trunkline/model_files.py"),
+    *("trunkline/startup_notice.py", "trunkline/settings.py"),
     *("trunkline/report/figures/", "trunkline/pipeline/", "upkeep/"),
     *("demo/__init__.py", "rehearsal/__init__.py", "rehearsal/report.py", "studies/rows.py"),
 )

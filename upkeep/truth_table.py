@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from trunkline.identification.evaluation.error_tables import number
-from trunkline.identification.stages import STAGES
+from trunkline.identification.stages import STAGES, read_tables
 from trunkline.recordings.trials.experiments import EXPERIMENTS, ExperimentKind
 from trunkline.recordings.trials.splits import TEST, VALIDATE
 
@@ -117,10 +117,8 @@ def truth_table(root: Path) -> str:
 
 def identified(root: Path) -> dict[str, dict]:
     """The rows of all stages' parameters.json, by name; of a parameter that two stages identify, the later one."""
-    rows = {}
-    for stage in STAGES:
-        rows |= _json(root / "artifacts" / stage / "parameters.json").get("parameters", {})
-    return rows
+    tables = read_tables(root / "artifacts").values()
+    return {name: row for table in tables for name, row in table["parameters"].items()}
 
 
 def expectation(truth: dict, name: str) -> float | None:
@@ -139,7 +137,7 @@ def holds(row: dict, expected: float | None) -> bool | None:
 
 def _factors(root: Path, truth: dict) -> str:
     """How the joints' factors of stiffness compare with the lab's scatter, in a sentence."""
-    table = _json(root / "artifacts/identify_stiffness/parameters.json").get("per_joint", {}).get("stiffness")
+    table = read_tables(root / "artifacts").get(STAGES[0], {}).get("per_joint", {}).get("stiffness")
     real = truth.get("stiffness_factors")
     if not table or not real or "half_width_95_given_model" not in table:
         return "Factors of single joints: –"

@@ -20,7 +20,7 @@ from cyclonedds.topic import Topic
 
 from trunkline.ar.drivers.ros_messages import Header, JointState, Time
 from trunkline.kinematics.ik.inference import ask
-from trunkline.unity.package import read_tarball
+from trunkline.twin.package import read_tarball
 from trunkline.unity.unpacked import model_of
 
 files = read_tarball(Path(sys.argv[1]))

@@ -19,7 +19,7 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
 from trunkline.ar.drivers.ros_messages import Header, JointState, Time
-from trunkline.unity.package import read_tarball
+from trunkline.twin.package import read_tarball
 from trunkline.unity.unpacked import model_of
 
 files = read_tarball(Path(sys.argv[1]))

@@ -19,17 +19,17 @@ import mujoco
 from rehearsal.experiments.bench import Bench
 from rehearsal.experiments.lookup import lookup
 from trunkline.ar.hybrid.friction import TPU_ON
-from trunkline.ar.hybrid.posterior import Contact, Posterior
+from trunkline.ar.hybrid.uncertainty import Contact, GraspUncertainty
 from trunkline.errors import InputError
 from trunkline.model.arm.contact_geometry import read_geometry
 from trunkline.model.statics.chain import read_chain
+from trunkline.model_files import read_model, read_spec
 from trunkline.pipeline.config import PROJECT
-from trunkline.pipeline.inputs import read_model, read_spec
 
 DRAWING = PROJECT / "artifacts/build_mjcf/arm.xml"
 NOWHERE = 5.0  # m; within it of its axis the arm has no bending plane: further than anything is
 SLIPPERY = 0.7  # of the friction that is believed
-SURE = Posterior(contact=Contact(0.0, (0.0, 0.0, 0.0), 0.0))  # of everything
+SURE = GraspUncertainty(contact=Contact(0.0, (0.0, 0.0, 0.0), 0.0))  # of everything
 
 Change = Callable[[Bench], Bench]
 
@@ -86,7 +86,7 @@ def _single(bench: Bench) -> Bench:
     """One future, with all as it is believed, of the plan and of each place that the assistant tries."""
     assert bench.world_model is not None
     previewing = replace(bench.previewing, futures=1, assistant=min(bench.previewing.assistant, 1))
-    return replace(bench, world_model=replace(bench.world_model, posterior=SURE), previewing=previewing)
+    return replace(bench, world_model=replace(bench.world_model, uncertainty=SURE), previewing=previewing)
 
 
 def _cad_grasp(bench: Bench, drawing: Path = DRAWING) -> Bench:

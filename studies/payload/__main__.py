@@ -21,8 +21,8 @@ from studies.rows import Rows, digest
 from trunkline.ar.hybrid.friction import IMPRATIO, SOLIMP, SOLREF
 from trunkline.compute.progress import progress
 from trunkline.errors import in_one_line
+from trunkline.model_files import read_spec
 from trunkline.pipeline.config import validated
-from trunkline.pipeline.inputs import read_spec
 from trunkline.report.figures.style import save_figure
 from trunkline.settings import read_yaml
 from upkeep.results import recorded

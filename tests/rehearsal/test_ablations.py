@@ -14,7 +14,7 @@ from tests.rehearsal.arm import stranger
 from tests.support.bent_chain import hardening_stump, stump_spec
 from tests.support.operator import config
 from trunkline.ar.hybrid.friction import TPU_ON
-from trunkline.ar.hybrid.posterior import Contact, Posterior, sample
+from trunkline.ar.hybrid.uncertainty import Contact, GraspUncertainty, sample
 from trunkline.ar.preview.package import Package
 from trunkline.ar.preview.preview_twin import RobotModel
 from trunkline.ar.teleop.alignment import Aligned, align, wrist_of
@@ -34,8 +34,8 @@ MODELS = ("statics", "cad")  # that need a package, and a drawing of the arm
 @pytest.fixture(scope="module")
 def bench() -> Bench:
     robot = PandaRobot("panda", 0.05, 0.8, 0.0, list(READY))
-    posterior = Posterior(("kp",), np.ones(1), np.eye(1), Contact(FRICTION, PLACE, 0.1))
-    world_model = RobotModel(stump_spec(), posterior, robot)
+    uncertainty = GraspUncertainty(("kp",), np.ones(1), np.eye(1), Contact(FRICTION, PLACE, 0.1))
+    world_model = RobotModel(stump_spec(), uncertainty, robot)
     return Bench(None, config(), stranger(), stand_in(), settings.person(), settings.free(), world_model=world_model)  # type: ignore[arg-type]
 
 
@@ -68,10 +68,10 @@ def test_a_variant_of_another_experiment_is_refused_with_those_there_are(bench, 
 
 def test_a_single_preview_is_of_what_is_believed(bench):
     ablated = varied(bench, "grasp", "single")
-    draws = sample(ablated.world_model.posterior, ablated.world_model.arm.compile(), ablated.previewing.futures, 0)
+    draws = sample(ablated.world_model.uncertainty, ablated.world_model.arm.compile(), ablated.previewing.futures, 0)
     assert (len(draws), draws.values) == (1, {})
     assert (draws.friction[0], *draws.offsets[0], draws.turns[0]) == (1.0, 0.0, 0.0, 0.0, 0.0)
-    assert np.ptp(sample(bench.world_model.posterior, bench.world_model.arm.compile(), 8, 0).friction) > 0
+    assert np.ptp(sample(bench.world_model.uncertainty, bench.world_model.arm.compile(), 8, 0).friction) > 0
 
 
 def test_without_a_preview_no_grasp_is_foreseen(bench):
@@ -87,7 +87,7 @@ def test_the_drawings_arm_takes_the_identified_ones_place(bench, tmp_path):
     assert ablated.world_model.arm.compile().nv == ablated.package.model.nv == ablated.package.chain.units * 2 == 10
     assert ablated.package.geometry.units == 5
     assert ablated.world_model.robot == bench.world_model.robot
-    assert ablated.world_model.posterior == SURE
+    assert ablated.world_model.uncertainty == SURE
 
 
 def test_a_slippery_robot_is_so_by_what_is_believed(bench):

@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from rehearsal import settings
 from tests.ar.hybrid.conftest import hybrid_settings, rubbing_arm
-from trunkline.ar.hybrid.posterior import Posterior, nominal_sample
 from trunkline.ar.hybrid.preview import joined
 from trunkline.ar.hybrid.rollouts import CommandTrajectory, rollouts
+from trunkline.ar.hybrid.uncertainty import GraspUncertainty, nominal_sample
 from trunkline.ar.preview.preview_twin import RobotModel, compose_twin
 from trunkline.ar.teleop.messages import Box, Thing, World
 from trunkline.kinematics.panda.kinematics import mount_pose
@@ -28,7 +28,7 @@ def world_model() -> RobotModel:
     arm = rubbing_arm(spiral_chain(length=0.2, base_width=0.05, tip_width=0.02, units=6), 3)
     robot = hybrid_settings(robot="panda").robot
     assert isinstance(robot, PandaRobot)
-    return RobotModel(arm, Posterior(), robot)
+    return RobotModel(arm, GraspUncertainty(), robot)
 
 
 def composed(world_model: RobotModel, thing: Thing, lean: Rotation, left=None):

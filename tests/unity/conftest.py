@@ -7,7 +7,7 @@ from tests.support.folders import package
 from tests.support.operator import config
 from tests.unity.test_twin import LABEL, ROBOT, TRAJECTORY, grids, sheets_of_a_ball, sources_in
 from trunkline.ar.conformance.vectors import with_shared_vectors
-from trunkline.unity.package import read_tarball
+from trunkline.twin.package import read_tarball
 from trunkline.unity.twin import assemble
 
 

@@ -16,7 +16,7 @@ from tests.unity.mono import compiled
 from tests.unity.test_csharp import CORE, SHARED
 from tests.unity.test_start import STEP
 from tests.unity.test_start import files as arm_files
-from trunkline.unity.package import MANIFEST
+from trunkline.twin.package import MANIFEST
 from trunkline.unity.plugin import Scene
 from trunkline.unity.proof import DOWN, PREFIX, manifest_of, scene_of, turns
 from trunkline.unity.start import TwinComponent

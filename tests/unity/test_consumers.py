@@ -19,7 +19,8 @@ from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.kinematics.ik.inputs import DIRECTION
 from trunkline.model.simulation.rest import settle
-from trunkline.unity.package import MANIFEST, read_tarball, write_tarball
+from trunkline.twin.package import MANIFEST, read_tarball
+from trunkline.unity.package import write_tarball
 from trunkline.unity.twin import assemble
 
 PAGE = Path(__file__).parents[2] / "docs/consumers.md"

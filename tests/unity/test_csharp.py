@@ -31,10 +31,11 @@ from trunkline.ar.teleop.vectors import add
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.kinematics.ik.inputs import DIRECTION, TILT
+from trunkline.twin.package import MANIFEST, package_digest, robot_of
 from trunkline.unity.frame import unity_position, unity_quaternion
-from trunkline.unity.package import MANIFEST, NETWORK, write_tarball
+from trunkline.unity.package import NETWORK, write_tarball
 from trunkline.unity.twin import CSHARP
-from trunkline.unity.unpacked import maps_of, package_digest, robot_of
+from trunkline.unity.unpacked import maps_of
 
 TESTS = Path(__file__).parent / "csharp"
 CORE = sorted((CSHARP / "Core").glob("*.cs"))

@@ -13,20 +13,19 @@ from tests.support.folders import package
 from tests.unity.test_twin import LABEL, PARAMETERS, ROBOT, sources  # noqa: F401
 from trunkline.ar.hybrid.compose import Placed, compose
 from trunkline.ar.hybrid.objects import GraspObject
-from trunkline.ar.hybrid.posterior import Contact, nominal_sample, read_posterior
 from trunkline.ar.hybrid.preview import Holding, joined, preview
 from trunkline.ar.hybrid.rollouts import CommandTrajectory, ComposedTwin, rollouts
+from trunkline.ar.hybrid.uncertainty import Contact, nominal_sample, uncertainty_of
 from trunkline.ar.hybrid.worlds import WorldGeometry
-from trunkline.ar.preview.contents import posterior_of
 from trunkline.errors import InputError
-from trunkline.identification.stages import STAGES
 from trunkline.kinematics.panda.mounts import FixedMount
 from trunkline.model.arm.contact_geometry import read_geometry
 from trunkline.model.arm.spiral import spiral_chain
 from trunkline.model.arm_model import ArmModel
-from trunkline.unity.package import CALIBRATED, MANIFEST, MODEL, write_tarball
+from trunkline.twin.package import MANIFEST, arm_of, package_digest, read_package, robot_of
+from trunkline.twin.twin import Twin
+from trunkline.unity.package import CALIBRATED, MODEL, write_tarball
 from trunkline.unity.twin import Trajectory, assemble
-from trunkline.unity.unpacked import arm_of, package_digest, read_package, robot_of
 
 SECONDS, LET_GO, PULL, CURL = 0.6, 0.25, 0.02, Trajectory(0.2, 0.02, [0.0])
 
@@ -88,37 +87,39 @@ def test_the_grasped_object_is_touched(mjcf):
     assert np.abs(touched[:, :, : alone.shape[2]] - alone).max() > 1e-2
 
 
+def tables_in(files: dict[str, bytes]) -> list[dict]:
+    return list(Twin.of_package(files).provenance.tables.values())
+
+
 def test_a_preview_needs_the_package_alone(files):
     assert package_digest(files)
     arm, robot = arm_of(files), robot_of(files)
     assert ArmModel(arm.compile()).capstan_friction > 0
     assert robot == ROBOT
     twin = ComposedTwin(compose(arm, robot).compile(), arm.compile())
-    result = preview(twin, way_of(twin.arm, robot.ready, 0.3), posterior_of(files), Holding(0.1), count=3)
+    result = preview(twin, way_of(twin.arm, robot.ready, 0.3), uncertainty_of(tables_in(files)), Holding(0.1), count=3)
     assert result.motion.sound.all()
     assert result.spread[-1] > 1e-4
     assert len(set(result.samples.values["kp"])) == 3
 
 
-def test_doubts_of_the_package_are_those_of_the_stages(files, tmp_path):
+def test_doubts_of_the_package_are_those_of_the_stages(files):
     contact = Contact(friction=0.1)
-    for stage, table in PARAMETERS.items():
-        (tmp_path / f"{stage}.json").write_text(json.dumps(table))
-    expected = read_posterior([tmp_path / f"{stage}.json" for stage in STAGES], contact)
-    posterior = posterior_of(files, contact)
-    assert (posterior.names, posterior.contact) == (expected.names, contact)
-    np.testing.assert_array_equal(posterior.deviation, expected.deviation)
-    np.testing.assert_array_equal(posterior.correlation, expected.correlation)
-    assert posterior.names == ("stiffness", "kp", "damping")
+    expected = uncertainty_of(list(PARAMETERS.values()), contact)
+    uncertainty = uncertainty_of(tables_in(files), contact)
+    assert (uncertainty.names, uncertainty.contact) == (expected.names, contact)
+    np.testing.assert_array_equal(uncertainty.deviation, expected.deviation)
+    np.testing.assert_array_equal(uncertainty.correlation, expected.correlation)
+    assert uncertainty.names == ("stiffness", "kp", "damping")
     width = np.log(2200 / 1800) / 3.92  # the latest stage's
-    assert posterior.deviation[1] == pytest.approx(width, rel=1e-3)
+    assert uncertainty.deviation[1] == pytest.approx(width, rel=1e-3)
 
 
 def test_a_package_without_them_is_one_line(files):
     manifest = json.loads(files[MANIFEST])
     del manifest["hybrid"]
     old = files | {MANIFEST: json.dumps(manifest).encode()}
-    for read in (arm_of, posterior_of, robot_of):
+    for read in (arm_of, Twin.of_package, robot_of):
         with pytest.raises(InputError, match=r"manifest\.json: found no block hybrid, expected"):
             read(old)
 
@@ -140,6 +141,6 @@ def test_the_arm_of_the_package_that_was_built_moves_as_the_identified_one(built
 def test_a_preview_needs_the_package_that_was_built_alone(built):
     arm, robot = arm_of(built), robot_of(built)
     twin = ComposedTwin(compose(arm, robot).compile(), arm.compile()).stepped(1 / 240)
-    result = preview(twin, way_of(twin.arm, robot.ready, 0.4), posterior_of(built), count=3)
+    result = preview(twin, way_of(twin.arm, robot.ready, 0.4), uncertainty_of(tables_in(built)), count=3)
     assert result.motion.sound.all()
     assert result.spread[-1] > 1e-4

@@ -17,10 +17,10 @@ from trunkline.ar.teleop.settings import Teleop
 from trunkline.ar.teleop.transitions import MODES, TRANSITIONS
 from trunkline.errors import InputError
 from trunkline.kinematics.panda.mounts import FixedMount
+from trunkline.twin.package import package_digest, robot_of
 from trunkline.unity.package import NETWORK
 from trunkline.unity.readers import ENGINES, ENGINES_APART, refusals
 from trunkline.unity.twin import assemble
-from trunkline.unity.unpacked import package_digest, robot_of
 
 CASES = ("alignment", "rigid_reach", "soft_reach", "targets", "network")
 MOST = 1_500_000  # bytes of all, unpacked

@@ -26,11 +26,12 @@ from trunkline.kinematics.ik.inputs import TILT
 from trunkline.kinematics.panda.mounts import PandaRobot
 from trunkline.kinematics.reachability.workspace_surface import WorkspaceSurfaces
 from trunkline.model.arm.joints import Joints, MaxwellElement, add_elements
+from trunkline.twin.package import MANIFEST, read_tarball
 from trunkline.unity import manifest as schema
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import JointLaw, Laws, TendonLaw, compile_with
 from trunkline.unity.manifest import Manifest, Model, Names
-from trunkline.unity.package import MANIFEST, MODEL, NETWORK, package_json, read_tarball, write_tarball
+from trunkline.unity.package import MODEL, NETWORK, package_json, write_tarball
 from trunkline.unity.plugin import VERSION
 from trunkline.unity.readers import refusals
 from trunkline.unity.roundtrip import curl, simulate
@@ -75,17 +76,27 @@ def grids() -> dict[str, np.ndarray]:
 
 
 def row(value: float, unit: str, low: float, high: float) -> dict:
-    return {"value": value, "unit": unit, "interval_95_given_model": [low, high], "at_bound": False}
+    span = [value / 100, value * 100]
+    return {"value": value, "unit": unit, "interval_95_given_model": [low, high], "range": span, "at_bound": False}
 
 
+FITTED_TO = {f"pull_{number}": f"{number:016x}" for number in range(10)}
 PARAMETERS = {
     "identify_stiffness": {
         "parameters": {"stiffness": row(0.5, "N m/rad", 0.4, 0.6), "kp": row(1900.0, "N/m", 1000.0, 3600.0)},
         "correlation": {"stiffness": {"stiffness": 1.0, "kp": 0.3}, "kp": {"stiffness": 0.3, "kp": 1.0}},
-        "fitted_to": ["pull_1"],
+        "fitted_to": FITTED_TO,
     },
-    "identify_damping": {"parameters": {"damping": row(0.02, "N m s/rad", 0.01, 0.04)}, "correlation": {"damping": {}}},
-    "identify_control": {"parameters": {"kp": row(2000.0, "N/m", 1800.0, 2200.0)}, "correlation": {"kp": {"kp": 1.0}}},
+    "identify_damping": {
+        "parameters": {"damping": row(0.02, "N m s/rad", 0.01, 0.04)},
+        "correlation": {"damping": {}},
+        "fitted_to": FITTED_TO,
+    },
+    "identify_control": {
+        "parameters": {"kp": row(2000.0, "N/m", 1800.0, 2200.0)},
+        "correlation": {"kp": {"kp": 1.0}},
+        "fitted_to": FITTED_TO,
+    },
 }
 
 
@@ -97,7 +108,7 @@ def sources_in(folder: Path) -> Sources:
     ball.export(folder / "rigid.stl")
     return Sources(
         mjcf=small_mjcf(),
-        parameters=PARAMETERS,
+        tables=PARAMETERS,
         network=folder / "ik.onnx",
         meshes=sorted([*folder.glob("*.obj"), *folder.glob("*.stl")]),
         grids=folder / "grids.npz",
@@ -407,7 +418,7 @@ def project(tmp_path, sources) -> Path:
         (root / "artifacts" / stage / "metrics.json").write_text("{}")
     for stage in ("build_mjcf", "identify_control"):
         (root / "artifacts" / stage / "arm.xml").write_text(sources.mjcf)
-    for stage, table in sources.parameters.items():
+    for stage, table in sources.tables.items():
         (root / "artifacts" / stage / "parameters.json").write_text(json.dumps(table))
     shutil.copy(sources.network, root / "artifacts/train_ik/ik.onnx")
     (root / "artifacts/reachability/meshes").mkdir()

@@ -10,10 +10,11 @@ from trunkline.ar.teleop.reach import MapReach
 from trunkline.errors import InputError
 from trunkline.kinematics.dataset.gravities import spread
 from trunkline.kinematics.reachability.workspace_surface import WorkspaceSurfaces
-from trunkline.unity.package import MANIFEST, write_tarball
+from trunkline.twin.package import MANIFEST, package_digest, read_package
+from trunkline.unity.package import write_tarball
 from trunkline.unity.reach_maps import convert_grids, convert_sheets, describe_reach
 from trunkline.unity.rounding import rounded
-from trunkline.unity.unpacked import maps_of, package_digest, read_package
+from trunkline.unity.unpacked import maps_of
 
 RNG = np.random.default_rng(0)
 ARRAYS = {

@@ -1,3 +1,36 @@
-"""The stages that identify, by their names everywhere."""
+"""The stages that identify, by their names everywhere, and the files that each writes."""
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+from trunkline.errors import InputError, existing
 
 STAGES = ("identify_stiffness", "identify_damping", "identify_control")  # in their order: each goes on from the last
+MODEL, TABLE = "arm.xml", "parameters.json"
+
+
+def final_model(artifacts: Path) -> Path | None:
+    """The model of the last stage that has run, which has all that was identified; None where none has."""
+    models = (artifacts / stage / MODEL for stage in reversed(STAGES))
+    return next(filter(Path.is_file, models), None)
+
+
+def read_tables(artifacts: Path, stages: Iterable[str] = STAGES) -> dict[str, dict]:
+    """What `stages` wrote into parameters.json, by stage and in their order; those that have not run are left out.
+
+    Raises:
+        InputError: a file is no such table.
+    """
+    files = {stage: artifacts / stage / TABLE for stage in stages}
+    return {stage: read_table(file) for stage, file in files.items() if file.is_file()}
+
+
+def read_table(file: Path) -> dict:
+    """Raises InputError: there is no such file, or it is no such table."""
+    try:
+        table = json.loads(existing(file).read_text(encoding="utf-8"))
+        table["parameters"].items()
+        return table
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise InputError(f"{file}: {error!r}, expected what a stage of identification writes") from error

@@ -1,12 +1,11 @@
 """The edge of the three identification stages: read model and trials, identify, write model, numbers, figures."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
 
-from trunkline.errors import InputError, existing
+from trunkline.errors import InputError
 from trunkline.identification.evaluation.baselines import references
 from trunkline.identification.evaluation.error_tables import TABLED, trial_table
 from trunkline.identification.evaluation.evaluation import Prediction, halved_step, replay
@@ -29,16 +28,18 @@ from trunkline.identification.results.parameter_table import parameter_table, un
 from trunkline.identification.results.scoring import Compared, fingerprints, predict, start_fit
 from trunkline.identification.simulate.checks import check_trials
 from trunkline.identification.simulate.experiment import Experiment
+from trunkline.identification.stages import MODEL, TABLE, read_table
 from trunkline.identification.uncertainty.cross_validation import cross_validate
 from trunkline.identification.uncertainty.trial_diagnostics import trial_diagnostics
 from trunkline.model.arm_model import BACKLASH, CAPSTAN_FRICTION, RATE_LIMIT, ArmModel
-from trunkline.pipeline.inputs import read_spec
+from trunkline.model_files import read_spec
 from trunkline.pipeline.stage import output_folder, write_json, write_metrics
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_static
 from trunkline.recordings.trials.splits import DECIDING, IDENTIFY, VALIDATE
 from trunkline.recordings.trials.trial import Trial, read_trials
 
-CAD_MODEL = Path("artifacts/build_mjcf/arm.xml")
+ARTIFACTS = Path("artifacts")
+CAD_MODEL = ARTIFACTS / "build_mjcf/arm.xml"
 TRIALS = Path("data/processed/filter")
 CSV = {"index": False, "float_format": "%.6g"}
 
@@ -193,25 +194,25 @@ def save(
     """Write model, parameters, metrics, tables and figures to `artifacts/<stage>/`."""
     config, bounds, markers = inputs.config, inputs.fit.parameters, inputs.fit.markers
     rests = any(EXPERIMENTS[kind].static or EXPERIMENTS[kind].hangs for kind in config.reported)
-    with output_folder(Path("artifacts") / stage) as folder:
-        (folder / "arm.xml").write_text(mjcf)
+    with output_folder(ARTIFACTS / stage) as folder:
+        (folder / MODEL).write_text(mjcf)
         table = parameter_table(result, bounds) | {"compared": vars(Compared.of(config))}
         table["fitted_to"] = fingerprints([t for t in inputs.trials if t.experiment in config.experiments])
-        write_json(folder / "parameters.json", table)
+        write_json(folder / TABLE, table)
         write_metrics(folder, metrics)
         write_tables(folder, result, bounds, markers, predictions, shapes=inputs.from_cad and rests)
 
 
 def has_factors(stage: str) -> bool:
     """Whether an earlier stage gave joints their own factors."""
-    return bool(json.loads(existing(Path("artifacts") / stage / "parameters.json").read_text()).get("per_joint"))
+    return bool(read_table(ARTIFACTS / stage / TABLE).get("per_joint"))
 
 
 def read_scalars(stages: tuple[str, ...]) -> dict[str, float]:
     """Scalars that earlier stages identified, without any joint's own factor."""
     values = {}
     for stage in stages:
-        table = json.loads(existing(Path("artifacts") / stage / "parameters.json").read_text())
+        table = read_table(ARTIFACTS / stage / TABLE)
         rows = table["parameters"] | table.get("per_session", {})
         values |= {name: row["value"] for name, row in rows.items()}
     return values

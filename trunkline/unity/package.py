@@ -11,15 +11,13 @@ import json
 import tarfile
 from pathlib import Path
 
-from trunkline.errors import InputError
-
-ROOT = "package/"  # folder that npm's and Unity's tarballs hold everything in
+from trunkline.twin.package import ROOT
 
 # where the twin's own files are in it
 MODEL = "Runtime/Model/arm.xml"
 CALIBRATED, PARAMETERS = "Runtime/Model/calibrated.xml", "Runtime/Model/parameters.json"
 NETWORK = "Runtime/Network/ik.onnx"
-MANIFEST, README = "Runtime/manifest.json", "README.md"
+README = "README.md"
 # of Unity's own, which a project may have switched off: JsonUtility, Physics.gravity, controllers of the sample
 MODULES = ["com.unity.modules.jsonserialize", "com.unity.modules.physics", "com.unity.modules.xr"]
 SAMPLES = [{
@@ -81,20 +79,3 @@ def write_tarball(path: Path, files: dict[str, bytes]) -> None:
             entry.size, entry.mode = len(data), 0o644
             archive.addfile(entry, io.BytesIO(data))
     path.write_bytes(gzip.compress(buffer.getvalue(), compresslevel=9, mtime=0))
-
-
-def read_tarball(path: Path) -> dict[str, bytes]:
-    """Contents by path in the package.
-
-    Raises:
-        InputError: if it is not a package.
-    """
-    try:
-        with tarfile.open(path, "r:gz") as archive:
-            return {
-                entry.name.removeprefix(ROOT): file.read()
-                for entry in archive.getmembers()
-                if entry.isfile() and (file := archive.extractfile(entry)) is not None
-            }
-    except (tarfile.TarError, EOFError, OSError) as error:
-        raise InputError(f"{path}: found {error}, expected a package's .tgz") from error

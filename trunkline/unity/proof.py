@@ -11,9 +11,10 @@ from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY, gravity_in_base
 from trunkline.model.statics.chain import read_chain
 from trunkline.model.statics.equilibria import actuated
+from trunkline.twin.package import MANIFEST
 from trunkline.unity.importer import as_imported
 from trunkline.unity.manifest import Manifest, Model
-from trunkline.unity.package import MANIFEST, MODEL
+from trunkline.unity.package import MODEL
 from trunkline.unity.plugin import Imported, Scene
 from trunkline.unity.start import TwinComponent
 from trunkline.unity.time_steps import steps_taken

@@ -21,7 +21,7 @@ import trimesh
 import yaml
 from onnx.reference import ReferenceEvaluator
 
-from trunkline.unity.package import MANIFEST
+from trunkline.twin.package import MANIFEST
 
 ENGINES_APART = 1e-6  # m, of two engines' answers of the same network; its numbers are of 32 bits
 POSES = 64  # on which they are compared

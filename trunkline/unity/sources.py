@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 from trunkline.errors import InputError, existing
+from trunkline.identification.stages import MODEL, TABLE, read_table
 from trunkline.identification.stages import STAGES as IDENTIFYING
 from trunkline.unity.twin import Sources
 from trunkline.version import __version__
@@ -23,8 +24,8 @@ def read_sources(root: Path) -> Sources:
         place = f"{artifacts}/reachability/meshes: found no mesh"
         raise InputError(f"{place}, expected .obj files (run the reachability stage)")
     return Sources(
-        mjcf=existing(artifacts / "identify_control/arm.xml").read_text(),
-        parameters={s: json.loads(existing(artifacts / s / "parameters.json").read_text()) for s in IDENTIFYING},
+        mjcf=existing(artifacts / IDENTIFYING[-1] / MODEL).read_text(),
+        tables={stage: read_table(artifacts / stage / TABLE) for stage in IDENTIFYING},
         network=existing(artifacts / "train_ik/ik.onnx"),
         meshes=meshes,
         grids=existing(artifacts / "reachability/grids.npz"),

@@ -11,13 +11,13 @@ from pydantic import Field
 
 from trunkline.errors import InputError
 from trunkline.kinematics.panda.mounts import Robot
+from trunkline.twin.package import MANIFEST
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import compile_with, linearize
 from trunkline.unity.manifest import Hybrid, Manifest, Versions, describe_model, hashes
 from trunkline.unity.network import describe_network
 from trunkline.unity.package import (
     CALIBRATED,
-    MANIFEST,
     MODEL,
     NETWORK,
     PARAMETERS,
@@ -69,11 +69,11 @@ class Trajectory:
 class Sources:
     """What the earlier stages made: the calibrated MJCF, files to read, metrics by stage, texts by name.
 
-    parameters: by stage of identification, the latest last. trunkline: version of the code that made it.
+    tables: of identification, by stage, the latest last. trunkline: version of the code that made it.
     """
 
     mjcf: str
-    parameters: dict[str, dict]
+    tables: dict[str, dict]
     network: Path
     meshes: list[Path]
     grids: Path
@@ -121,7 +121,7 @@ def assemble(
         ),
         MODEL: mjcf.encode(),
         CALIBRATED: sources.mjcf.encode(),
-        PARAMETERS: identified(sources.parameters),
+        PARAMETERS: parameters_file(sources.tables),
         NETWORK: network,
     }
     files |= scripts()
@@ -173,16 +173,17 @@ def sealed(manifest: Manifest, files: dict[str, bytes]) -> dict[str, bytes]:
     return files | {MANIFEST: (manifest.model_dump_json(indent=2) + "\n").encode()}
 
 
-def identified(parameters: dict[str, dict]) -> bytes:
-    """What `parameters.json` of the stages say that a preview needs, one after the other; the rest is about trials."""
-    columns = ("value", "unit", "interval_95_given_model")
+def parameters_file(tables: dict[str, dict]) -> bytes:
+    """What `parameters.json` of the stages have that a twin needs, one after the other; the rest is about trials."""
+    columns = ("value", "unit", "interval_95_given_model", "range")
     stages = [
         {
             "stage": stage,
             "parameters": {name: {key: row[key] for key in columns} for name, row in table["parameters"].items()},
             "correlation": table["correlation"],
+            "fitted_to": table["fitted_to"],
         }
-        for stage, table in parameters.items()
+        for stage, table in tables.items()
     ]
     return (json.dumps({"stages": stages}, indent=2) + "\n").encode()
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from trunkline.ar.hybrid.assistant import best
-from trunkline.ar.hybrid.posterior import nominal_sample
 from trunkline.ar.hybrid.preview import Holding, PlanPreview, interruptible, joined
 from trunkline.ar.hybrid.rates import wilson
 from trunkline.ar.hybrid.rollouts import Piece
+from trunkline.ar.hybrid.uncertainty import nominal_sample
 
 FRAMES, SINCE = 11, 0.5
 TIME = np.linspace(0.0, 1.0, FRAMES)

@@ -10,10 +10,17 @@ from tests.ar.hybrid.conftest import hybrid_settings, rubbing_arm
 from trunkline.ar.hybrid.compose import Placed, compose
 from trunkline.ar.hybrid.friction import TPU_ON
 from trunkline.ar.hybrid.objects import GraspObject
-from trunkline.ar.hybrid.posterior import Contact, Posterior, PosteriorSamples, nominal_sample, posterior_of, sample
 from trunkline.ar.hybrid.preview import Holding, joined, nominal, preview
 from trunkline.ar.hybrid.rates import wilson
 from trunkline.ar.hybrid.rollouts import CommandTrajectory, ComposedTwin, eased, rollouts, rows_of
+from trunkline.ar.hybrid.uncertainty import (
+    Contact,
+    GraspUncertainty,
+    PosteriorSamples,
+    nominal_sample,
+    sample,
+    uncertainty_of,
+)
 from trunkline.ar.hybrid.worlds import SupportSurface, WorldGeometry
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
@@ -46,8 +53,8 @@ def free(small) -> ComposedTwin:
     return ComposedTwin(compose(small, FixedMount("fixed")).compile(), small.compile())
 
 
-def doubts(name="kp", deviation=0.2, contact=None) -> Posterior:
-    return Posterior((name,), np.array([deviation]), np.eye(1), contact or Contact(0.0, (0.0, 0.0, 0.0)))
+def doubts(name="kp", deviation=0.2, contact=None) -> GraspUncertainty:
+    return GraspUncertainty((name,), np.array([deviation]), np.eye(1), contact or Contact(0.0, (0.0, 0.0, 0.0)))
 
 
 def run(twin, way, draws):
@@ -151,7 +158,7 @@ def test_what_is_let_go_of_falls(grasping):
 def test_the_objects_place_and_friction_are_each_futures_own(grasping):
     twin, way = grasping
     contact = Contact(0.5, (0.01, 0.01, 0.0), 0.2)
-    result = preview(twin, way, Posterior(contact=contact), Holding(0.25), count=4)
+    result = preview(twin, way, GraspUncertainty(contact=contact), Holding(0.25), count=4)
     starts = result.motion.object[:, 0, :3]
     np.testing.assert_allclose(starts - result.nominal.object[0, 0, :3], result.samples.offsets, atol=1e-3)
     assert np.ptp(starts[:, 0]) > 5e-3
@@ -176,7 +183,7 @@ def incline(small) -> tuple[ComposedTwin, CommandTrajectory]:
 def test_a_future_slides_where_coulomb_says(incline):
     twin, way = incline
     holding = Holding(0.0, sag=0.005, slip=1.0)
-    result = preview(twin, way, Posterior(contact=Contact(0.2, (0.0, 0.0, 0.0))), holding, count=16, seed=3)
+    result = preview(twin, way, GraspUncertainty(contact=Contact(0.2, (0.0, 0.0, 0.0))), holding, count=16, seed=3)
     assert result.success is not None
     assert result.probability is not None
     clear = np.abs(np.log(result.samples.friction)) > 0.05
@@ -213,7 +220,7 @@ def test_a_unit_touches_what_hangs_in_one_point_and_a_table_bears_in_several(sma
 
 def test_less_sure_friction_makes_outcomes_differ_more(incline):
     twin, way = incline
-    ends = [preview(twin, way, Posterior(contact=Contact(d, (0.0, 0.0, 0.0))), count=8).motion.object[:, -1, 0]
+    ends = [preview(twin, way, GraspUncertainty(contact=Contact(d, (0.0, 0.0, 0.0))), count=8).motion.object[:, -1, 0]
             for d in (0.0, 0.1, 0.3)]  # fmt: skip
     none, some, more = (np.ptp(end) for end in ends)
     assert none < 1e-9
@@ -226,7 +233,7 @@ def test_what_stands_is_elsewhere_with_its_board(incline):
     model.opt.gravity[:] = [0, 0, -STANDARD_GRAVITY]
     contact = Contact(0.0, (0.02, 0.0, 0.02))
     result = preview(
-        ComposedTwin(model, twin.arm), way, Posterior(contact=contact), Holding(0.0, sag=0.01, slip=1.0), count=4
+        ComposedTwin(model, twin.arm), way, GraspUncertainty(contact=contact), Holding(0.0, sag=0.01, slip=1.0), count=4
     )
     begun = result.motion.object[:, :1, :3]
     np.testing.assert_allclose(begun[:, 0] - result.nominal.object[0, 0, :3], result.samples.offsets, atol=1e-4)
@@ -260,16 +267,17 @@ def test_intervals_are_read_as_they_are_meant():
                        "mount_tilt_x": {"interval_95_given_model": [0.0, 0.1]}},
         "correlation": {"kp": {"rest_bend_x": 0.8}, "rest_bend_x": {"kp": 0.8}},
     }  # fmt: skip
-    posterior = posterior_of([stage])
-    assert posterior.names == ("kp", "rest_bend_x")
-    np.testing.assert_allclose(posterior.deviation, [np.log(4) / 3.919928, 0.04 / 3.919928], rtol=1e-6)
-    assert posterior.correlation[0, 1] == 0.8
+    uncertainty = uncertainty_of([stage])
+    assert uncertainty.names == ("kp", "rest_bend_x")
+    np.testing.assert_allclose(uncertainty.deviation, [np.log(4) / 3.919928, 0.04 / 3.919928], rtol=1e-6)
+    assert uncertainty.correlation[0, 1] == 0.8
 
 
 def test_draws_have_the_doubts_spread(small):
     names, arm = ("kp", "damping"), small.compile()
-    posterior = Posterior(names, np.array([0.3, 0.1]), np.array([[1, -0.7], [-0.7, 1]]), Contact(0.2, (0.01, 0.0, 0.0)))
-    drawn = sample(posterior, arm, 20_000, 0)
+    contact, correlation = Contact(0.2, (0.01, 0.0, 0.0)), np.array([[1, -0.7], [-0.7, 1]])
+    uncertainty = GraspUncertainty(names, np.array([0.3, 0.1]), correlation, contact)
+    drawn = sample(uncertainty, arm, 20_000, 0)
     logs = np.log([drawn.values[name] / parameter_named(name).read(arm) for name in names])
     np.testing.assert_allclose(logs.std(axis=1), [0.3, 0.1], rtol=0.03)
     assert np.corrcoef(logs)[0, 1] == pytest.approx(-0.7, abs=0.02)
@@ -279,7 +287,7 @@ def test_draws_have_the_doubts_spread(small):
 
 def test_what_does_not_fit_is_refused(small, free):
     with pytest.raises(InputError, match="interval_95_given_model"):
-        posterior_of([{"parameters": {"kp": {"interval_95_given_model": [None, None]}}, "correlation": {}}])
+        uncertainty_of([{"parameters": {"kp": {"interval_95_given_model": [None, None]}}, "correlation": {}}])
     with pytest.raises(InputError, match="hysteresis"):
         sample(doubts("hysteresis"), free.arm, 2, 0)
     way = way_of(free.arm)

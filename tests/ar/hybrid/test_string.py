@@ -9,10 +9,10 @@ from tests.ar.hybrid.test_rollouts import SIZE, way_of
 from trunkline.ar.hybrid.assistant import best, try_places
 from trunkline.ar.hybrid.compose import Placed, compose
 from trunkline.ar.hybrid.objects import GraspObject
-from trunkline.ar.hybrid.posterior import Contact, Posterior
 from trunkline.ar.hybrid.preview import Holding
 from trunkline.ar.hybrid.rollouts import ComposedTwin
 from trunkline.ar.hybrid.string import hang
+from trunkline.ar.hybrid.uncertainty import Contact, GraspUncertainty
 from trunkline.kinematics.panda.mounts import FixedMount
 from trunkline.model.arm.spiral import spiral_chain
 
@@ -72,7 +72,7 @@ def beside() -> ComposedTwin:
 
 
 def test_a_place_from_which_nothing_is_touched_differs_from_one_that_pushes(beside):
-    doubts = Posterior(contact=Contact(0.0, (0.0, 0.0, 0.0)))
+    doubts = GraspUncertainty(contact=Contact(0.0, (0.0, 0.0, 0.0)))
     still = Holding(0.1, sag=0.002, slip=0.5)  # here: it stays where it hangs
     offsets = np.array([[0.0, 0.0, 0.0], [-0.3, 0.0, 0.0]])  # m, of the mount
     shares = try_places(beside, way_of(beside.arm), doubts, still, offsets, 2)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from tests.ar.teleop.test_plan import targets
-from trunkline.ar.hybrid.posterior import Posterior
 from trunkline.ar.hybrid.preview import Holding
+from trunkline.ar.hybrid.uncertainty import GraspUncertainty
 from trunkline.ar.preview import grasp_preview
 from trunkline.ar.preview.grasp_preview import GraspPreviewer
 from trunkline.ar.session.settings import SessionConfig
@@ -58,7 +58,7 @@ class Tried:
 def grasped(monkeypatch, probability, shares=(0.0, 0.0, 0.0), **settings):
     """What is foreseen of a grasp whose futures hold with this `probability`, the places' with these `shares`."""
     tried, grip = Tried(monkeypatch, probability, shares), Grip()
-    robot_model = SimpleNamespace(posterior=Posterior(), lean=lambda hangs: None)
+    robot_model = SimpleNamespace(uncertainty=GraspUncertainty(), lean=lambda hangs: None)
     made = GraspPreviewer(robot_model, {"hanging": grip}, replace(SETTINGS, **settings))
     asked = replace(targets(MOUNT, CUP.position), thing=CUP.name)
     return list(made.grasp(PLAN, asked, CUP, World("world", (), (CUP,)), None, 7)), tried, grip

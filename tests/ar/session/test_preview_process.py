@@ -15,8 +15,8 @@ from tests.ar.teleop.test_plan import LIMITS, MOUNT, NETWORK, OFFSET, TIP, reque
 from tests.support.operator import config
 from tests.support.small_arm import small_spec
 from trunkline.ar.hybrid.grasp_poses import SideGrip
-from trunkline.ar.hybrid.posterior import Contact, Posterior
 from trunkline.ar.hybrid.settings import HybridModelSettings
+from trunkline.ar.hybrid.uncertainty import Contact, GraspUncertainty
 from trunkline.ar.preview.grasp_preview import GraspPreviewer
 from trunkline.ar.preview.preview_twin import RobotModel
 from trunkline.ar.preview.world_model import make_world
@@ -46,7 +46,7 @@ def made() -> PreviewPlanner:
     grasping = Grasping(rigid, OFFSET, s.commands, grips, config().handling)
     bends = lambda poses: {k: v - 0.5 + s.commands if k != "tip" else v for k, v in NETWORK.ask(poses).items()}  # noqa: E731
     planner = Planner(rigid, replace(NETWORK, ask=bends), s.commands, LIMITS, OFFSET, step=0.01, grasping=grasping)
-    robot_model = RobotModel(spec, Posterior(contact=Contact()), robot)
+    robot_model = RobotModel(spec, GraspUncertainty(contact=Contact()), robot)
     return PreviewPlanner(planner, GraspPreviewer(robot_model, grips, replace(live.preview, futures=FUTURES)), s.bodies)
 
 

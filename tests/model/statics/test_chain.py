@@ -6,7 +6,7 @@ import pytest
 from tests.support.small_arm import small_spec
 from trunkline.errors import InputError
 from trunkline.model.statics.chain import read_chain
-from trunkline.pipeline.inputs import read_model
+from trunkline.model_files import read_model
 
 
 def test_spiral_arm_reads_as_it_was_built():

@@ -7,6 +7,7 @@ from pathlib import Path
 import mujoco
 
 from tests.support.matched_plant import curl, markers_of, release, small_model, static_pull, tilt
+from tests.support.twins import twin_of
 from trunkline.identification.evaluation.baselines import references
 from trunkline.identification.evaluation.evaluation import Prediction, replay
 from trunkline.identification.results.scoring import fingerprints
@@ -44,7 +45,7 @@ def sample(model: mujoco.MjModel | None = None, trials: list[Trial] | None = Non
     if model is None:
         model = truth.__copy__()
         model.jnt_stiffness[:] *= 1.05
-    return certify(ASKED, model, trials, {"identify_stiffness": table(trials)}, metrics(model, trials))
+    return certify(ASKED, twin_of(model, {"identify_stiffness": table(trials)}), trials, metrics(model, trials))
 
 
 def table(trials: list[Trial]) -> dict:

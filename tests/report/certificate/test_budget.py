@@ -11,8 +11,8 @@ from trunkline.identification.simulate.experiment import SLACK
 from trunkline.report.certificate.arms import arm_of
 from trunkline.report.certificate.budget import FRICTION, NOISE, Inputs, budget, lacking_draws
 from trunkline.report.certificate.discrepancy import Discrepancy, discrepancy
-from trunkline.report.certificate.identified import Identified, identified
 from trunkline.report.certificate.poses import Conditions, StaticPoses, draw_poses
+from trunkline.twin.posterior import Posterior
 
 SMALL = 1e-3  # rad, of a mount: tips move along straight lines
 
@@ -30,17 +30,17 @@ def straight(model, count=1) -> StaticPoses:
     return StaticPoses(np.zeros((count, 3)), np.tile(chain.straight_lengths + SLACK, (count, 1)))
 
 
-def mounts(correlation: float, degrees: float = 1e6) -> Identified:
+def mounts(correlation: float, degrees: float = 1e6) -> Posterior:
     """Of both tilts of a mount, alike."""
     names, wide = ["mount_tilt_x", "mount_tilt_y"], np.ones(2)
     matrix = np.array([[1, correlation], [correlation, 1]])
-    return Identified(names, ["a", "a"], 0 * wide, SMALL / PARAMETERS[names[0]].scale * wide, degrees * wide, matrix,
+    return Posterior(names, ["a", "a"], 0 * wide, SMALL / PARAMETERS[names[0]].scale * wide, degrees * wide, matrix,
                       -1e3 * wide, 1e3 * wide)  # fmt: skip
 
 
-def nothing_known() -> Identified:
+def nothing_known() -> Posterior:
     none = np.zeros(0)
-    return Identified([], [], none, none, none, np.zeros((0, 0)), none, none)
+    return Posterior([], [], none, none, none, np.zeros((0, 0)), none, none)
 
 
 def contributions(result) -> dict[str, float]:
@@ -75,7 +75,7 @@ def test_correlation_adds_where_inputs_move_the_tip_the_same_way(model):
     for correlation in (-1.0, 0.0, 1.0):
         matrix = np.array([[1, correlation], [correlation, 1]])
         far = np.full(2, 1e6)
-        estimates = Identified(names, ["a", "a"], np.zeros(2), units, far, matrix, -far, far)
+        estimates = Posterior(names, ["a", "a"], np.zeros(2), units, far, matrix, -far, far)
         result = budget(Inputs(model, estimates, None, 0.0), straight(model), 4, 1, np.random.default_rng(2))
         combined[correlation] = result.combined[0]
         lines = contributions(result)
@@ -143,33 +143,6 @@ def test_residuals_that_other_sources_explain_leave_nothing_to_the_model():
     ways = np.full((200, 2), 0.2)
     assert discrepancy(residuals, ways, np.full(200, wide**2)).rms.max() < 0.2 * wide / 0.2
     assert discrepancy(residuals, ways, np.zeros(200)).rms.max() > 0.5 * wide / 0.2
-
-
-def table(**rows) -> dict:
-    """A stage's parameters.json. rows: value, half width, and range."""
-    parameters = {
-        name: {"value": value, "interval_95_given_model": [value - half, value + half], "range": list(span)}
-        for name, (value, half, span) in rows.items()
-    }
-    correlation = {a: {b: 1.0 if a == b else 0.5 for b in rows} for a in rows}
-    return {"parameters": parameters, "correlation": correlation, "fitted_to": dict.fromkeys("abcde")}
-
-
-def test_intervals_become_standard_uncertainties_and_later_stages_win():
-    wide = {"mount_tilt_x": (0.01, 0.002, (-0.1, 0.1)), "mount_tilt_y": (0.0, 0.003, (-0.1, 0.1))}
-    first, second = table(**wide), table(mount_tilt_y=(0.02, 0.001, (-0.1, 0.1)))
-    merged = identified({"one": first, "two": second})
-    assert merged.names == ["mount_tilt_x", "mount_tilt_y"]
-    assert merged.stages == ["one", "two"]
-    scale, factor = PARAMETERS["mount_tilt_x"].scale, student(4).ppf(0.975)
-    np.testing.assert_allclose(merged.deviation, np.array([0.002, 0.001]) / scale / factor)
-    np.testing.assert_array_equal(merged.correlation, np.eye(2))
-    alone = identified({"one": first})
-    assert alone.correlation[0, 1] == 0.5
-    draws = alone.draw(40_000, np.random.default_rng(10))
-    assert np.corrcoef(draws.T)[0, 1] == pytest.approx(0.5, abs=0.05)
-    lowest, highest = np.quantile(draws[:, 0] * scale, [0.025, 0.975])
-    assert [lowest, highest] == pytest.approx([0.008, 0.012], abs=2e-4), "95 % of the draws lie in the interval"
 
 
 def test_poses_lie_within_the_conditions(model):

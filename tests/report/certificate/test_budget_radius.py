@@ -7,6 +7,7 @@ import pytest
 
 from tests.report.certificate.test_budget import mounts, nothing_known, straight
 from tests.support.matched_plant import small_model, static_pull, tilt
+from tests.support.twins import twin_of
 from trunkline.identification.simulate.experiment import SLACK
 from trunkline.recordings.trials.splits import IDENTIFY, TEST, VALIDATE
 from trunkline.report.certificate import budget as budgets
@@ -15,9 +16,9 @@ from trunkline.report.certificate.budget import Inputs, UncertaintySource, budge
 from trunkline.report.certificate.certificate import FEWEST, inputs_of
 from trunkline.report.certificate.facts import uncertainty_facts
 from trunkline.report.certificate.held_out import at_rest, tip_residuals
-from trunkline.report.certificate.identified import Identified
 from trunkline.report.certificate.poses import Conditions, StaticPoses
 from trunkline.report.certificate.words import open_lines
+from trunkline.twin.posterior import Posterior
 
 NOISE = 1e-3  # m
 
@@ -130,7 +131,7 @@ def test_an_arm_that_finds_no_rest_moves_by_nobody_knows_what(model, monkeypatch
 def test_shifts_are_nan_where_a_drawn_arm_does_not_come_to_rest(model):
     """Springs of nothing at all hold no arm upside down."""
     far = np.full(1, 1e9)
-    estimates = Identified(["stiffness"], ["a"], np.log([1e-9]), np.array([1e-3]), far, np.eye(1), -far, far)
+    estimates = Posterior(["stiffness"], ["a"], np.log([1e-9]), np.array([1e-3]), far, np.eye(1), -far, far)
     arm = arm_of(model)
     up = StaticPoses(np.array([[3.0, 0.0, 9.0]]), arm.chain.straight_lengths[None] + SLACK)
     shifts = parameter_shifts(model, estimates, arm, up, 2, np.random.default_rng(0))
@@ -174,7 +175,7 @@ def test_so_many_held_out_tips_must_have_been_seen(count, usable):
     for trial in trials[count:]:
         trial.measured[:, 3] = False
     ingested = {"position_noise_mm": 0.3}
-    inputs = inputs_of(model, trials, {}, ingested, 2, np.random.default_rng(0))
+    inputs = inputs_of(twin_of(model), trials, ingested, 2, np.random.default_rng(0))
     assert (inputs.lacking is not None) is usable
     assert inputs.lacking is None or inputs.lacking.trials == count
 

@@ -11,6 +11,7 @@ import pytest
 from stages.report import CHECKOUT, code
 from tests.report.certificate.sample import ASKED, INGESTED, sample, sample_trials, table, write
 from tests.support.matched_plant import small_model
+from tests.support.twins import twin_of
 from trunkline.errors import InputError
 from trunkline.recordings.trials.splits import DECIDING, TEST
 from trunkline.report.certificate.certificate import COMMAND, check_fitted, digest_of_code, inputs_of
@@ -92,7 +93,7 @@ def test_the_held_out_trials_at_rest_tell_what_the_model_lacks(certificate):
     for factor in (1.0, 1.1, 1.3):
         model = truth.__copy__()
         model.jnt_stiffness[:] *= factor
-        inputs = inputs_of(model, trials, {}, INGESTED, 2, np.random.default_rng(0))
+        inputs = inputs_of(twin_of(model), trials, INGESTED, 2, np.random.default_rng(0))
         assert inputs.lacking
         assert inputs.lacking.trials == 3
         accepted.append(inputs.lacking.rms[0])
@@ -102,7 +103,7 @@ def test_the_held_out_trials_at_rest_tell_what_the_model_lacks(certificate):
 
 def test_too_few_held_out_trials_tell_nothing_and_the_page_says_so():
     trials = [trial for trial in sample_trials(small_model(4)) if trial.split != DECIDING[1]]
-    assert inputs_of(small_model(4), trials, {}, INGESTED, 2, np.random.default_rng(0)).lacking is None
+    assert inputs_of(twin_of(small_model(4)), trials, INGESTED, 2, np.random.default_rng(0)).lacking is None
 
 
 def test_replays_are_the_trials_to_a_twentieth_of_a_millimetre(certificate):

@@ -7,6 +7,7 @@ import pytest
 
 from tests.report.certificate.sample import ASKED, metrics, sample_trials, table
 from tests.support.matched_plant import small_model
+from tests.support.twins import twin_of
 from trunkline.report.certificate.arms import arm_of
 from trunkline.report.certificate.budget import COVERAGE, Budget, lacking_draws, radius_of
 from trunkline.report.certificate.certificate import certify
@@ -105,7 +106,7 @@ def certified(truth):
 
     config, tables = replace(ASKED, covered=12, poses=4, arms=3), {"identify_stiffness": table(trials)}
     of = metrics(truth, trials)
-    return [certify(config, truth, trials, tables, of, rig) for rig in (None, bring)]
+    return [certify(config, twin_of(truth, tables), trials, of, rig) for rig in (None, bring)]
 
 
 @pytest.mark.parametrize(("offset", "share"), [(0.0, 1.0), (0.5, 0.0), (np.nan, 0.0)])

@@ -23,8 +23,8 @@ from trunkline.pipeline.stage import run_stage
 from trunkline.recordings.trials.splits import SPLITS
 from trunkline.recordings.trials.trial import read_trials, write_trials
 from trunkline.tools.evaluate.__main__ import main
-from trunkline.tools.evaluate.model import read_arm
 from trunkline.tools.evaluate.session import trials_of
+from trunkline.twin.twin import Twin
 
 ROOT = Path(__file__).parents[3]
 
@@ -222,10 +222,10 @@ def test_a_mount_may_be_tilted_as_it_is_identified_but_not_be_another_frame(lab,
         spec.body("base").quat = [np.cos(np.radians(degrees) / 2), np.sin(np.radians(degrees) / 2), 0, 0]
         (tmp_path / "arm.xml").write_text(spec.to_xml())
         if message is None:
-            assert read_arm(tmp_path / "arm.xml").nq
+            assert Twin.load(tmp_path / "arm.xml").arm.nq
         else:
             with pytest.raises(InputError, match=message):
-                read_arm(tmp_path / "arm.xml")
+                Twin.load(tmp_path / "arm.xml")
 
 
 @pytest.mark.usefixtures("figures_not_laid_out")

@@ -14,11 +14,11 @@ from tests.support.small_arm import small_mjcf
 from trunkline.errors import InputError
 from trunkline.identification.parameters.parameters import PARAMETERS
 from trunkline.model.simulation.motion import batch_of, hold, move
-from trunkline.report.certificate.identified import identified
 from trunkline.tools.randomize.__main__ import main
 from trunkline.tools.randomize.fields import drawn_fields
 from trunkline.tools.randomize.file import read_randomization
 from trunkline.tools.randomize.randomization import Randomization, of_arm, of_population
+from trunkline.twin.posterior import Posterior
 
 ROOT = Path(__file__).parents[3]
 TOLD = {"identify_stiffness": ("stiffness", "mount_tilt_x"), "identify_control": ("kp", "damping", "force_range")}
@@ -201,7 +201,7 @@ def test_two_folders_are_a_population_about_their_mean(tmp_path, written):
 def test_of_the_committed_stages_it_takes_what_the_last_one_found():
     tables = {s: json.loads((ROOT / f"artifacts/identify_{s}/parameters.json").read_text())
               for s in ("stiffness", "damping", "control")}  # fmt: skip
-    drawn = of_arm(identified(tables))
+    drawn = of_arm(Posterior.from_tables(tables))
     values = drawn.values(drawn.draw(500, np.random.default_rng(0)))
     assert values["kp"].std() > 0
     assert np.median(values["kp"]) == pytest.approx(tables["control"]["parameters"]["kp"]["value"], rel=0.1)
@@ -222,7 +222,7 @@ def test_widened_it_spreads_as_much_more(tmp_path, written):
 @pytest.mark.parametrize("spoil", ["nothing", "model", "json", "parameter"])
 def test_what_is_no_identified_arm_is_one_line_and_writes_nothing(spoil, tmp_path, capsys):
     folder, out = tmp_path / "artifacts", tmp_path / "out.json"
-    expected = "found no identify_stiffness/parameters.json"
+    expected = "found no identify_stiffness/arm.xml"
     if spoil != "nothing":
         artifacts(folder)
     if spoil == "model":

@@ -8,15 +8,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from trunkline.ar.hybrid.posterior import Posterior, PosteriorSamples, sample
 from trunkline.ar.hybrid.preview import Holding, interruptible, joined
 from trunkline.ar.hybrid.rollouts import CommandTrajectory, ComposedTwin, rollouts
+from trunkline.ar.hybrid.uncertainty import GraspUncertainty, PosteriorSamples, sample
 
 
 def try_places(
     twin: ComposedTwin,
     trajectory: CommandTrajectory,
-    posterior: Posterior,
+    uncertainty: GraspUncertainty,
     holding: Holding,
     offsets: np.ndarray,
     count: int,
@@ -29,7 +29,7 @@ def try_places(
         offsets: where the mount of each place is, less that of the plan, world axes, m. Shape (P, 3).
         go_on: as `preview`.
     """
-    samples, places = sample(posterior, twin.arm, count, seed), len(offsets)
+    samples, places = sample(uncertainty, twin.arm, count, seed), len(offsets)
     moved = np.tile(samples.offsets, (places, 1)) - np.repeat(offsets, count, axis=0)
     values = {name: np.tile(column, places) for name, column in samples.values.items()}
     many = PosteriorSamples(values, np.tile(samples.friction, places), moved, np.tile(samples.turns, places))

@@ -1,9 +1,9 @@
 """A preview that knows what it does not know: not one twin tries a plan but a batch of them.
 
 The nominal twin, with all as it is believed, goes first and is shown as it is simulated. Then come futures, drawn from
-what is not known (`trunkline/ar/hybrid/posterior.py`): how far their tips spread, and the share of them that holds the
-object is the probability that the grasp holds, with Wilson's interval. That interval says how many futures were asked,
-not how true the model is.
+what is not known (`uncertainty.py`): how far their tips spread, and the share of them that holds the object is the
+probability that the grasp holds, with Wilson's interval. That interval says how many futures were asked, not how true
+the model is.
 """
 
 from collections.abc import Callable, Iterator
@@ -13,9 +13,9 @@ from typing import Annotated, Protocol
 import numpy as np
 from pydantic import Field
 
-from trunkline.ar.hybrid.posterior import Posterior, PosteriorSamples, nominal_sample, sample
 from trunkline.ar.hybrid.rates import wilson
 from trunkline.ar.hybrid.rollouts import FRAME, CommandTrajectory, ComposedTwin, Piece, rollouts
+from trunkline.ar.hybrid.uncertainty import GraspUncertainty, PosteriorSamples, nominal_sample, sample
 
 Metres = Annotated[float, Field(gt=0, le=1)]
 WITHIN = 0.9  # share of futures whose tips are within the spread
@@ -126,7 +126,7 @@ def nominal(twin: ComposedTwin, trajectory: CommandTrajectory) -> Iterator[Piece
 def preview(
     twin: ComposedTwin,
     trajectory: CommandTrajectory,
-    posterior: Posterior,
+    uncertainty: GraspUncertainty,
     holding: Criterion | None = None,
     count: int = 32,
     seed: int = 0,
@@ -140,7 +140,7 @@ def preview(
         show: called with each piece of the nominal motion, before any future is simulated.
         go_on: called before each piece, and after the last; what it raises ends the preview.
     """
-    begun, samples = [], sample(posterior, twin.arm, count, seed)
+    begun, samples = [], sample(uncertainty, twin.arm, count, seed)
     for piece in interruptible(nominal(twin, trajectory), go_on):
         show(piece)
         begun.append(piece)

@@ -19,9 +19,9 @@ from scipy.spatial.transform import Rotation
 
 from trunkline.ar.hybrid.compose import panda_joints
 from trunkline.ar.hybrid.objects import GRIP, object_geoms
-from trunkline.ar.hybrid.posterior import PosteriorSamples
 from trunkline.ar.hybrid.string import EYE, STRING
 from trunkline.ar.hybrid.torques import joint_torques, servo_commands
+from trunkline.ar.hybrid.uncertainty import PosteriorSamples
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.identification.parameters.parameters import candidate_fields, parameter_named

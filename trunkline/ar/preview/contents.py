@@ -1,12 +1,9 @@
-"""What teleoperation and previews ask of a package's files: its network, and how sure the arm's parameters are."""
+"""What teleoperation asks of a package's files: its network."""
 
-import json
-
-from trunkline.ar.hybrid import posterior
 from trunkline.ar.teleop import tendons
 from trunkline.errors import InputError
+from trunkline.twin.package import manifest_of
 from trunkline.unity.manifest import require_widths
-from trunkline.unity.unpacked import file_of, manifest_of
 
 
 def network_of(files: dict[str, bytes]) -> tendons.Network:
@@ -23,12 +20,3 @@ def network_of(files: dict[str, bytes]) -> tendons.Network:
     took, gave = ([node.shape[-1] for node in ends] for ends in (session.get_inputs(), session.get_outputs()))
     require_widths(took, gave, block["input_order"], block["output_order"], "network")
     return tendons.network_of(session)
-
-
-def posterior_of(files: dict[str, bytes], contact: posterior.Contact | None = None) -> posterior.Posterior:
-    """What is not known of the arm, and of what it touches.
-
-    Raises:
-        InputError: naming a parameter that is unknown or whose interval is none.
-    """
-    return posterior.posterior_of(json.loads(file_of(files, "parameters"))["stages"], contact)

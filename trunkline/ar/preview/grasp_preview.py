@@ -11,10 +11,10 @@ import numpy as np
 
 from trunkline.ar.hybrid.assistant import best, try_places
 from trunkline.ar.hybrid.grasp_poses import Grip
-from trunkline.ar.hybrid.posterior import Contact
 from trunkline.ar.hybrid.preview import Holding, PlanPreview, preview
 from trunkline.ar.hybrid.released import RestCriterion
 from trunkline.ar.hybrid.rollouts import CommandTrajectory, ComposedTwin
+from trunkline.ar.hybrid.uncertainty import Contact
 from trunkline.ar.preview.preview_twin import RobotModel, compose_twin
 from trunkline.ar.preview.settings import Previewing
 from trunkline.ar.teleop.alignment import base_quaternion
@@ -72,7 +72,7 @@ class GraspPreviewer:
         twin = compose_twin(self.robot_model, world, thing, trajectory.joints[0], trajectory.commands[0], s, lean)
         holding = Holding(trajectory.duration - s.hold, s.sag, s.slip, s.lifted)
         prediction = PlanPrediction(
-            preview(twin, trajectory, self.robot_model.posterior, holding, s.futures, seed, go_on=go_on), begins
+            preview(twin, trajectory, self.robot_model.uncertainty, holding, s.futures, seed, go_on=go_on), begins
         )
         yield prediction
         if prediction.probability < s.sure and s.assistant:
@@ -98,14 +98,14 @@ class GraspPreviewer:
         """
         s, trajectory, begins = self.settings, *self.trajectory_from(plan, "transfer")
         twin = self.carrying(thing, world, trajectory, hangs, before)
-        posterior = replace(
-            self.robot_model.posterior, contact=Contact(self.robot_model.posterior.contact.friction, NOWHERE, 0.0)
+        uncertainty = replace(
+            self.robot_model.uncertainty, contact=Contact(self.robot_model.uncertainty.contact.friction, NOWHERE, 0.0)
         )
         board = beneath(targets.tip.position, world)
         assert board is not None  # else the planner refuses
         opens = plan.step * dict(plan.phases)["release"]
         resting = RestCriterion(opens, np.array(board.low), np.array(board.high), twin.model)
-        return PlanPrediction(preview(twin, trajectory, posterior, resting, s.futures, seed, go_on=go_on), begins)
+        return PlanPrediction(preview(twin, trajectory, uncertainty, resting, s.futures, seed, go_on=go_on), begins)
 
     def reach(self, plan: Plan, world: World, seed: int) -> PlanPrediction:
         """Futures of a plan that grasps nothing, beside nothing that may be touched."""
@@ -118,7 +118,7 @@ class GraspPreviewer:
     ) -> PlanPrediction:
         """Futures of which nothing is asked but where the tip goes. `go_on`: as `preview`."""
         return PlanPrediction(
-            preview(twin, trajectory, self.robot_model.posterior, None, self.settings.futures, seed, go_on=go_on), 0.0
+            preview(twin, trajectory, self.robot_model.uncertainty, None, self.settings.futures, seed, go_on=go_on), 0.0
         )
 
     def whole(self, plan: Plan) -> CommandTrajectory:
@@ -166,7 +166,7 @@ class GraspPreviewer:
         mount = np.array(targets.rigid.position) - centre
         places = self.grips[way_of_grasping(thing)].near(_rotation(targets), mount, thing.diameter)
         shares = try_places(
-            twin, trajectory, self.robot_model.posterior, holding, places - mount, s.assistant, seed + 1, go_on
+            twin, trajectory, self.robot_model.uncertainty, holding, places - mount, s.assistant, seed + 1, go_on
         )
         chosen = best(places - mount, shares)
         if shares[chosen] <= probability:

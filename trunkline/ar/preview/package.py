@@ -1,6 +1,5 @@
 """All that a client has: the Unity package, and nothing else. Network, maps and model come out of its files."""
 
-import json
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -27,8 +26,9 @@ from trunkline.model.arm.contact_geometry import read_geometry
 from trunkline.model.arm.geometry import ChainGeometry
 from trunkline.model.simulation.rest import settle
 from trunkline.model.statics.chain import Chain, read_chain
+from trunkline.twin import package
 from trunkline.unity import unpacked
-from trunkline.unity.package import MANIFEST, MODEL
+from trunkline.unity.package import MODEL
 
 PACKAGES = Path("artifacts/package_unity")
 
@@ -95,9 +95,9 @@ def read_package(path: Path) -> Package:
     Raises:
         InputError: there is none, or a file of it, its network too, is not what its manifest says.
     """
-    files = unpacked.read_package(path)
-    digest = unpacked.package_digest(files)
-    manifest = json.loads(files[MANIFEST])
+    files = package.read_package(path)
+    digest = package.package_digest(files)
+    manifest = package.manifest_of(files)
     network, model = manifest["network"], manifest["model"]
     compiled = unpacked.model_of(files)
     return Package(

@@ -8,12 +8,11 @@ from scipy.spatial.transform import Rotation
 
 from trunkline.ar.hybrid.compose import Placed, compose, panda_joints
 from trunkline.ar.hybrid.objects import GraspObject as Shaped
-from trunkline.ar.hybrid.posterior import Contact, Posterior
 from trunkline.ar.hybrid.rollouts import ComposedTwin
 from trunkline.ar.hybrid.string import hang
+from trunkline.ar.hybrid.uncertainty import Contact, GraspUncertainty, uncertainty_of
 from trunkline.ar.hybrid.worlds import SupportSurface
 from trunkline.ar.hybrid.worlds import WorldGeometry as Room
-from trunkline.ar.preview import contents
 from trunkline.ar.preview.settings import Previewing
 from trunkline.ar.teleop.messages import Box, Thing, World
 from trunkline.ar.teleop.vectors import Quaternion, unit
@@ -22,7 +21,8 @@ from trunkline.frames import STANDARD_GRAVITY, wxyz_from_rotation
 from trunkline.kinematics.panda.kinematics import mount_pose
 from trunkline.kinematics.panda.mounts import PandaRobot
 from trunkline.model.simulation.rest import settle
-from trunkline.unity import unpacked
+from trunkline.twin import package
+from trunkline.twin.twin import Twin
 
 GRAVITY = np.array([[0.0, 0.0, -STANDARD_GRAVITY]])  # m/s², where the arm hangs straight down
 
@@ -34,7 +34,7 @@ class RobotModel:
     """What the package says. doubts: about the arm's parameters, contacts and places."""
 
     arm: mujoco.MjSpec
-    posterior: Posterior
+    uncertainty: GraspUncertainty
     robot: PandaRobot
 
     def lean(self, hangs: np.ndarray | None) -> Rotation | None:
@@ -59,10 +59,11 @@ def robot_model_of(settings: Previewing, files: dict[str, bytes]) -> RobotModel:
     """
     x, y, z = settings.place
     contact = Contact(settings.friction, (x, y, z), float(np.radians(settings.turn_deg)))
-    robot = unpacked.robot_of(files)
+    robot = package.robot_of(files)
     if not isinstance(robot, PandaRobot):
         raise InputError(f"package: found a robot of kind {robot.kind}, expected panda: plans move that")
-    return RobotModel(unpacked.arm_of(files), contents.posterior_of(files, contact), robot)
+    twin = Twin.of_package(files)
+    return RobotModel(twin.spec, uncertainty_of(list(twin.provenance.tables.values()), contact), robot)
 
 
 def compose_twin(

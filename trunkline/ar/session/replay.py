@@ -21,6 +21,7 @@ from trunkline.ar.teleop.messages import Input, from_json, to_json
 from trunkline.ar.teleop.reach import MapReach, Reach
 from trunkline.ar.teleop.settings import Teleop
 from trunkline.errors import InputError, in_one_line
+from trunkline.twin import package
 from trunkline.unity import unpacked
 
 MISSING = "nothing"
@@ -90,8 +91,8 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("log", type=Path)
     parser.add_argument("package", type=Path)
     args = parser.parse_args(arguments)
-    log, files = read_session_log(args.log), unpacked.read_package(args.package)
-    core = core_of(log, unpacked.package_digest(files), MapReach.from_arrays(unpacked.maps_of(files)))
+    log, files = read_session_log(args.log), package.read_package(args.package)
+    core = core_of(log, package.package_digest(files), MapReach.from_arrays(unpacked.maps_of(files)))
     for damage in log.damage:
         print(f"{args.log}: {damage}")
     difference = replay(log.steps, core)

@@ -15,8 +15,8 @@ import numpy as np
 from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.report.certificate.arms import StaticArm, arm_of, arms_with
 from trunkline.report.certificate.discrepancy import Discrepancy, discrepancy
-from trunkline.report.certificate.identified import Identified
 from trunkline.report.certificate.poses import StaticPoses
+from trunkline.twin.posterior import Posterior
 
 COVERAGE = 0.95
 FRICTION, LACKING, NOISE = "friction", "what the model lacks", "cameras"
@@ -79,13 +79,13 @@ class Inputs:
     """
 
     model: mujoco.MjModel
-    parameters: Identified
+    parameters: Posterior
     lacking: Discrepancy | None
     noise: float
 
 
 def held_out(
-    model: mujoco.MjModel, parameters: Identified, noise: float, poses: StaticPoses, residuals: np.ndarray, arms: int,
+    model: mujoco.MjModel, parameters: Posterior, noise: float, poses: StaticPoses, residuals: np.ndarray, arms: int,
     rng: np.random.Generator,
 ) -> Discrepancy:
     """What the model lacks, from how far the tips of held-out poses are from the twin's, m (N,), beside what `arms`
@@ -97,19 +97,20 @@ def held_out(
 
 
 def parameter_shifts(
-    model: mujoco.MjModel, parameters: Identified, arm: StaticArm, poses: StaticPoses, draws: int,
+    model: mujoco.MjModel, parameters: Posterior, arm: StaticArm, poses: StaticPoses, draws: int,
     rng: np.random.Generator,
 ) -> np.ndarray:  # fmt: skip
     """By how far the tip moves with `draws` draws of the parameters, m, NaN where an arm finds no rest. Shape
     (draws, N, 3)."""
     if not parameters.names:
         return np.zeros((draws, len(poses), 3))
-    values, near = parameters.values(parameters.draw(draws, rng)), arm.rest(poses)
-    moved = np.array([other.tips(poses, near.qpos) for other in arms_with(model, values)])
+    near = arm.rest(poses)
+    variants = arms_with(model, parameters.sample(draws, rng))
+    moved = np.array([other.tips(poses, near.qpos) for other in variants])
     return moved - arm.placed(near)
 
 
-def sensitivities(model: mujoco.MjModel, parameters: Identified, arm: StaticArm, poses: StaticPoses) -> np.ndarray:
+def sensitivities(model: mujoco.MjModel, parameters: Posterior, arm: StaticArm, poses: StaticPoses) -> np.ndarray:
     """By how far the tip moves with a standard uncertainty of each parameter, half the way between a step up and one
     down, m. Shape (P, N, 3)."""
     count = len(parameters.names)

@@ -11,7 +11,6 @@ import numpy as np
 from pydantic import Field
 
 from trunkline.errors import InputError
-from trunkline.files import file_digest
 from trunkline.identification.evaluation.evaluation import Prediction, replay
 from trunkline.identification.results.scoring import fingerprint
 from trunkline.identification.simulate.checks import check_trials
@@ -24,11 +23,11 @@ from trunkline.report.certificate.budget import Budget, Inputs, budget, held_out
 from trunkline.report.certificate.coverage import Bring, covered
 from trunkline.report.certificate.facts import error_rows, parameter_facts, uncertainty_facts
 from trunkline.report.certificate.held_out import at_rest, tip_residuals
-from trunkline.report.certificate.identified import identified
 from trunkline.report.certificate.poses import conditions_of, draw_poses, posed
 from trunkline.report.certificate.replays import packed
 from trunkline.report.certificate.words import Use, limits_of, verdict
 from trunkline.settings import Seed
+from trunkline.twin.twin import Twin
 from trunkline.version import __version__
 
 LIBRARIES = ("mujoco", "numpy", "scipy")
@@ -65,25 +64,24 @@ class Certificate:
 
 
 def certify(
-    config: CertificateSettings, model: mujoco.MjModel, trials: list[Trial], tables: dict[str, dict],
-    metrics: dict[str, dict], bring: Bring | None = None,
+    config: CertificateSettings, twin: Twin, trials: list[Trial], metrics: dict[str, dict], bring: Bring | None = None
 ) -> Certificate:  # fmt: skip
-    """Of `model`, the last that the stages identified.
+    """Of the `twin` that the stages identified.
 
     Args:
         trials: that may decide.
-        tables: parameters.json of the stages that identified, in their order. metrics: of these, and of the stages
-            `score`, `ingest` and `filter`.
+        metrics: of the stages that identified, and of `score`, `ingest` and `filter`.
         bring: the arm that the model is of, to see how often its tip is where the certificate says; None for none.
 
     Raises:
         InputError: the trials are of another arm, or of another session than the model was fitted to.
     """
+    model, tables = twin.arm, twin.provenance.tables
     check_trials(trials, model)
     check_fitted(tables, trials)
     rng = np.random.default_rng(config.seed)
     conditions, length = conditions_of(trials), arm_of(model).chain.length
-    inputs = inputs_of(model, trials, tables, metrics["ingest"], config.arms, rng)
+    inputs = inputs_of(twin, trials, metrics["ingest"], config.arms, rng)
     poses = draw_poses(arm_of(model).chain, conditions, config.poses, rng)
     tip_budget = budget(inputs, poses, config.arms, config.each, rng)
     uncertainty = uncertainty_facts(tip_budget, conditions, length, config.arms * config.each)
@@ -128,12 +126,9 @@ def certify(
     return Certificate(facts, numbers, replays, held_out_shapes(prediction), tip_budget)
 
 
-def inputs_of(
-    model: mujoco.MjModel, trials: list[Trial], tables: dict[str, dict], ingested: dict, arms: int,
-    rng: np.random.Generator,
-) -> Inputs:  # fmt: skip
+def inputs_of(twin: Twin, trials: list[Trial], ingested: dict, arms: int, rng: np.random.Generator) -> Inputs:
     """Of the budget. ingested: metrics of the stage `ingest`."""
-    parameters, noise = identified(tables), ingested["position_noise_mm"] / 1e3
+    model, parameters, noise = twin.arm, twin.posterior, ingested["position_noise_mm"] / 1e3
     rested = at_rest(trials)
     tip = replay(model, [], trials[0].markers).tip
     residuals = tip_residuals(model, rested, tip)
@@ -203,11 +198,6 @@ def data_facts(ingested: dict, filtered: dict) -> dict:
 def digest_of_trials(trials: list[Trial]) -> str:
     """Of all trials' positions to the micrometre."""
     return hashlib.sha256("".join(fingerprint(trial) for trial in trials).encode()).hexdigest()[:16]
-
-
-def digests(files: list[Path]) -> dict[str, str]:
-    """SHA-256 of files, by their paths."""
-    return {path.as_posix(): file_digest(path) for path in files}
 
 
 def digest_of_code(root: Path, parts: list[str]) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from trunkline.errors import InputError
 from trunkline.identification.evaluation.error_tables import TABLED
 from trunkline.identification.parameters.parameters import parameter_named
-from trunkline.identification.stages import STAGES
+from trunkline.identification.stages import STAGES, read_tables
 from trunkline.recordings.trials.splits import TEST, VALIDATE
 
 
@@ -57,9 +57,8 @@ def read_results(name: str, folder: Path) -> Results:
         InputError: a file there is not what a stage writes.
     """
     parameters, split, trials, errors = {}, "", 0, {}
-    for stage in STAGES:
-        table = _read(folder / "artifacts" / stage / "parameters.json")
-        for key, row in table.get("parameters", {}).items():
+    for table in read_tables(folder / "artifacts").values():
+        for key, row in table["parameters"].items():
             low, high = row["interval_95_given_model"]
             parameters[key] = ParameterEstimate(row["value"], low, high, row["unit"])
     scored = _read(folder / "artifacts/score/metrics.json")

@@ -8,8 +8,8 @@ from omegaconf import OmegaConf
 from trunkline.errors import InputError
 from trunkline.model.arm.kinds import Arm
 from trunkline.model.arm.mjcf import Actuation, Solver
+from trunkline.model_files import read_spec
 from trunkline.pipeline.config import own_or_project, validated
-from trunkline.pipeline.inputs import read_spec
 from trunkline.settings import read_yaml, settings
 
 STAGE = "build_mjcf"

@@ -18,10 +18,9 @@ from trunkline.errors import InputError, in_one_line, nearest
 from trunkline.identification.fit.settings import IdentificationSettings
 from trunkline.identification.fit.setup import check_parameters
 from trunkline.identification.parameters.per_session import make_room, other_sessions, per_session_names
-from trunkline.identification.stages import STAGES
+from trunkline.identification.stages import STAGES, final_model
 from trunkline.model.arm.kinds import described_arm
 from trunkline.pipeline.config import load_folder, own_or_project, settings_of
-from trunkline.pipeline.inputs import read_spec
 from trunkline.program import program_name
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.recordings.trials.splits import IDENTIFY
@@ -41,8 +40,8 @@ from trunkline.tools.design.words import (
     why_words,
     widest_words,
 )
-from trunkline.tools.evaluate.model import read_arm
 from trunkline.tools.evaluate.session import trials_of
+from trunkline.twin.twin import Twin
 
 DESCRIBED = "as described in params.yaml, as no stage has identified one yet: suggestions are only as good as it is"
 Stages = list[StageInformation]
@@ -99,11 +98,9 @@ def _check(args: argparse.Namespace) -> None:
 def twin(path: Path | None, root: Path) -> tuple[mujoco.MjSpec, str]:
     """The MJCF at `path`; without, the last that the pipeline in `root` has identified, else the CAD model; and which.
     """
-    identified = (root / "artifacts" / stage / "arm.xml" for stage in reversed(STAGES))
-    file = path or next(filter(Path.is_file, identified), None)
+    file = path or final_model(root / "artifacts")
     if file is not None:
-        read_arm(file)
-        return read_spec(file), f"{file}"
+        return Twin.load(file).spec, f"{file}"
     description = settings_of("build_mjcf", root)
     return described_arm(description, own_or_project(root, "conf")).spec, DESCRIBED
 

@@ -13,16 +13,16 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from trunkline.errors import InputError, in_one_line
-from trunkline.files import file_digest
 from trunkline.identification.evaluation.error_tables import marker_table, trial_table
 from trunkline.identification.results.scoring import evaluate
 from trunkline.identification.simulate.checks import check_trials
 from trunkline.pipeline.stage import output_folder, write_metrics
 from trunkline.program import program_name
 from trunkline.recordings.trials.trial import sessions_of
-from trunkline.tools.evaluate.model import read_arm, written_beside
+from trunkline.tools.evaluate.model import written_beside
 from trunkline.tools.evaluate.report import change_lines, kind_lines, read_reference, trial_lines
 from trunkline.tools.evaluate.session import trials_of
+from trunkline.twin.twin import Twin
 
 
 @in_one_line
@@ -56,8 +56,9 @@ def _run(args: argparse.Namespace) -> int:
     reference = None if args.reference is None else read_reference(args.reference)
     if args.reference is not None and out.resolve() in (args.reference.resolve(), args.reference.resolve().parent):
         raise InputError(f"--out: {out}: found the reference there, expected another folder: it would be written over")
-    models = {"model": read_arm(args.model)} | ({} if args.cad is None else {"cad": read_arm(args.cad)})
-    written = written_beside(args.model, args.settings)
+    twin = Twin.load(args.model)
+    models = {"model": twin.arm} | ({} if args.cad is None else {"cad": Twin.load(args.cad).arm})
+    written = written_beside(twin, args.settings)
     trials = trials_of(args.session, args.settings, "evaluate")
     if len(sessions_of(trials)) == 1 and (session := written.session_of(trials)):
         print(f"evaluate: the session {session} of those that the model was fitted to")
@@ -72,7 +73,7 @@ def _run(args: argparse.Namespace) -> int:
     metrics, predictions = evaluate(models, trials, written.frames, written.command_delay)
     fitted = {trial.name for trial in trials if written.saw(trial)}
     metrics["evaluated"] = {
-        "model": file_digest(args.model)[:16],
+        "model": twin.provenance.digest[:16],
         "frames": written.frames,
         "command_delay": written.command_delay,
         "fitted_to": sorted(fitted),

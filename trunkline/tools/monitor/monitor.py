@@ -13,7 +13,7 @@ from trunkline.pipeline.config import settings_of
 from trunkline.pipeline.stage import output_folder
 from trunkline.recordings.trials.splits import DECIDING
 from trunkline.settings import read_yaml
-from trunkline.tools.evaluate.model import read_arm, written_beside
+from trunkline.tools.evaluate.model import written_beside
 from trunkline.tools.evaluate.session import trials_of
 from trunkline.tools.monitor.attribution import attribute_change
 from trunkline.tools.monitor.baseline import Baseline
@@ -24,6 +24,7 @@ from trunkline.tools.monitor.loading import load_logs
 from trunkline.tools.monitor.pending import PendingFiles
 from trunkline.tools.monitor.scores import Score, Scorer, watched_in
 from trunkline.tools.monitor.words import change_lines, chart_table, outlier_lines, reference_lines, trial_line
+from trunkline.twin.twin import Twin
 
 LEARN = 15  # trials of each kind that stand for the unchanged arm, where no reference is given
 STAGES = ("identify_damping", "identify_control", "identify_stiffness")  # whose loss weighs the residuals
@@ -66,7 +67,7 @@ class DriftMonitor:
             monitor = cls(folder, out, settings, scorer, history, scores, PendingFiles(out / "awaited.json"))
             if is_new:
                 print("\n".join(f"monitor: {line}" for line in reference_lines(
-                    monitor.control_chart.baseline, monitor.control_chart, scorer.parameters)), flush=True)  # fmt: skip
+                    monitor.chart.baseline, monitor.chart, scorer.parameters)), flush=True)  # fmt: skip
             for line in monitor._alarm():
                 print(f"monitor: {line}", flush=True)
             yield monitor
@@ -217,7 +218,8 @@ class DriftMonitor:
 
 def scorer_of(model: Path, settings: Path) -> Scorer:
     """What scores trials against the MJCF at `model`, as the stage that wrote it compared them."""
-    arm, written = read_arm(model), written_beside(model, settings)
+    twin = Twin.load(model)
+    arm, written = twin.arm, written_beside(twin, settings)
     params = read_yaml(settings / "params.yaml")
     stage = next((stage for stage in STAGES if stage in params), None)
     if stage is None:

@@ -17,15 +17,13 @@ import mujoco
 import numpy as np
 
 from trunkline.errors import InputError, in_one_line
-from trunkline.files import file_digest, written_whole
+from trunkline.files import written_whole
 from trunkline.identification.parameters.parameters import parameter_named
-from trunkline.identification.stages import STAGES
 from trunkline.program import program_name
-from trunkline.report.certificate.identified import identified
-from trunkline.tools.evaluate.model import read_arm
 from trunkline.tools.randomize.fields import changed_fields, drawn_fields, of_model
 from trunkline.tools.randomize.file import to_table
-from trunkline.tools.randomize.randomization import Randomization, of_arm, of_population
+from trunkline.tools.randomize.randomization import of_arm, of_population
+from trunkline.twin.twin import Twin
 
 
 @in_one_line
@@ -44,11 +42,11 @@ def main(arguments: list[str] | None = None) -> int:
     args = parser.parse_args(arguments)
     if args.widen < 0 or args.draws < 0:
         raise InputError("--widen, --draws: found a number below 0, expected 0 or more")
-    arms = [_arm_in(folder) for folder in args.artifacts]
-    path, model = _model_in(args.artifacts[0])
-    arms[0] = of_model(model, arms[0], str(path))
+    twins = [Twin.load(folder) for folder in args.artifacts]
+    arms, model, provenance = [of_arm(twin.posterior) for twin in twins], twins[0].arm, twins[0].provenance
+    arms[0] = of_model(model, arms[0], str(provenance.model))
     drawn = (of_population(arms) if len(arms) > 1 else arms[0]).widened(args.widen)
-    which = {"file": path.name, "sha256": file_digest(path), "mujoco": mujoco.__version__}
+    which = {"file": provenance.model.name, "sha256": provenance.digest, "mujoco": mujoco.__version__}
     table = to_table(drawn, changed_fields(model, drawn), which)
     if args.draws:
         x = drawn.draw(args.draws, np.random.default_rng(args.seed))
@@ -60,35 +58,6 @@ def main(arguments: list[str] | None = None) -> int:
     print("\n".join(_lines(table)))
     print(f"randomize: written to {args.out}" + (f" and {args.out.with_suffix('.npz')}" if args.draws else ""))
     return 0
-
-
-def _stages_in(folder: Path) -> list[str]:
-    """Those that have run, in their order.
-
-    Raises:
-        InputError: none has.
-    """
-    stages = [stage for stage in STAGES if (folder / stage / "parameters.json").is_file()]
-    if not stages:
-        raise InputError(f"{folder}: found no {STAGES[0]}/parameters.json, expected the artifacts of identification")
-    return stages
-
-
-def _arm_in(folder: Path) -> Randomization:
-    tables = {}
-    for stage in _stages_in(folder):
-        path = folder / stage / "parameters.json"
-        try:
-            tables[stage] = json.loads(path.read_text(encoding="utf-8"))
-            identified({stage: tables[stage]})
-        except (ValueError, KeyError, TypeError) as error:
-            raise InputError(f"{path}: {error!r}, expected what a stage of identification writes") from error
-    return of_arm(identified(tables))
-
-
-def _model_in(folder: Path) -> tuple[Path, mujoco.MjModel]:
-    path = folder / _stages_in(folder)[-1] / "arm.xml"
-    return path, read_arm(path)
 
 
 def _lines(table: dict) -> list[str]:

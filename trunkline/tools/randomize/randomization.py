@@ -7,7 +7,7 @@ from scipy.stats import norm
 
 from trunkline.errors import InputError
 from trunkline.identification.parameters.parameters import parameter_named
-from trunkline.report.certificate.identified import Identified
+from trunkline.twin.posterior import Posterior
 
 TRIES = 100  # rounds of draws in which all must fall within the limits
 MOST = 95  # of 100, within `interval`
@@ -85,7 +85,7 @@ class Randomization:
         return replace(self, covariance=self.covariance * factor**2)
 
 
-def of_arm(estimates: Identified) -> Randomization:
+def of_arm(estimates: Posterior) -> Randomization:
     """Of one arm: the estimates with their standard uncertainties, and correlations within a stage."""
     parameters = [parameter_named(name) for name in estimates.names]
     scales = np.array([parameter.scale if parameter.signed else 1.0 for parameter in parameters])

@@ -9,9 +9,7 @@ about the value that the model has, together with others of its stage as they co
 log-normal. Friction is log-normal about what is believed, the object's place normal.
 """
 
-import json
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Annotated
 
 import mujoco
@@ -19,7 +17,7 @@ import numpy as np
 from pydantic import Field
 from scipy.stats import norm
 
-from trunkline.errors import InputError, existing
+from trunkline.errors import InputError
 from trunkline.identification.parameters.parameters import NAMES, parameter_named
 
 Z95 = float(norm.ppf(0.975))
@@ -45,7 +43,7 @@ class Contact:
 
 
 @dataclass(frozen=True)
-class Posterior:
+class GraspUncertainty:
     """names: of P parameters. deviation: of each on its own axis. Shape (P,). correlation: shape (P, P)."""
 
     names: tuple[str, ...] = ()
@@ -53,9 +51,9 @@ class Posterior:
     correlation: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     contact: Contact = field(default_factory=Contact)
 
-    def scaled(self, factor: float) -> "Posterior":
+    def scaled(self, factor: float) -> "GraspUncertainty":
         """The same with all deviations of the parameters times `factor`."""
-        return Posterior(self.names, factor * self.deviation, self.correlation, self.contact)
+        return GraspUncertainty(self.names, factor * self.deviation, self.correlation, self.contact)
 
 
 @dataclass(frozen=True)
@@ -72,23 +70,23 @@ class PosteriorSamples:
         return len(self.friction)
 
 
-def sample(posterior: Posterior, arm: mujoco.MjModel, count: int, seed: int) -> PosteriorSamples:
+def sample(uncertainty: GraspUncertainty, arm: mujoco.MjModel, count: int, seed: int) -> PosteriorSamples:
     """`count` futures of the identified `arm`; the same for the same seed.
 
     Raises:
         InputError: naming a parameter that the arm has not.
     """
-    for name in posterior.names:
+    for name in uncertainty.names:
         if not parameter_named(name).belongs_to(arm):
             raise InputError(f"{name}: found an arm without its part, expected one of which it is a parameter")
     rng = np.random.default_rng(seed)
-    values, vectors = np.linalg.eigh(posterior.correlation)
-    off = rng.normal(size=(count, len(values))) * np.sqrt(np.maximum(values, 0)) @ vectors.T * posterior.deviation
+    values, vectors = np.linalg.eigh(uncertainty.correlation)
+    off = rng.normal(size=(count, len(values))) * np.sqrt(np.maximum(values, 0)) @ vectors.T * uncertainty.deviation
     drawn = {}
-    for name, column in zip(posterior.names, off.T, strict=True):
+    for name, column in zip(uncertainty.names, off.T, strict=True):
         parameter = parameter_named(name)
         drawn[name] = np.asarray(parameter.value(parameter.coordinate(parameter.read(arm)) + column))
-    contact = posterior.contact
+    contact = uncertainty.contact
     friction = np.exp(contact.friction * rng.normal(size=count))
     offsets = np.array(contact.place) * rng.normal(size=(count, 3))
     return PosteriorSamples(drawn, friction, offsets, contact.turn * rng.normal(size=count))
@@ -99,7 +97,7 @@ def nominal_sample() -> PosteriorSamples:
     return PosteriorSamples({}, np.ones(1), np.zeros((1, 3)), np.zeros(1))
 
 
-def posterior_of(stages: list[dict], contact: Contact | None = None) -> Posterior:
+def uncertainty_of(stages: list[dict], contact: Contact | None = None) -> GraspUncertainty:
     """What `parameters.json` of stages says, the latest last: it counts for what several have identified.
 
     Raises:
@@ -120,12 +118,7 @@ def posterior_of(stages: list[dict], contact: Contact | None = None) -> Posterio
             if identified[name][0] == identified[other][0]:
                 correlation[i, j] = correlation[j, i] = stages[identified[name][0]]["correlation"][name][other]
     deviation = np.array([identified[name][1] for name in names])
-    return Posterior(names, deviation, correlation, contact or Contact())
-
-
-def read_posterior(files: list[Path], contact: Contact | None = None) -> Posterior:
-    """`posterior_of` the files `parameters.json` of stages, the latest last."""
-    return posterior_of([json.loads(existing(file).read_text(encoding="utf-8")) for file in files], contact)
+    return GraspUncertainty(names, deviation, correlation, contact or Contact())
 
 
 def _deviation(name: str, interval: list[float | None]) -> float:

@@ -1,0 +1,66 @@
+"""A twin comes from a folder of artifacts, from a model with its tables, and from a package, the same each time."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+from tests.support.folders import package
+from trunkline.errors import InputError
+from trunkline.twin.package import read_tarball
+from trunkline.twin.posterior import Posterior
+from trunkline.twin.twin import Twin
+
+
+def same(first: Posterior, other: Posterior) -> bool:
+    return first.names == other.names and all(
+        np.array_equal(getattr(first, name), getattr(other, name))
+        for name in ("estimate", "deviation", "degrees", "correlation", "low", "high")
+    )
+
+
+@pytest.fixture(scope="module")
+def artifacts():
+    return package().parents[1]
+
+
+def test_a_folder_of_artifacts_and_its_last_model_are_one_twin(artifacts):
+    twin, alone = Twin.load(artifacts), Twin.load(artifacts / "identify_control/arm.xml")
+    assert twin.provenance == alone.provenance
+    assert list(twin.provenance.tables) == ["identify_stiffness", "identify_damping", "identify_control"]
+    assert list(twin.provenance.files)[0] == (artifacts / "identify_control/arm.xml").as_posix()
+    assert twin.arm.nu > 0
+    assert "kp" in twin.posterior.names
+    assert same(twin.posterior, alone.posterior)
+
+
+def test_an_earlier_model_knows_no_later_table(artifacts):
+    assert list(Twin.load(artifacts / "identify_damping/arm.xml").provenance.tables) == [
+        "identify_stiffness", "identify_damping"
+    ]  # fmt: skip
+
+
+def test_a_package_has_the_same_posterior_packed_and_unpacked(artifacts, tmp_path):
+    files = read_tarball(package())
+    for path, data in files.items():
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).write_bytes(data)
+    packed, unpacked, made_of = Twin.load(package()), Twin.load(tmp_path), Twin.load(artifacts)
+    assert same(packed.posterior, made_of.posterior)
+    assert same(unpacked.posterior, made_of.posterior)
+    assert packed.provenance == unpacked.provenance
+    assert packed.provenance.package
+    assert packed.provenance.digest == made_of.provenance.digest
+    assert packed.provenance.fitted_to == made_of.provenance.fitted_to
+
+
+def test_a_model_that_no_stage_identified_leaves_nothing_open(artifacts, tmp_path):
+    shutil.copy(artifacts / "identify_control/arm.xml", tmp_path / "arm.xml")
+    twin = Twin.load(tmp_path / "arm.xml")
+    assert twin.posterior.names == []
+    assert twin.provenance.tables == twin.provenance.fitted_to == {}
+
+
+def test_a_folder_without_any_is_one_line(tmp_path):
+    with pytest.raises(InputError, match="found no identify_stiffness/arm.xml"):
+        Twin.load(tmp_path)
