@@ -8,7 +8,7 @@ from trunkline.compute.progress import progress
 from trunkline.pipeline.stage import output_folder, run_stage, write_metrics
 from trunkline.recordings.filtering.effect import summary
 from trunkline.recordings.filtering.filter import Filter, filter_raw_trial
-from trunkline.recordings.trials.raw_trial import read_takes
+from trunkline.recordings.trials.raw_trial import read_raw_trials
 from trunkline.recordings.trials.splits import SPLITS
 from trunkline.recordings.trials.trial import write_trials
 from trunkline.report.figures.data import filter_figure
@@ -21,19 +21,19 @@ Config = settings(Filter)
 
 
 def main(config: Filter) -> None:
-    takes = read_takes(INGEST, SPLITS)
+    raw_trials = read_raw_trials(INGEST, SPLITS)
     trials, effects = [], []
-    with progress(len(takes), "filter", "trials") as bar:
-        for take in takes:
-            trial, effect = filter_raw_trial(take, config)
+    with progress(len(raw_trials), "filter", "trials") as bar:
+        for raw in raw_trials:
+            trial, effect = filter_raw_trial(raw, config)
             trials.append(trial)
             effects.append(effect)
-            bar.update(1, trial=take.name)
+            bar.update(1, trial=raw.name)
     with output_folder(PROCESSED) as processed, output_folder(ARTIFACTS) as artifacts:
         write_trials(processed, trials)
         write_metrics(artifacts, summary(trials, effects))
         shown = max(range(len(trials)), key=lambda i: np.ptp(trials[i].positions, axis=0).sum())
-        save_figure(filter_figure(takes[shown], trials[shown]), artifacts / "filter.png")
+        save_figure(filter_figure(raw_trials[shown], trials[shown]), artifacts / "filter.png")
 
 
 if __name__ == "__main__":

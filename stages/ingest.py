@@ -21,7 +21,7 @@ from trunkline.recordings.cleaning.session_checks import (
     together,
 )
 from trunkline.recordings.session.session import OneFolder, Session, SomeSessions, session_folders
-from trunkline.recordings.trials.raw_trial import write_takes
+from trunkline.recordings.trials.raw_trial import write_raw_trials
 from trunkline.report.figures.data import quality_figure
 from trunkline.report.figures.style import save_figure
 from trunkline.settings import settings
@@ -44,14 +44,14 @@ def main(config: Config) -> None:
     folders = session_folders(RAW / config.session, config.only)
     sessions = check_each_session(folders, partial(gathered_of, config=config), config.plausible.distance)
     gathered = together(list(sessions.values()))
-    qualities = [judge(take, sessions) for take, sessions in zip(gathered.takes, gathered.findings, strict=True)]
-    for take, finding in zip(gathered.takes, gathered.findings, strict=True):
-        take.repairs = len(finding.repairs)
+    qualities = [judge(raw, sessions) for raw, sessions in zip(gathered.raw_trials, gathered.findings, strict=True)]
+    for raw, finding in zip(gathered.raw_trials, gathered.findings, strict=True):
+        raw.repairs = len(finding.repairs)
     for line in remarks(qualities):
         print(f"ingest: {line}")
     clocks = {name: clock_facts(session.clock) for name, session in sessions.items()} if len(sessions) > 1 else None
     with output_folder(PROCESSED) as processed, output_folder(ARTIFACTS) as artifacts:
-        write_takes(processed, gathered.takes)
+        write_raw_trials(processed, gathered.raw_trials)
         write_json(artifacts / "quality.json", report(qualities, gathered) | ({"clocks": clocks} if clocks else {}))
         write_metrics(artifacts, summary(qualities, gathered))
         save_figure(quality_figure(qualities, gathered), artifacts / "quality.png")
@@ -64,13 +64,13 @@ def main(config: Config) -> None:
 
 
 def gathered_of(folder: Path, session: Session, config: Config) -> CheckedSession:
-    """The takes of one session, whose clock and vertical are its own."""
+    """The raw trials of one session, whose clock and vertical are its own."""
     with progress(len(session.trials), "ingest", "trials") as bar:
         taken = []
-        for trial, take, findings in load_raw_trials(folder, session, config.limits):
-            if isinstance(take, InputError) and config.refused_trials == "stop":
-                raise take
-            taken.append((trial, take, findings))
+        for trial, raw, findings in load_raw_trials(folder, session, config.limits):
+            if isinstance(raw, InputError) and config.refused_trials == "stop":
+                raise raw
+            taken.append((trial, raw, findings))
             bar.update(1, trial=trial.name)
     gathered = check_session(taken, session, config.plausible, config.refused_trials, f"{folder}")
     require_enough(gathered, session.trials)

@@ -24,7 +24,7 @@ from trunkline.model.arm.joints import JenkinsElement
 from trunkline.model.arm.uniform import Uniform
 from trunkline.pipeline.config import load_config
 from trunkline.recordings.filtering.filter import filter_raw_trial
-from trunkline.recordings.trials.raw_trial import RawTrial, read_takes
+from trunkline.recordings.trials.raw_trial import RawTrial, read_raw_trials
 from trunkline.recordings.trials.splits import DECIDING, IDENTIFY, VALIDATE
 from upkeep.results import recorded
 
@@ -78,11 +78,11 @@ def cases() -> dict[str, Case]:
     }
 
 
-def error(case: Case, takes: list[RawTrial]) -> tuple[float, float, float, float]:
+def error(case: Case, raw_trials: list[RawTrial]) -> tuple[float, float, float, float]:
     """Mean position error on the identify and on the validate releases, mm, and of the latter also the tip error, mm
     and % of the arm's length."""
     chosen = replace(load_config(filter.Config, "filter", EXAMPLE), **case.filtered)
-    trials = [filter_raw_trial(as_stamped(take) if case.as_stamped else take, chosen)[0] for take in takes]
+    trials = [filter_raw_trial(as_stamped(raw) if case.as_stamped else raw, chosen)[0] for raw in raw_trials]
     config = load_config(identify_stiffness.Config, "identify_stiffness", EXAMPLE)
     config = replace(config, parameters=config.parameters | case.parameters, **case.settings)
     model, experiments, fit = set_up(config, trials, arm(case))
@@ -109,18 +109,18 @@ def arm(case: Case) -> mujoco.MjModel:
     return model
 
 
-def as_stamped(take: RawTrial) -> RawTrial:
-    """A take without the time of its lost frames."""
-    return replace(take, time=np.arange(len(take.time)) * np.median(np.diff(take.time)))
+def as_stamped(raw: RawTrial) -> RawTrial:
+    """A raw trial without the time of its lost frames."""
+    return replace(raw, time=np.arange(len(raw.time)) * np.median(np.diff(raw.time)))
 
 
 @in_one_line
 @recorded("real_arm")
 def main() -> int:
-    takes = read_takes(EXAMPLE / "data/processed/ingest", DECIDING)
+    raw_trials = read_raw_trials(EXAMPLE / "data/processed/ingest", DECIDING)
     print(f"{'':45}  identify  validate: mean position error, tip error, and that of the length")
     for name, case in cases().items():
-        identify_mm, validate_mm, tip_mm, share = error(case, takes)
+        identify_mm, validate_mm, tip_mm, share = error(case, raw_trials)
         print(f"{name:45}  {identify_mm:5.2f} mm  {validate_mm:5.2f} mm  {tip_mm:5.2f} mm  {share:.2f} %", flush=True)
     return 0
 

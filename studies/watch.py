@@ -40,7 +40,7 @@ from trunkline.recordings.trials.splits import DECIDING
 from trunkline.recordings.trials.trial import read_trials
 from trunkline.tools.monitor.attribution import attribute_change
 from trunkline.tools.monitor.baseline import Baseline
-from trunkline.tools.monitor.chart import Chart, chart_of
+from trunkline.tools.monitor.control_chart import Chart, chart_of
 from trunkline.tools.monitor.history import read_score, score_row
 from trunkline.tools.monitor.loading import load_logs
 from trunkline.tools.monitor.monitor import LEARN, scorer_of

@@ -37,10 +37,10 @@ def test_the_public_csv_becomes_a_session_that_ingest_reads(public, tmp_path):
     session = read_session(folder)
     assert [trial.split for trial in session.trials] == ["identify", "identify", "test"] * 3 + ["validate"] * 4
     positions = read_releases(public)
-    for number, (_, take, findings) in enumerate(load_raw_trials(folder, session, LIMITS)):
-        assert (take.markers, take.tendons, take.quaternions) == (("1", "2", "3"), (), None)
-        np.testing.assert_array_equal(take.positions, positions[number][: len(take.time)])  # to the last bit
-        np.testing.assert_allclose(np.diff(take.time), 0.01)
+    for number, (_, raw, findings) in enumerate(load_raw_trials(folder, session, LIMITS)):
+        assert (raw.markers, raw.tendons, raw.quaternions) == (("1", "2", "3"), (), None)
+        np.testing.assert_array_equal(raw.positions, positions[number][: len(raw.time)])  # to the last bit
+        np.testing.assert_allclose(np.diff(raw.time), 0.01)
         assert not findings.repairs
 
 
@@ -59,8 +59,8 @@ def test_releases_with_another_load_are_a_session_of_their_own(public, tmp_path)
     assert (session.frame, session.base) == (first.frame, first.base)
     assert {(trial.experiment, trial.split, trial.load) for trial in session.trials} == {("release", "test", 0.1)}
     positions = read_releases(public)
-    for number, (_, take, _) in enumerate(load_raw_trials(folder, session, LIMITS)):
-        np.testing.assert_array_equal(take.positions, positions[number][: len(take.time)])
+    for number, (_, raw, _) in enumerate(load_raw_trials(folder, session, LIMITS)):
+        np.testing.assert_array_equal(raw.positions, positions[number][: len(raw.time)])
 
 
 @pytest.mark.parametrize(
@@ -100,8 +100,8 @@ def test_the_csv_gives_the_very_logs_that_are_shared(recorded, tmp_path):
     lines = [",".join(COLUMNS)]
     for number, log in enumerate(sorted(recorded.glob("*.mcap"))):
         session.trials = [type(session.trials[0])(file=log.name, experiment="release", split="identify")]
-        [(_, take, _)] = load_raw_trials(recorded, session, LIMITS)
-        lines += [",".join([str(number), *map(repr, frame)]) for frame in take.positions.reshape(-1, 9).tolist()]
+        [(_, raw, _)] = load_raw_trials(recorded, session, LIMITS)
+        lines += [",".join([str(number), *map(repr, frame)]) for frame in raw.positions.reshape(-1, 9).tolist()]
     (tmp_path / "public.csv").write_text("\n".join(lines) + "\n")
     make_session(tmp_path / "public.csv", tmp_path / "session")
     for log in recorded.glob("*.mcap"):
@@ -111,7 +111,7 @@ def test_the_csv_gives_the_very_logs_that_are_shared(recorded, tmp_path):
 @with_recordings
 def test_frames_that_the_recorder_lost_are_found_in_two_logs_of_thirteen(recorded):
     repairs = {
-        take.name: findings.repairs for _, take, findings in load_raw_trials(recorded, read_session(recorded), LIMITS)
+        raw.name: findings.repairs for _, raw, findings in load_raw_trials(recorded, read_session(recorded), LIMITS)
     }
     assert len(repairs) == 13
     repaired = {name: lines for name, lines in repairs.items() if lines}

@@ -45,10 +45,10 @@ def test_the_public_csvs_become_a_session_of_settled_poses(public, tmp_path):
     assert make_session(public, folder) == 9
     session = read_session(folder)
     assert [trial.split for trial in session.trials] == ["identify"] * 5 + ["validate", "identify"] + ["test"] * 2
-    for _, take, findings in load_raw_trials(folder, session, LIMITS):
-        assert not isinstance(take, InputError), take
+    for _, raw, findings in load_raw_trials(folder, session, LIMITS):
+        assert not isinstance(raw, InputError), raw
         assert not findings.repairs
-        trial, _ = filter_raw_trial(take, FILTER)
+        trial, _ = filter_raw_trial(raw, FILTER)
         share = np.linspace(0, 1, 6)
         np.testing.assert_allclose(trial.positions[:, 0], 1e-3 * np.outer(share, [5, 7, 1]) - [0, 0, 0.188], atol=1e-12)
         np.testing.assert_allclose(trial.commands, 1e-3 * np.outer(share, range(1, 10)), atol=1e-12)

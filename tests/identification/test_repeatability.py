@@ -133,7 +133,7 @@ def test_a_real_hose_comes_to_rest_elsewhere_each_time(tmp_path):
     (tmp_path / "session.yaml").write_text((ROOT / "examples/asl_trunk/session.yaml").read_text())
     limits, settings = settings_of("ingest", ROOT).limits, settings_of("filter", ROOT / "examples/asl_trunk")
     trials = [
-        filter_raw_trial(take, settings)[0] for _, take, _ in load_raw_trials(tmp_path, read_session(tmp_path), limits)
+        filter_raw_trial(raw, settings)[0] for _, raw, _ in load_raw_trials(tmp_path, read_session(tmp_path), limits)
     ]
     table = repeatability(trials, tip=2)["release"]
     assert table["trials"] == 13

@@ -21,7 +21,7 @@ from trunkline.pipeline.identify import run
 from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.filtering.filter import Filter
 from trunkline.recordings.session.session import read_session
-from trunkline.recordings.trials.raw_trial import write_takes
+from trunkline.recordings.trials.raw_trial import write_raw_trials
 from trunkline.recordings.trials.splits import DECIDING, IDENTIFY, SPLITS, TEST, VALIDATE
 from trunkline.recordings.trials.trial import Trial, read_trials, write_trials
 
@@ -78,7 +78,7 @@ def test_whoever_reads_trials_says_which_and_of_the_stages_only_score_says_test(
         (name, ast.unparse(node.args[1]))
         for name, tree in files().items()
         for node in ast.walk(tree)
-        if isinstance(node, ast.Call) and ast.unparse(node.func) in ("read_trials", "read_takes")
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in ("read_trials", "read_raw_trials")
     ]
     assert {(name, splits) for name, splits in calls if splits != "DECIDING"} == {
         ("stages/filter.py", "SPLITS"),
@@ -156,15 +156,15 @@ def test_poison_in_the_split_test_moves_no_bit_of_the_other_filtered_trials(tmp_
     config = load_config(Filter, "filter", ROOT)
     record(tmp_path / "raw", [*all_truths(), replace(static_truth(30.0), split=TEST)], instruments())
     limits = load_config(__import__("stages.ingest").ingest.Config, "ingest", ROOT).limits
-    takes = [take for _, take, _ in load_raw_trials(tmp_path / "raw", read_session(tmp_path / "raw"), limits)]
+    raw_trials = [raw for _, raw, _ in load_raw_trials(tmp_path / "raw", read_session(tmp_path / "raw"), limits)]
     results = []
     for shift in (0.0, 1e3):
         moved = [
-            replace(take, positions=take.positions * (1 + shift) + shift) if take.split == TEST else take
-            for take in takes
+            replace(raw, positions=raw.positions * (1 + shift) + shift) if raw.split == TEST else raw
+            for raw in raw_trials
         ]
         filter_stage.INGEST.mkdir(parents=True, exist_ok=True)
-        write_takes(filter_stage.INGEST, moved)
+        write_raw_trials(filter_stage.INGEST, moved)
         filter_stage.main(config)
         results.append(read_trials(filter_stage.PROCESSED, DECIDING))
     assert len(results[0]) == 4

@@ -13,7 +13,7 @@ from tests.support.sessions import MARKERS
 from tests.support.workbench import workbench
 from trunkline.pipeline.stage import run_stage
 from trunkline.recordings.logs.definitions import RIGID_BODIES
-from trunkline.recordings.trials.raw_trial import read_takes
+from trunkline.recordings.trials.raw_trial import read_raw_trials
 from trunkline.recordings.trials.splits import SPLITS
 
 
@@ -45,9 +45,9 @@ def test_takes_report_and_metrics(project, capsys):
     assert [line.split(":")[1].strip() for line in warnings] == ["splits", "experiments", "splits", "splits"]
     assert warnings[0].startswith("all trials: splits: no trial of the split test")
     assert warnings[1].startswith("all trials: experiments: no static_pull, motion in the session")
-    takes = read_takes(ingest.PROCESSED, SPLITS)
-    assert [take.name for take in takes] == ["tilt_00", "tilt_60", "release_a", "curl_40"]
-    assert {take.markers for take in takes} == {MARKERS}
+    raw_trials = read_raw_trials(ingest.PROCESSED, SPLITS)
+    assert [raw.name for raw in raw_trials] == ["tilt_00", "tilt_60", "release_a", "curl_40"]
+    assert {raw.markers for raw in raw_trials} == {MARKERS}
     metrics = json.loads((ingest.ARTIFACTS / "metrics.json").read_text())
     assert metrics["trials"] == 4
     assert metrics["refused"] == 0
@@ -238,7 +238,7 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(project, capsys, monkeypatch
     def full(*arguments):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(ingest, "write_takes", full)
+    monkeypatch.setattr(ingest, "write_raw_trials", full)
     code, stderr = run(capsys)
     assert (code, stderr) == (1, "error: [Errno 28] No space left on device\n")
     assert not any(path for folder in (project / "artifacts", project / "data/processed") for path in folder.iterdir())

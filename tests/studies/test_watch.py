@@ -5,7 +5,7 @@ import numpy as np
 from studies.watch import AFTER, LATEST, found_lines, packed, unpacked
 from tests.tools.monitor.scores import drawn
 from trunkline.tools.monitor.baseline import Baseline
-from trunkline.tools.monitor.chart import chart_of
+from trunkline.tools.monitor.control_chart import chart_of
 
 
 def test_a_kept_score_is_the_one_that_was_scored():

@@ -31,8 +31,8 @@ def silent(m):
 
 
 def clock_of(taken):
-    take, findings = taken
-    return align_clocks([take], [findings], LONGEST), take, findings
+    raw, findings = taken
+    return align_clocks([raw], [findings], LONGEST), raw, findings
 
 
 @pytest.mark.parametrize("clock", ["frame", "stamp"])
@@ -40,18 +40,18 @@ def test_an_arm_that_lags_does_not_move_the_offset(tmp_path, clock):
     one_trial(tmp_path, lambda m: None, lagging())
     if clock != "frame":
         edit_session(tmp_path, "clock: frame", f"clock: {clock}")
-    result, take, findings = clock_of(taken(tmp_path)[0])
+    result, raw, findings = clock_of(taken(tmp_path)[0])
     assert result.by == "log times"
     assert abs(result.offset + 0.137) < result.uncertainty < 5e-3
-    assert take.clock_offset == result.offset
+    assert raw.clock_offset == result.offset
     assert result.lag == pytest.approx(0.02, abs=4e-3)
     assert findings.warnings == []
 
 
 def test_motion_decides_where_log_times_were_copied_and_its_lag_is_named(tmp_path):
-    result, take, findings = clock_of(one_trial(tmp_path, copied, lagging()))
+    result, raw, findings = clock_of(one_trial(tmp_path, copied, lagging()))
     assert (result.by, result.uncertainty, result.lag) == ("motion", None, None)
-    assert take.clock_offset == result.offset == pytest.approx(-0.137 + 0.02, abs=4e-3)
+    assert raw.clock_offset == result.offset == pytest.approx(-0.137 + 0.02, abs=4e-3)
     (warning,) = findings.warnings
     assert "is by the arm's motion, and its lag is in it; log times tell nothing" in warning
 
@@ -74,14 +74,14 @@ def test_motors_that_the_recorder_dates_need_no_motion(tmp_path):
     def unstamped(m):
         m.command_stamps[:] = m.tendon_stamps[:] = 0
 
-    result, take, _ = clock_of(one_trial(tmp_path, unstamped, lagging(0.0)))
+    result, raw, _ = clock_of(one_trial(tmp_path, unstamped, lagging(0.0)))
     assert result.by == "log times"
-    truth = np.interp(take.tendon_time + result.offset - 0.3, [0, 0.9, 1.8], [0, 1, 0])
-    assert np.corrcoef(truth, take.tendon_positions[:, 0])[0, 1] > 0.9
+    truth = np.interp(raw.tendon_time + result.offset - 0.3, [0, 0.9, 1.8], [0, 1, 0])
+    assert np.corrcoef(truth, raw.tendon_positions[:, 0])[0, 1] > 0.9
     assert result.lag == pytest.approx(0.0, abs=5e-3), "within the delays of messages"
     edit_session(tmp_path, "clock: frame", "clock: log")
-    result, take, _ = clock_of(taken(tmp_path)[0])
-    assert (result.by, result.offset, take.clock_offset) == ("log times", 0.0, 0.0)
+    result, raw, _ = clock_of(taken(tmp_path)[0])
+    assert (result.by, result.offset, raw.clock_offset) == ("log times", 0.0, 0.0)
     assert 1e-3 < result.uncertainty < 6e-3
 
 
@@ -96,8 +96,8 @@ def test_a_trial_without_motion_tells_too_and_one_without_motors_has_nothing_to_
 
 def session(tmp_path, *rows):
     """Takes a, b, … with their findings, of (split, offset by log times, offset by motion)."""
-    take, _ = one_trial(tmp_path, lambda m: None, curl_truth())
-    takes = [replace(take, name="abcdefgh"[i], split=split) for i, (split, *_) in enumerate(rows)]
+    raw, _ = one_trial(tmp_path, lambda m: None, curl_truth())
+    raw_trials = [replace(raw, name="abcdefgh"[i], split=split) for i, (split, *_) in enumerate(rows)]
     findings = [
         Findings(
             by_log_times=None if logged is None else LoggedOffset(logged, 2e-3),
@@ -105,7 +105,8 @@ def session(tmp_path, *rows):
         )
         for _, logged, moved in rows
     ]
-    return align_clocks(takes, findings, LONGEST), [t.clock_offset for t in takes], [f.warnings for f in findings]
+    clock = align_clocks(raw_trials, findings, LONGEST)
+    return clock, [raw.clock_offset for raw in raw_trials], [f.warnings for f in findings]
 
 
 def test_only_takes_for_identification_agree_on_the_clock(tmp_path):
@@ -134,8 +135,8 @@ def test_clocks_that_drift_are_followed_and_trials_that_disagree_are_named(tmp_p
 
 
 def test_an_uncertain_fit_of_the_motion_has_no_say(tmp_path):
-    take, findings = one_trial(tmp_path, copied, curl_truth(split="identify"))
+    raw, findings = one_trial(tmp_path, copied, curl_truth(split="identify"))
     findings.by_motion = OffsetFit(-0.7, 0.9)
-    clock = align_clocks([take], [findings], LONGEST)
-    assert (clock.by, clock.offset, take.clock_offset) == (None, 0.0, 0.0)
+    clock = align_clocks([raw], [findings], LONGEST)
+    assert (clock.by, clock.offset, raw.clock_offset) == (None, 0.0, 0.0)
     assert findings.warnings == ["clock: neither log times nor motion tell the motors' offset; it is taken for 0"]

@@ -1,4 +1,4 @@
-"""What a session's logs become: good takes, repairs that are said, refusals that name the culprit."""
+"""What a session's logs become: good raw trials, repairs that are said, refusals that name the culprit."""
 
 import re
 from dataclasses import replace
@@ -23,12 +23,12 @@ REAL = SHARED / "asl_trunk"
 
 
 def taken(folder):
-    """[(take or error, findings)] of the session in `folder`."""
-    return [(take, findings) for _, take, findings in load_raw_trials(folder, read_session(folder), LIMITS)]
+    """[(raw trial or error, findings)] of the session in `folder`."""
+    return [(raw, findings) for _, raw, findings in load_raw_trials(folder, read_session(folder), LIMITS)]
 
 
 def one_trial(folder, change, truth=None):
-    """The take, or error, of a session of one trial whose measurement went through `change`."""
+    """The raw trial, or error, of a session of one trial whose measurement went through `change`."""
     m = measure(
         truth or release_truth(),
         instruments(occlusions_per_s=0, outliers=0),
@@ -37,8 +37,8 @@ def one_trial(folder, change, truth=None):
     m = change(m) or m
     write_log(folder / f"{m.name}.mcap", m)
     write_session(folder, [m], instruments())
-    ((take, findings),) = taken(folder)
-    return take, findings
+    ((raw, findings),) = taken(folder)
+    return raw, findings
 
 
 def edit_session(folder, old, new):
@@ -58,38 +58,38 @@ def refused(result, message):
 
 def test_takes_carry_what_was_measured(tmp_path):
     (m,) = record(tmp_path, [curl_truth()], instruments())
-    ((take, findings),) = taken(tmp_path)
-    assert take.markers == MARKERS
+    ((raw, findings),) = taken(tmp_path)
+    assert raw.markers == MARKERS
     assert findings.repairs == []
-    np.testing.assert_array_equal(take.positions, m.positions[:, 1:])
-    np.testing.assert_array_equal(take.base_positions, m.positions[:, 0])
+    np.testing.assert_array_equal(raw.positions, m.positions[:, 1:])
+    np.testing.assert_array_equal(raw.base_positions, m.positions[:, 0])
     np.testing.assert_allclose(
-        np.abs(np.nansum(take.quaternions * m.quaternions[:, 1:], axis=-1)).max(), 1
+        np.abs(np.nansum(raw.quaternions * m.quaternions[:, 1:], axis=-1)).max(), 1
     )
-    np.testing.assert_allclose(take.time, (m.frames - m.frames[0]) / 120, atol=2e-3)
-    assert np.abs(np.diff(take.time) * 120 - np.diff(m.frames)).max() < 1e-2, (
+    np.testing.assert_allclose(raw.time, (m.frames - m.frames[0]) / 120, atol=2e-3)
+    assert np.abs(np.diff(raw.time) * 120 - np.diff(m.frames)).max() < 1e-2, (
         "the frame clock has no jitter"
     )
-    np.testing.assert_array_equal(take.commands, m.commands[: len(take.commands)])
-    assert align_clocks([take], [findings], 0.1).by == "log times"
-    assert take.clock_offset == pytest.approx(-0.137, abs=0.5e-3)
+    np.testing.assert_array_equal(raw.commands, m.commands[: len(raw.commands)])
+    assert align_clocks([raw], [findings], 0.1).by == "log times"
+    assert raw.clock_offset == pytest.approx(-0.137, abs=0.5e-3)
 
 
 def test_stamp_and_log_clocks(tmp_path):
     (m,) = record(tmp_path, [release_truth()], instruments())
     edit_session(tmp_path, "clock: frame", "clock: stamp")
-    ((take, _),) = taken(tmp_path)
-    np.testing.assert_allclose(take.time, np.sort(m.stamps - m.stamps.min()) * 1e-9, atol=1e-9)
+    ((raw, _),) = taken(tmp_path)
+    np.testing.assert_allclose(raw.time, np.sort(m.stamps - m.stamps.min()) * 1e-9, atol=1e-9)
     edit_session(tmp_path, "clock: stamp", "clock: log")
-    ((take, _),) = taken(tmp_path)
-    np.testing.assert_allclose(take.time[[0, -1]], (m.logged[[0, -1]] - m.logged[0]) * 1e-9, atol=1e-9)
+    ((raw, _),) = taken(tmp_path)
+    np.testing.assert_allclose(raw.time[[0, -1]], (m.logged[[0, -1]] - m.logged[0]) * 1e-9, atol=1e-9)
 
 
 def test_markers_by_the_name_of_the_release_before(tmp_path, capsys):
     record(tmp_path, [release_truth()], instruments())
     edit_session(tmp_path, "base: base", "base: base\nsegments: {unit_08: tip}")
-    ((take, _),) = taken(tmp_path)
-    assert take.markers == ("tip",)
+    ((raw, _),) = taken(tmp_path)
+    assert raw.markers == ("tip",)
     assert capsys.readouterr().out.startswith(f"{tmp_path / 'session.yaml'}: `segments` is called `markers` now: ")
     edit_session(tmp_path, "base: base", "base: base\nmarkers: {unit_08: tip}")
     with pytest.raises(InputError, match="found `segments` beside `markers`, its new name, expected `markers` alone"):
@@ -100,10 +100,10 @@ def test_window_and_names_from_the_session(tmp_path):
     record(tmp_path, [release_truth()], instruments())
     edit_session(tmp_path, "split: identify", "split: identify, window: [0.5, 1.5]")
     edit_session(tmp_path, "base: base", "base: base\nmarkers: {unit_08: tip, unit_02: root}")
-    ((take, _),) = taken(tmp_path)
-    assert take.markers == ("tip", "root")
-    assert take.time[0] == 0
-    assert take.time[-1] == pytest.approx(1.0, abs=0.02)
+    ((raw, _),) = taken(tmp_path)
+    assert raw.markers == ("tip", "root")
+    assert raw.time[0] == 0
+    assert raw.time[-1] == pytest.approx(1.0, abs=0.02)
     edit_session(tmp_path, "[0.5, 1.5]", "[50, 60]")
     refused(taken(tmp_path)[0], r"window \[50.0, 60.0\] s holds no pose, the log has 2.\d+ s")
 
@@ -115,13 +115,13 @@ def test_bad_quaternions_and_positions_are_dropped_and_counted(tmp_path):
         m.quaternions[40, 1] *= 1.5
         m.positions[50:52, 4, 1] = np.inf
 
-    take, findings = one_trial(tmp_path, spoil)
+    raw, findings = one_trial(tmp_path, spoil)
     assert findings.repairs == [
         "16 samples with a NaN, zero or unnormalised quaternion dropped (unit_02, unit_04, unit_06)",
         "2 samples with a position that is not finite dropped (unit_08)",
     ]
-    assert np.isnan(take.positions[10:15, 1]).all()
-    assert np.isfinite(take.positions).all(axis=-1).sum() == take.positions[..., 0].size - 18
+    assert np.isnan(raw.positions[10:15, 1]).all()
+    assert np.isfinite(raw.positions).all(axis=-1).sum() == raw.positions[..., 0].size - 18
 
 
 def test_nothing_but_bad_quaternions_is_refused(tmp_path):
@@ -186,9 +186,9 @@ def test_topics_are_found_by_schema_and_name(tmp_path):
     (tmp_path / "session.yaml").write_text(
         "".join(line for line in text if not line.startswith("topics"))
     )
-    ((take, _),) = taken(tmp_path)
-    assert len(take.command_time) > 100
-    assert len(take.tendon_time) > 400
+    ((raw, _),) = taken(tmp_path)
+    assert len(raw.command_time) > 100
+    assert len(raw.tendon_time) > 400
 
 
 @pytest.mark.parametrize("clock", ["stamp", "frame"])
@@ -218,12 +218,12 @@ def test_frames_slightly_out_of_order_are_sorted_and_said(tmp_path):
 
     one_trial(tmp_path, swap)
     edit_session(tmp_path, "clock: frame", "clock: stamp")
-    take, findings = taken(tmp_path)[0]
+    raw, findings = taken(tmp_path)[0]
     assert findings.repairs == [
         "1 frames out of order sorted by their stamps",
         "1 frames with a stamp that was there already dropped",
     ]
-    assert np.all(np.diff(take.time) > 0)
+    assert np.all(np.diff(raw.time) > 0)
 
 
 def test_truncated_log_is_salvaged_with_the_loss_stated(tmp_path):
@@ -232,9 +232,9 @@ def test_truncated_log_is_salvaged_with_the_loss_stated(tmp_path):
     data = log.read_bytes()
     ((whole, _),) = taken(tmp_path)
     log.write_bytes(data[: len(data) * 3 // 4])
-    take, findings = taken(tmp_path)[0]
-    assert 60 < len(take.time) < len(whole.time)
-    np.testing.assert_array_equal(take.positions, whole.positions[: len(take.time)])
+    raw, findings = taken(tmp_path)[0]
+    assert 60 < len(raw.time) < len(whole.time)
+    np.testing.assert_array_equal(raw.positions, whole.positions[: len(raw.time)])
     assert findings.repairs[0].startswith(f"log: cut off at byte {len(data) * 3 // 4}")
     log.write_bytes(data[: len(data) // 20])
     refused(taken(tmp_path)[0], r"(damaged: cut off at byte|no pose topic.*damaged: cut off)")
@@ -258,11 +258,11 @@ def test_real_recordings_without_orientations_or_base_body(tmp_path):
     lines = "".join(f"  - {{file: {name}, experiment: release, split: identify}}\n" for name in names)
     head = "frame: {up: [0, 1, 0]}\nbase: {position: [0.1015, 0.0, 0.105]}\n"
     (tmp_path / "session.yaml").write_text(head + "trials:\n" + lines)
-    takes = [take for take, _ in taken(tmp_path)]
-    assert len(takes) == 13
-    for take in takes:
-        assert take.markers == ("1", "2", "3")
-        trial, _ = filter_raw_trial(take, FILTER)
+    raw_trials = [raw for raw, _ in taken(tmp_path)]
+    assert len(raw_trials) == 13
+    for raw in raw_trials:
+        assert raw.markers == ("1", "2", "3")
+        trial, _ = filter_raw_trial(raw, FILTER)
         assert trial.quaternions is None
         np.testing.assert_allclose(trial.gravity, [0, 0, -9.80665], atol=1e-9)
         rest = trial.positions[-1] - [[0, 0, -0.106], [0, 0, -0.203], [0, 0, -0.322]]

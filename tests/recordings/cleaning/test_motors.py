@@ -41,8 +41,8 @@ def test_curl_without_any_tendon_is_refused(tmp_path):
     curl(tmp_path, silence_both)
     edit_session(tmp_path, ", commands: /tendon_commands, tendon_positions: /tendon_states", "")
     refused_curl(tmp_path, "found no command topic and no tendon position topic among: none .*, expected commands")
-    take, _ = curl(tmp_path, silence)
-    assert isinstance(take, InputError), "session.yaml names a command topic that no log has"
+    raw, _ = curl(tmp_path, silence)
+    assert isinstance(raw, InputError), "session.yaml names a command topic that no log has"
     edit_session(tmp_path, "commands: /tendon_commands, ", "")
     assert len(taken(tmp_path)[0][0].tendon_time) > 400, "tendon positions alone will do"
 
@@ -69,9 +69,9 @@ def test_motors_without_stamps_are_dated_by_the_recorder(tmp_path, clock):
 
     curl(tmp_path, zero)
     edit_session(tmp_path, "clock: frame", f"clock: {clock}")
-    take, findings = taken(tmp_path)[0]
-    assert len(take.command_time) > 100
-    assert len(take.tendon_time) > 400
+    raw, findings = taken(tmp_path)[0]
+    assert len(raw.command_time) > 100
+    assert len(raw.tendon_time) > 400
     repairs = [repair for repair in findings.repairs if "dated by the recorder's clock" in repair]
     assert len(repairs) == (0 if clock == "log" else 2)
 
@@ -85,10 +85,10 @@ def test_tendons_take_the_names_of_the_session(tmp_path):
     edit_session(
         tmp_path, "base: base", "base: base\ntendons: {motor_3: tendon_3, motor_1: tendon_1, motor_2: tendon_2}"
     )
-    take, _ = taken(tmp_path)[0]
-    assert take.tendons == ("tendon_3", "tendon_1", "tendon_2")
-    np.testing.assert_array_equal(take.commands, plain.commands[:, [2, 0, 1]])
-    np.testing.assert_array_equal(take.tendon_positions, plain.tendon_positions[:, [2, 0, 1]])
+    raw, _ = taken(tmp_path)[0]
+    assert raw.tendons == ("tendon_3", "tendon_1", "tendon_2")
+    np.testing.assert_array_equal(raw.commands, plain.commands[:, [2, 0, 1]])
+    np.testing.assert_array_equal(raw.tendon_positions, plain.tendon_positions[:, [2, 0, 1]])
     edit_session(tmp_path, "motor_3:", "motor_4:")
     edit_session(tmp_path, "tendon_3", "tendon_4")
     refused_curl(tmp_path, "command topic: found motor_1, motor_2, motor_3, expected 'motor_4' as in session.yaml")
@@ -101,11 +101,11 @@ def test_a_motor_may_wind_several_tendons_by_degrees_of_its_drum(tmp_path):
     edit_session(
         tmp_path, "base: base", f"base: base\nmotors: {{m2: {{unit: mm, tendons: {{tendon_3: 0.5}}}}, {pair}}}"
     )
-    take, _ = taken(tmp_path)[0]
+    raw, _ = taken(tmp_path)[0]
     turned = np.pi / 180 * 0.02 * plain.commands[:, 0]
-    assert take.tendons == ("tendon_3", "tendon_1", "tendon_2")
+    assert raw.tendons == ("tendon_3", "tendon_1", "tendon_2")
     np.testing.assert_allclose(
-        take.commands, np.stack([5e-4 * plain.commands[:, 1], turned, -turned], axis=1), atol=1e-15
+        raw.commands, np.stack([5e-4 * plain.commands[:, 1], turned, -turned], axis=1), atol=1e-15
     )
     edit_session(tmp_path, "m2:", "m4:")
     refused_curl(tmp_path, "command topic: found m1, m2, m3, expected 'm4' as in session.yaml")

@@ -13,7 +13,7 @@ from tests.support.workbench import ROOT, workbench
 from trunkline.errors import InputError
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.settings import require_session
-from trunkline.recordings.trials.raw_trial import read_takes
+from trunkline.recordings.trials.raw_trial import read_raw_trials
 from trunkline.recordings.trials.splits import SPLITS
 from trunkline.recordings.trials.trial import read_trials
 from trunkline.tools.evaluate.session import trials_of
@@ -45,30 +45,30 @@ def run_ingest(root) -> None:
 def test_each_session_has_its_names_and_its_clock(two):
     require_session(two)
     run_ingest(two)
-    takes = read_takes(two / "data/processed/ingest", SPLITS)
-    assert [take.name for take in takes[:4]] == [f"monday/{truth.name}" for truth in all_truths()]
-    assert len({take.name for take in takes}) == 2 * len(all_truths())
-    for take in takes:
-        assert take.clock_offset == pytest.approx(-CLOCKS[take.session], abs=0.01)
+    raw_trials = read_raw_trials(two / "data/processed/ingest", SPLITS)
+    assert [raw.name for raw in raw_trials[:4]] == [f"monday/{truth.name}" for truth in all_truths()]
+    assert len({raw.name for raw in raw_trials}) == 2 * len(all_truths())
+    for raw in raw_trials:
+        assert raw.clock_offset == pytest.approx(-CLOCKS[raw.session], abs=0.01)
     quality = json.loads((two / "artifacts/ingest/quality.json").read_text())
-    assert len(quality["logs"]) == len(takes)
+    assert len(quality["logs"]) == len(raw_trials)
     assert set(quality["clocks"]) == set(CLOCKS)
     filtering.main(load_config(filtering.Config, "filter", two))
     trials = read_trials(two / "data/processed/filter", SPLITS)
-    assert [trial.session for trial in trials] == [take.session for take in takes]
+    assert [trial.session for trial in trials] == [raw.session for raw in raw_trials]
     checked = {trial.name: trial.positions.tobytes() for trial in trials_of(two / "data/raw/arm_7", two, "evaluate")}
     assert checked == {trial.name: trial.positions.tobytes() for trial in trials}  # as `check` and `evaluate` read them
 
 
 def test_without_only_all_sessions_of_the_folder_are_read_by_name(two):
     run_ingest(two)
-    listed = {take.name: take.clock_offset for take in read_takes(two / "data/processed/ingest", SPLITS)}
+    listed = {raw.name: raw.clock_offset for raw in read_raw_trials(two / "data/processed/ingest", SPLITS)}
     set_session(two, "session: arm_7")
     require_session(two)
     run_ingest(two)
-    takes = read_takes(two / "data/processed/ingest", SPLITS)
-    assert {take.name: take.clock_offset for take in takes} == listed
-    assert takes[0].session == "friday"
+    raw_trials = read_raw_trials(two / "data/processed/ingest", SPLITS)
+    assert {raw.name: raw.clock_offset for raw in raw_trials} == listed
+    assert raw_trials[0].session == "friday"
 
 
 def test_one_of_several_sessions_by_itself_is_as_if_it_were_alone(two):
@@ -78,7 +78,7 @@ def test_one_of_several_sessions_by_itself_is_as_if_it_were_alone(two):
         set_session(two, lines)
         run_ingest(two)
         files[lines] = {f.name: f.read_bytes() for f in (two / "data/processed/ingest").iterdir()}
-        assert not any(take.session for take in read_takes(two / "data/processed/ingest", SPLITS))
+        assert not any(raw.session for raw in read_raw_trials(two / "data/processed/ingest", SPLITS))
     first, second = files.values()
     assert first == second
 

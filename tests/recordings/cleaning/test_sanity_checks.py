@@ -65,24 +65,25 @@ def sound(folder):
 
 def judged(sound, base="base", **changed):
     """(what is said of each trial, of the session) after `changed` takes, by trial."""
-    takes = [changed.get(name, take) for name, (_, take, _) in sound.items()]
-    findings = [Findings() for _ in takes]
-    session = check_sanity(takes, findings, base, PLAUSIBLE)
-    return {take.name: remarks.faults for take, remarks in zip(takes, findings, strict=True) if remarks.faults}, session
+    raw_trials = [changed.get(name, raw) for name, (_, raw, _) in sound.items()]
+    findings = [Findings() for _ in raw_trials]
+    session = check_sanity(raw_trials, findings, base, PLAUSIBLE)
+    faults = {raw.name: f.faults for raw, f in zip(raw_trials, findings, strict=True) if f.faults}
+    return faults, session
 
 
-def take_of(sound, name):
+def raw_trial_of(sound, name):
     return sound[name][1]
 
 
 def every(sound, change):
-    return {name: change(take) for name, (_, take, _) in sound.items()}
+    return {name: change(raw) for name, (_, raw, _) in sound.items()}
 
 
-def moved(take, body, offset):
-    positions = take.positions.copy()
+def moved(raw, body, offset):
+    positions = raw.positions.copy()
     positions[:, body] += offset
-    return replace(take, positions=positions)
+    return replace(raw, positions=positions)
 
 
 def test_a_sound_session_has_no_fault_and_no_warning(folder, sound):
@@ -101,7 +102,7 @@ def test_real_recordings_have_no_fault(tmp_path):
     (tmp_path / "session.yaml").write_text("\n".join(head + lines) + "\n")
     session = read_session(tmp_path)
     gathered = check_session(load_raw_trials(tmp_path, session, LIMITS), session, PLAUSIBLE, "stop", "real")
-    assert len(gathered.takes) == 13
+    assert len(gathered.raw_trials) == 13
     for remarks in gathered.findings:
         no_validate, no_test, no_others = remarks.warnings
         assert no_validate == "splits: no trial of the split validate: no error is of trials that were not fitted"
@@ -112,7 +113,7 @@ def test_real_recordings_have_no_fault(tmp_path):
 @pytest.mark.parametrize("name", ["tilt_30", "release_a", "release_b", "curl_60"])
 @pytest.mark.parametrize("body", range(4))
 def test_a_body_that_is_off_is_named(sound, name, body):
-    trials, session = judged(sound, **{name: moved(take_of(sound, name), body, [0.0, 0.3, 0.4])})
+    trials, session = judged(sound, **{name: moved(raw_trial_of(sound, name), body, [0.0, 0.3, 0.4])})
     assert list(trials) == [name]
     (fault,) = [fault for fault in trials[name] if "expected neighbours at distances" in fault]
     assert fault.startswith(f"{MARKERS[body]!r} is ")
@@ -120,14 +121,14 @@ def test_a_body_that_is_off_is_named(sound, name, body):
 
 
 def test_a_body_that_is_off_by_little_is_left(sound):
-    assert judged(sound, release_a=moved(take_of(sound, "release_a"), 2, [0.0, 0.01, 0.0])) == ({}, [])
+    assert judged(sound, release_a=moved(raw_trial_of(sound, "release_a"), 2, [0.0, 0.01, 0.0])) == ({}, [])
 
 
 def test_a_body_that_stands_still_beside_the_arm_is_named(sound):
-    def stands(take):
-        positions = take.positions.copy()
-        positions[:, 2] = take.base_positions + [0.0, -0.25, 0.0]
-        return replace(take, positions=positions)
+    def stands(raw):
+        positions = raw.positions.copy()
+        positions[:, 2] = raw.base_positions + [0.0, -0.25, 0.0]
+        return replace(raw, positions=positions)
 
     _, session = judged(sound, **every(sound, stands))
     assert any(fault.startswith("'unit_06' ") and fault.endswith("is it on the arm?") for fault in session), session
@@ -135,8 +136,8 @@ def test_a_body_that_stands_still_beside_the_arm_is_named(sound):
 
 @pytest.mark.parametrize("factor", [1e3, 1e-3])
 def test_one_log_in_another_unit_is_named(sound, factor):
-    take = take_of(sound, "release_b")
-    other = replace(take, positions=factor * take.positions, base_positions=factor * take.base_positions)
+    raw = raw_trial_of(sound, "release_b")
+    other = replace(raw, positions=factor * raw.positions, base_positions=factor * raw.base_positions)
     trials, _ = judged(sound, release_b=other)
     assert list(trials) == ["release_b"]
     match = re.match(r"unit: bodies are ([\d.]+) times as far apart as", trials["release_b"][0])
@@ -147,7 +148,7 @@ def test_one_log_in_another_unit_is_named(sound, factor):
 @pytest.mark.parametrize("order", [(1, 0, 2, 3), (0, 2, 1, 3), (0, 1, 3, 2), (2, 1, 0, 3)])
 def test_exchanged_markers_of_the_whole_session_are_named(sound, order):
     names = tuple(MARKERS[place] for place in order)
-    trials, session = judged(sound, **every(sound, lambda take: replace(take, markers=names)))
+    trials, session = judged(sound, **every(sound, lambda raw: replace(raw, markers=names)))
     assert trials == {}
     assert len(session) == 1
     assert "check `markers` in session.yaml" in session[0]
@@ -157,16 +158,16 @@ def test_exchanged_markers_of_the_whole_session_are_named(sound, order):
 
 @pytest.mark.parametrize("names", [MARKERS[::-1], ("root", "a", "b", "tip"), ("7", "b8", "c9", "1")])
 def test_markers_named_from_the_tip_or_without_numbers_are_left(sound, names):
-    assert judged(sound, **every(sound, lambda take: replace(take, markers=names))) == ({}, [])
+    assert judged(sound, **every(sound, lambda raw: replace(raw, markers=names))) == ({}, [])
 
 
 def test_a_base_that_moves_while_a_marker_rests_is_named(sound):
-    def exchange(take):
-        positions, quaternions = take.positions.copy(), take.quaternions.copy()
-        positions[:, 0], quaternions[:, 0] = take.base_positions, take.base_quaternions
-        changed = {"base_positions": take.positions[:, 0], "base_quaternions": take.quaternions[:, 0]}
-        names = ("base", *take.markers[1:])
-        return replace(take, positions=positions, quaternions=quaternions, markers=names, **changed)
+    def exchange(raw):
+        positions, quaternions = raw.positions.copy(), raw.quaternions.copy()
+        positions[:, 0], quaternions[:, 0] = raw.base_positions, raw.base_quaternions
+        changed = {"base_positions": raw.positions[:, 0], "base_quaternions": raw.quaternions[:, 0]}
+        names = ("base", *raw.markers[1:])
+        return replace(raw, positions=positions, quaternions=quaternions, markers=names, **changed)
 
     _, session = judged(sound, base="unit_02", **every(sound, exchange))
     assert session[-1].startswith("base: 'unit_02' moves by ")
@@ -194,20 +195,20 @@ def test_a_base_that_moves_while_a_marker_rests_is_named(sound):
     ],
 )
 def test_a_trial_labelled_as_another_experiment_is_named(sound, name, experiment, level, message):
-    trials, _ = judged(sound, **{name: replace(take_of(sound, name), experiment=experiment, level=level)})
+    trials, _ = judged(sound, **{name: replace(raw_trial_of(sound, name), experiment=experiment, level=level)})
     assert list(trials) == [name]
     assert any(re.search(message, fault) for fault in trials[name]), trials
 
 
-def with_tendons(take, commands_mm, positions_mm):
-    """The take beside motors that log these pulls of the three tendons throughout; nothing where None."""
-    time = np.arange(-0.5, take.time[-1] + 0.5, 0.01)
+def with_tendons(raw, commands_mm, positions_mm):
+    """The raw trial beside motors that log these pulls of the three tendons throughout; nothing where None."""
+    time = np.arange(-0.5, raw.time[-1] + 0.5, 0.01)
     rows = [
         np.empty((0, 3)) if pulls is None else 1e-3 * np.tile(pulls, (len(time), 1))
         for pulls in (commands_mm, positions_mm)
     ]
     times = {"command_time": time[: len(rows[0])], "tendon_time": time[: len(rows[1])]}
-    return replace(take, tendons=TENDONS, commands=rows[0], tendon_positions=rows[1], **times)
+    return replace(raw, tendons=TENDONS, commands=rows[0], tendon_positions=rows[1], **times)
 
 
 SLACK, PULLED = (-300.0, -300.0, -300.0), (-300.0, 40.0, -300.0)
@@ -225,7 +226,7 @@ SLACK, PULLED = (-300.0, -300.0, -300.0), (-300.0, 40.0, -300.0)
     ],
 )
 def test_a_pull_that_is_held_where_nothing_is_to_pull_is_named(sound, name, commands, positions, key):
-    trials, _ = judged(sound, **{name: with_tendons(take_of(sound, name), commands, positions)})
+    trials, _ = judged(sound, **{name: with_tendons(raw_trial_of(sound, name), commands, positions)})
     assert list(trials) == [name]
     (fault,) = trials[name]
     pattern = rf"experiment: {key}: 'tendon_2' is drawn in by 40\.?\d* mm, expected a \w+ without actuation"
@@ -235,36 +236,36 @@ def test_a_pull_that_is_held_where_nothing_is_to_pull_is_named(sound, name, comm
 @pytest.mark.parametrize("name", ["tilt_30", "release_a"])
 @pytest.mark.parametrize("commands", [None, (0.0, 0.0, 0.0), (2.0, -1.0, -1.0), SLACK])
 def test_loose_tendons_where_nothing_is_to_pull_are_left(sound, name, commands):
-    assert judged(sound, **{name: with_tendons(take_of(sound, name), commands, SLACK)}) == ({}, [])
-    assert judged(sound, **{name: with_tendons(take_of(sound, name), commands, None)}) == ({}, [])
+    assert judged(sound, **{name: with_tendons(raw_trial_of(sound, name), commands, SLACK)}) == ({}, [])
+    assert judged(sound, **{name: with_tendons(raw_trial_of(sound, name), commands, None)}) == ({}, [])
 
 
 def test_loose_tendons_of_encoders_that_start_anywhere_are_left(sound):
     def shifted(name, millimetres):
-        take = take_of(sound, name)
-        return replace(take, tendon_positions=take.tendon_positions + 1e-3 * millimetres)
+        raw = raw_trial_of(sound, name)
+        return replace(raw, tendon_positions=raw.tendon_positions + 1e-3 * millimetres)
 
     driven = [name for name in sound if name.startswith(("curl", "pull", "motion"))]
-    loose = with_tendons(take_of(sound, "tilt_30"), SLACK, (200.0, 200.0, 200.0))
+    loose = with_tendons(raw_trial_of(sound, "tilt_30"), SLACK, (200.0, 200.0, 200.0))
     same = {name: shifted(name, 500.0) for name in driven}  # slack is 200 mm then
     assert judged(sound, tilt_30=loose, **same) == ({}, [])
     anywhere = {name: shifted(name, 100.0 * index) for index, name in enumerate(driven)}
     assert judged(sound, tilt_30=loose, **anywhere) == ({}, [])
-    drawn_in = with_tendons(take_of(sound, "tilt_30"), SLACK, (200.0, 540.0, 200.0))
+    drawn_in = with_tendons(raw_trial_of(sound, "tilt_30"), SLACK, (200.0, 540.0, 200.0))
     (fault,) = judged(sound, tilt_30=drawn_in, **same)[0]["tilt_30"]
     assert fault.startswith("experiment: tendon positions: 'tendon_2' is drawn in by 40")
 
 
 def test_a_static_tilt_in_which_the_arm_swings_is_named(sound):
-    take = take_of(sound, "tilt_30")
-    swing = np.sin(2 * np.pi * 1.5 * take.time)[:, None, None] * [[0.01], [0.02], [0.03], [0.035]] * [1.0, 0.0, 0.0]
-    trials, _ = judged(sound, tilt_30=replace(take, positions=take.positions + swing))
+    raw = raw_trial_of(sound, "tilt_30")
+    swing = np.sin(2 * np.pi * 1.5 * raw.time)[:, None, None] * [[0.01], [0.02], [0.03], [0.035]] * [1.0, 0.0, 0.0]
+    trials, _ = judged(sound, tilt_30=replace(raw, positions=raw.positions + swing))
     assert list(trials) == ["tilt_30"]
     assert "experiment: 'unit_08' moves by 6" in trials["tilt_30"][-1] or "moves by 7" in trials["tilt_30"][-1]
 
 
-def pulls(take, commands, positions):
-    return replace(take, commands=commands(take.commands), tendon_positions=positions(take.tendon_positions))
+def pulls(raw, commands, positions):
+    return replace(raw, commands=commands(raw.commands), tendon_positions=positions(raw.tendon_positions))
 
 
 def same(values):
@@ -290,46 +291,46 @@ def same(values):
     ],
 )
 def test_tendons_that_cannot_be_are_named(sound, commands, positions, message):
-    take = take_of(sound, "curl_40")
-    take = replace(take, commands=take.commands - take.commands[0])
-    trials, _ = judged(sound, curl_40=pulls(take, commands, positions))
+    raw = raw_trial_of(sound, "curl_40")
+    raw = replace(raw, commands=raw.commands - raw.commands[0])
+    trials, _ = judged(sound, curl_40=pulls(raw, commands, positions))
     assert list(trials) == ["curl_40"]
     assert any(re.search(message, fault) for fault in trials["curl_40"]), trials
 
 
 def test_pulls_from_an_encoder_that_starts_anywhere_are_left(sound):
-    take = take_of(sound, "curl_40")
-    assert judged(sound, curl_40=replace(take, tendon_positions=take.tendon_positions + 1.7)) == ({}, [])
-    half = len(take.command_time) // 2
-    wound = take.tendon_time > take.command_time[half]
-    later = {"command_time": take.command_time[half:], "commands": take.commands[half:]}
-    later |= {"tendon_time": take.tendon_time[wound], "tendon_positions": take.tendon_positions[wound]}
-    assert judged(sound, curl_40=replace(take, **later)) == ({}, []), "a window that begins with the arm curled"
+    raw = raw_trial_of(sound, "curl_40")
+    assert judged(sound, curl_40=replace(raw, tendon_positions=raw.tendon_positions + 1.7)) == ({}, [])
+    half = len(raw.command_time) // 2
+    wound = raw.tendon_time > raw.command_time[half]
+    later = {"command_time": raw.command_time[half:], "commands": raw.commands[half:]}
+    later |= {"tendon_time": raw.tendon_time[wound], "tendon_positions": raw.tendon_positions[wound]}
+    assert judged(sound, curl_40=replace(raw, **later)) == ({}, []), "a window that begins with the arm curled"
 
 
 @pytest.mark.parametrize("name", ["pull_40_-20_-20", "motion_identify"])
 def test_pulls_without_a_level_that_are_in_mm_are_named(sound, name):
-    take = take_of(sound, name)
-    trials, _ = judged(sound, **{name: replace(take, commands=1e3 * take.commands)})
+    raw = raw_trial_of(sound, name)
+    trials, _ = judged(sound, **{name: replace(raw, commands=1e3 * raw.commands)})
     assert list(trials) == [name]
     (fault,) = trials[name]
     pattern = r"commands: found pulls up to \d+.* m, expected less than the arm's length of 0\.\d+ m: are they in mm"
     assert re.match(pattern, fault)
-    both = pulls(take, lambda c: 1e3 * c, lambda p: 1e3 * p)
+    both = pulls(raw, lambda c: 1e3 * c, lambda p: 1e3 * p)
     if name.startswith("motion"):
         assert any("tendon positions: found pulls up to" in fault for fault in judged(sound, **{name: both})[0][name])
 
 
 def test_a_static_pull_whose_window_touches_the_way_to_the_next_is_left(sound):
-    take = take_of(sound, "pull_40_-20_-20")
-    next_time = take.command_time[-1] + np.arange(1, 80) / 100
-    ramp = take.commands[-1] + np.linspace(0, 0.02, 79)[:, None]
-    commanded = np.concatenate([take.command_time, next_time]), np.concatenate([take.commands, ramp])
-    measured = np.concatenate([take.tendon_time, next_time]), np.concatenate([take.tendon_positions, ramp])
+    raw = raw_trial_of(sound, "pull_40_-20_-20")
+    next_time = raw.command_time[-1] + np.arange(1, 80) / 100
+    ramp = raw.commands[-1] + np.linspace(0, 0.02, 79)[:, None]
+    commanded = np.concatenate([raw.command_time, next_time]), np.concatenate([raw.commands, ramp])
+    measured = np.concatenate([raw.tendon_time, next_time]), np.concatenate([raw.tendon_positions, ramp])
     for ahead in (0.0, 0.5):  # s, of the motors' clock
         later = {"command_time": commanded[0] - ahead, "tendon_time": measured[0] - ahead}
-        later = replace(take, commands=commanded[1], tendon_positions=measured[1], **later)
-        assert judged(sound, **{take.name: later}) == ({}, [])
+        later = replace(raw, commands=commanded[1], tendon_positions=measured[1], **later)
+        assert judged(sound, **{raw.name: later}) == ({}, [])
 
 
 def test_static_pulls_have_no_say_in_the_clocks(tmp_path):
@@ -344,25 +345,25 @@ def test_static_pulls_have_no_say_in_the_clocks(tmp_path):
 
 
 def test_exchanged_topics_are_named(sound):
-    take = take_of(sound, "curl_40")
-    assert take.tendons == TENDONS
-    time = {"command_time": take.tendon_time, "tendon_time": take.command_time}
-    noisy = replace(take, commands=take.tendon_positions, tendon_positions=take.commands, **time)
+    raw = raw_trial_of(sound, "curl_40")
+    assert raw.tendons == TENDONS
+    time = {"command_time": raw.tendon_time, "tendon_time": raw.command_time}
+    noisy = replace(raw, commands=raw.tendon_positions, tendon_positions=raw.commands, **time)
     assert "commands are noisier" in judged(sound, curl_40=noisy)[0]["curl_40"][0]
-    early = replace(take, tendon_time=take.tendon_time - 0.05)
+    early = replace(raw, tendon_time=raw.tendon_time - 0.05)
     (fault,) = judged(sound, curl_40=early)[0]["curl_40"]
     assert fault.startswith("topics: what is measured comes 50 ms before its command: are `commands` and")
-    late = replace(take, tendon_time=take.tendon_time + 0.05)
+    late = replace(raw, tendon_time=raw.tendon_time + 0.05)
     assert judged(sound, curl_40=late) == ({}, [])
 
 
 def test_what_is_not_plausible_is_refused_left_out_or_said(folder, sound):
-    trial, take, findings = sound["release_a"]
+    trial, raw, findings = sound["release_a"]
     session = read_session(folder)
 
     def gathered(otherwise, refused_trials):
         taken = {name: (t, some, replace(f, warnings=[], faults=[])) for name, (t, some, f) in sound.items()}
-        taken["release_a"] = trial, moved(take, 2, 0.5), replace(findings, warnings=[], faults=[])
+        taken["release_a"] = trial, moved(raw, 2, 0.5), replace(findings, warnings=[], faults=[])
         return check_session(taken.values(), session, replace(PLAUSIBLE, otherwise=otherwise), refused_trials, "here")
 
     with pytest.raises(InputError, match=r"release_a\.mcap: trial release_a: 'unit_06' is "):
@@ -370,19 +371,19 @@ def test_what_is_not_plausible_is_refused_left_out_or_said(folder, sound):
     left = gathered("refuse", "leave_out")
     assert list(left.refused) == ["release_a"]
     assert "'unit_06' is " in left.refused["release_a"]
-    assert "release_a" not in [take.name for take in left.takes]
+    assert "release_a" not in [raw.name for raw in left.raw_trials]
     checked = gathered("warn", "stop")
-    names = [take.name for take in checked.takes]
+    names = [raw.name for raw in checked.raw_trials]
     warnings = checked.findings[names.index("release_a")].warnings
     assert warnings[0].startswith("'unit_06' is ")
 
 
 def test_a_level_that_the_base_contradicts_is_said(folder, sound):
-    trial, take, _ = sound["tilt_60"]
+    trial, raw, _ = sound["tilt_60"]
     taken = {name: (t, some, replace(f, warnings=[], faults=[])) for name, (t, some, f) in sound.items()}
-    taken["tilt_60"] = trial, replace(take, level=10.0), taken["tilt_60"][2]
+    taken["tilt_60"] = trial, replace(raw, level=10.0), taken["tilt_60"][2]
     gathered = check_session(taken.values(), read_session(folder), PLAUSIBLE, "stop", "here")
-    warnings = {take.name: remarks.warnings for take, remarks in zip(gathered.takes, gathered.findings, strict=True)}
+    warnings = {raw.name: remarks.warnings for raw, remarks in zip(gathered.raw_trials, gathered.findings, strict=True)}
     assert warnings["tilt_60"][1].startswith("level: found 10, but the base is tilted by 60°")
     assert all(warnings[name] == [NO_TEST] for name in warnings if name != "tilt_60")
 
@@ -399,19 +400,19 @@ def test_an_experiment_that_a_split_lacks_is_said(folder, sound):
     ("chosen", "expected"),
     [
         (
-            lambda take: take.split == "identify",
+            lambda raw: raw.split == "identify",
             ["splits: no trial of the split validate: no error is of trials that were not fitted", NO_TEST],
         ),
         (
-            lambda take: take.split == "validate",
+            lambda raw: raw.split == "validate",
             ["splits: no trial of the split identify: nothing can be identified", NO_TEST],
         ),
         (
-            lambda take: take.experiment != "curl",
+            lambda raw: raw.experiment != "curl",
             [NO_TEST, "experiments: no curl in the session: data/raw/README.md tells which settings do without"],
         ),
         (
-            lambda take: take.experiment != "motion",
+            lambda raw: raw.experiment != "motion",
             [
                 NO_TEST,
                 "experiments: no motion in the session: in params.yaml `experiments: [curl]` under "

@@ -19,7 +19,7 @@ MARGIN = 3  # frames: half a period of the cutoff, as far as the low-pass carrie
 TIME = np.arange(FRAMES) / RATE
 
 
-def take(kind: str = "motion", oriented: bool = False, **changes) -> RawTrial:
+def raw(kind: str = "motion", oriented: bool = False, **changes) -> RawTrial:
     """Two markers that sway, seen in every frame of the uniform clock, and a base that stands still."""
     positions = np.zeros((FRAMES, 2, 3))
     positions[..., 2] = [-0.2, -0.4]
@@ -44,7 +44,7 @@ def missing(source: RawTrial, begin: int, count: int, marker: int = 1) -> RawTri
 
 @pytest.mark.parametrize("missed", [1, BRIDGED - 1, BRIDGED])
 def test_a_gap_that_is_short_enough_is_measured_throughout(missed):
-    trial, effect = filter_raw_trial(missing(take(), 100, missed), SETTINGS)
+    trial, effect = filter_raw_trial(missing(raw(), 100, missed), SETTINGS)
     assert trial.measured.all()
     assert effect.gap_share == 0
     assert effect.filled_share == pytest.approx(missed / (2 * FRAMES))
@@ -52,7 +52,7 @@ def test_a_gap_that_is_short_enough_is_measured_throughout(missed):
 
 @pytest.mark.parametrize("missed", [BRIDGED + 1, 2 * BRIDGED, 3 * BRIDGED, 100])
 def test_a_longer_gap_is_not_measured_nor_is_what_the_low_pass_carries_beyond_it(missed):
-    trial, effect = filter_raw_trial(missing(take(), 100, missed), SETTINGS)
+    trial, effect = filter_raw_trial(missing(raw(), 100, missed), SETTINGS)
     assert trial.measured[:, 0].all(), "the other marker was seen"
     hidden = np.flatnonzero(~trial.measured[:, 1])
     assert hidden.tolist() == list(range(100 - MARGIN, 100 + missed + MARGIN))
@@ -62,7 +62,7 @@ def test_a_longer_gap_is_not_measured_nor_is_what_the_low_pass_carries_beyond_it
 @pytest.mark.parametrize("missed", [30, 60])
 def test_what_is_measured_does_not_depend_on_what_fills_a_gap(missed):
     """The same motion but for a jerk that happens while nobody looks."""
-    calm, jerked = take(), take()
+    calm, jerked = raw(), raw()
     inside = slice(100, 100 + missed)
     jerked.positions[inside, 1, 1] += 0.1 * np.hanning(missed)
     full, _ = filter_raw_trial(jerked, SETTINGS)
@@ -74,26 +74,26 @@ def test_what_is_measured_does_not_depend_on_what_fills_a_gap(missed):
 
 @pytest.mark.parametrize(("begin", "hidden"), [(0, range(20 + MARGIN)), (340, range(340 - MARGIN, FRAMES))])
 def test_before_the_first_and_after_the_last_sample_nothing_is_measured(begin, hidden):
-    trial, _ = filter_raw_trial(missing(take(), begin, 20), SETTINGS)
+    trial, _ = filter_raw_trial(missing(raw(), begin, 20), SETTINGS)
     assert np.flatnonzero(~trial.measured[:, 1]).tolist() == list(hidden)
 
 
 @pytest.mark.parametrize("what", ["position", "orientation"])
 def test_a_sample_that_is_off_in_either_way_is_dropped(what):
-    source = take(oriented=True)
+    source = raw(oriented=True)
     if what == "position":
         source.positions[150, 1, 1] += 0.02
     else:
         source.quaternions[150, 1] = [np.cos(0.4), np.sin(0.4), 0, 0]
     trial, effect = filter_raw_trial(source, SETTINGS)
     assert effect.outliers == 1
-    plain = filter_raw_trial(take(oriented=True), SETTINGS)[0]
+    plain = filter_raw_trial(raw(oriented=True), SETTINGS)[0]
     np.testing.assert_allclose(trial.positions, plain.positions, atol=1e-4)
     np.testing.assert_allclose(trial.quaternions, plain.quaternions, atol=1e-3)
 
 
 def test_a_sample_counts_only_with_its_orientation():
-    source = take(oriented=True)
+    source = raw(oriented=True)
     source.quaternions[100:140, 1] = np.nan
     trial, _ = filter_raw_trial(source, SETTINGS)
     assert np.flatnonzero(~trial.measured[:, 1]).tolist() == list(range(100 - MARGIN, 140 + MARGIN))
@@ -101,7 +101,7 @@ def test_a_sample_counts_only_with_its_orientation():
 
 @pytest.mark.parametrize(("samples", "enough"), [(8, True), (7, False)])
 def test_fewer_samples_than_the_low_pass_needs_are_refused(samples, enough):
-    source = missing(take(), samples, FRAMES)
+    source = missing(raw(), samples, FRAMES)
     if enough:
         assert filter_raw_trial(source, SETTINGS)[0].measured[:, 1].sum() == samples - MARGIN
         return
@@ -111,7 +111,7 @@ def test_fewer_samples_than_the_low_pass_needs_are_refused(samples, enough):
 
 def moving_while_hidden(count: int) -> tuple[RawTrial, slice]:
     """At rest, but for a while in which nobody sees the second marker and after which it is 2 mm elsewhere."""
-    source, hidden = take("static_pull"), slice(100, 100 + count)
+    source, hidden = raw("static_pull"), slice(100, 100 + count)
     source.positions[hidden.stop :, 1, 0] += 2e-3
     source.positions[hidden, 1, 0] = np.nan
     return source, hidden
@@ -158,7 +158,7 @@ def test_the_mean_shape_by_hand():
 
 @pytest.mark.parametrize("oriented", [False, True])
 def test_a_path_counts_frame_by_frame_what_was_seen_whole(oriented):
-    source = take("static_path", oriented)
+    source = raw("static_path", oriented)
     source.positions[5, 1] = np.nan
     if oriented:
         source.quaternions[7, 0] = np.nan
@@ -173,7 +173,7 @@ def test_a_path_counts_frame_by_frame_what_was_seen_whole(oriented):
 def test_of_commands_and_positions_one_stands_for_the_other(lacking):
     pulls, none = 0.01 * np.clip(TIME - 0.5, 0, 1)[:, None], np.empty((0, 1))
     commands, wound = {"commands": (none, pulls), "tendon positions": (pulls, none), "both": (none, none)}[lacking]
-    source = take(
+    source = raw(
         command_time=TIME[: len(commands)], commands=commands, tendon_time=TIME[: len(wound)], tendon_positions=wound
     )
     trial, _ = filter_raw_trial(source, SETTINGS)
@@ -183,7 +183,7 @@ def test_of_commands_and_positions_one_stands_for_the_other(lacking):
 
 
 def test_commands_come_on_the_poses_clock():
-    source = take(clock_offset=0.25)
+    source = raw(clock_offset=0.25)
     trial, _ = filter_raw_trial(source, SETTINGS)
     np.testing.assert_allclose(trial.commands[:, 0], 0.01 * np.clip(TIME - 0.75, 0, 1), atol=1e-9)
 
@@ -191,7 +191,7 @@ def test_commands_come_on_the_poses_clock():
 @pytest.mark.parametrize(("kind", "release", "free"), [("release", "free", True), ("release", "onset", False),
                                                        ("motion", "free", False)])  # fmt: skip
 def test_only_a_release_that_is_to_be_free_begins_in_motion(kind, release, free):
-    source = take(kind)
+    source = raw(kind)
     aside = np.clip(1.2 - TIME, 0, 0.2) / 0.2  # let go at 1 s
     source.positions[..., 0] = 0.1 * aside[:, None] * [0.5, 1.0]
     trial, _ = filter_raw_trial(source, SETTINGS)
@@ -204,5 +204,5 @@ def test_only_a_release_that_is_to_be_free_begins_in_motion(kind, release, free)
 
 def test_gravity_is_against_up_in_the_frame_of_the_base():
     turned = np.tile([np.sqrt(0.5), np.sqrt(0.5), 0, 0], (FRAMES, 1))  # a quarter about x
-    trial, _ = filter_raw_trial(take(base_quaternions=turned), SETTINGS)
+    trial, _ = filter_raw_trial(raw(base_quaternions=turned), SETTINGS)
     np.testing.assert_allclose(trial.gravity, [0, -STANDARD_GRAVITY, 0], atol=1e-9)

@@ -22,7 +22,7 @@ def test_static_pulls_motions_and_loads_come_through(tmp_path):
     record(tmp_path, [*all_truths(), pull_truth(pulls, load=0.125), motion_truth(tilt_deg=50.0)], instruments())
     session = read_session(tmp_path)
     gathered = check_session(load_raw_trials(tmp_path, session, LIMITS), session, PLAUSIBLE, "stop", "here")
-    trials = {trial.name: trial for trial in (filter_raw_trial(take, SETTINGS)[0] for take in gathered.takes)}
+    trials = {trial.name: trial for trial in (filter_raw_trial(raw, SETTINGS)[0] for raw in gathered.raw_trials)}
     pull, motion = trials["pull_40_-20_-20"], trials["motion_identify"]
     assert {name: trial.load for name, trial in trials.items() if trial.load} == {pull.name: 0.125}
     assert pull.positions.shape[0] == len(pull.commands) == 1

@@ -14,9 +14,10 @@ from tests.support.workbench import ROOT
 from trunkline.pipeline.stage import run_stage
 from trunkline.recordings.cleaning.checks import TrialLimits
 from trunkline.recordings.cleaning.clock_offset import set_gravity_direction
-from trunkline.recordings.cleaning.label_swaps import find_label_swaps, usual_distances
+from trunkline.recordings.cleaning.label_swaps import find_label_swaps
 from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.cleaning.stale_poses import stale_samples
+from trunkline.recordings.cleaning.usual_distances import usual_distances
 from trunkline.recordings.session.session import read_session
 
 LIMITS = TrialLimits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
@@ -24,7 +25,7 @@ CLEAN = instruments(occlusions_per_s=0.3, outliers=0)
 
 
 def session(folder, change=None, truths=None, settings=CLEAN):
-    """(takes, findings) of a session, the first of whose measurements went through `change`."""
+    """(raw trials, findings) of a session, the first of whose measurements went through `change`."""
     folder.mkdir(exist_ok=True)
     measured = [
         measure(truth, settings, np.random.default_rng(seed), 30.0 * seed)
@@ -40,9 +41,9 @@ def session(folder, change=None, truths=None, settings=CLEAN):
 
 def taken(folder):
     declared = read_session(folder)
-    _, takes, findings = zip(*load_raw_trials(folder, declared, LIMITS), strict=True)
-    set_gravity_direction(takes, findings, declared)
-    return takes, findings
+    _, raw_trials, findings = zip(*load_raw_trials(folder, declared, LIMITS), strict=True)
+    set_gravity_direction(raw_trials, findings, declared)
+    return raw_trials, findings
 
 
 def edit(folder, old, new):
@@ -53,7 +54,7 @@ def edit(folder, old, new):
 
 @pytest.fixture(scope="module")
 def right(tmp_path_factory):
-    """The takes of the session to which nothing happened."""
+    """The raw trials of the session to which nothing happened."""
     return session(tmp_path_factory.mktemp("session") / "right")[0]
 
 
@@ -81,21 +82,21 @@ def test_bodies_taken_for_each_other_are_put_right(tmp_path, right, frames, bodi
         for values in (m.positions, m.quaternions):
             values[frames, list(bodies)] = values[frames, [*bodies[1:], bodies[0]]]
 
-    takes, findings = session(tmp_path / "wrong", swap)
+    raw_trials, findings = session(tmp_path / "wrong", swap)
     names = " and ".join(repr(("base", *MARKERS)[body]) for body in bodies)
     (repair,) = [line for line in findings[0].repairs if "taken for each other" in line]
     assert repair.startswith(f"{names} were taken for each other in ")
     begin, end = map(float, repair.partition(" between ")[2].removesuffix(" s, put right").split(" and "))
-    times = takes[0].time[frames]
+    times = raw_trials[0].time[frames]
     assert begin == pytest.approx(times[0], abs=0.02)
     assert end == pytest.approx(times[-1], abs=0.02)
     assert findings[1].repairs == findings[2].repairs == []
     # a body beside a hidden one may lack the neighbours that would tell
-    same = np.isclose(takes[0].positions, right[0].positions, equal_nan=True).all(axis=(1, 2))
+    same = np.isclose(raw_trials[0].positions, right[0].positions, equal_nan=True).all(axis=(1, 2))
     assert same.mean() > 0.97
-    np.testing.assert_array_equal(takes[0].quaternions[same], right[0].quaternions[same])
-    np.testing.assert_array_equal(takes[0].base_positions[same], right[0].base_positions[same])
-    np.testing.assert_array_equal(takes[0].base_quaternions[same], right[0].base_quaternions[same])
+    np.testing.assert_array_equal(raw_trials[0].quaternions[same], right[0].quaternions[same])
+    np.testing.assert_array_equal(raw_trials[0].base_positions[same], right[0].base_positions[same])
+    np.testing.assert_array_equal(raw_trials[0].base_quaternions[same], right[0].base_quaternions[same])
 
 
 def test_a_marker_taken_for_the_base_is_put_right(tmp_path, right):
@@ -143,10 +144,10 @@ def test_repeated_poses_are_dropped_as_frozen(tmp_path):
     def freeze(m):
         m.positions[100:140, 3], m.quaternions[100:140, 3] = m.positions[100, 3], m.quaternions[100, 3]
 
-    takes, findings = session(tmp_path, freeze)
+    raw_trials, findings = session(tmp_path, freeze)
     assert findings[0].repairs == ["39 samples that only repeat the one before, to the last bit, dropped (unit_06)"]
-    assert np.isnan(takes[0].positions[101:140, 2]).all()
-    assert np.isfinite(takes[0].positions[100, 2]).all()
+    assert np.isnan(raw_trials[0].positions[101:140, 2]).all()
+    assert np.isfinite(raw_trials[0].positions[100, 2]).all()
 
 
 def test_all_bodies_frozen_at_once_and_float32(tmp_path):
@@ -154,9 +155,9 @@ def test_all_bodies_frozen_at_once_and_float32(tmp_path):
         m.positions[:] = m.positions.astype(np.float32)
         m.positions[100:140] = m.positions[100]
 
-    takes, _ = session(tmp_path, freeze, settings=instruments(occlusions_per_s=0, outliers=0))
-    assert np.isnan(takes[0].positions[101:140]).all()
-    assert np.isfinite(takes[0].positions[140:]).all()
+    raw_trials, _ = session(tmp_path, freeze, settings=instruments(occlusions_per_s=0, outliers=0))
+    assert np.isnan(raw_trials[0].positions[101:140]).all()
+    assert np.isfinite(raw_trials[0].positions[140:]).all()
 
 
 def test_rounded_and_constant_positions_are_not_frozen():
@@ -180,20 +181,20 @@ def test_wrong_unit_is_recognised(tmp_path, factor, declared, taken_as):
         write_log(folder / f"{m.name}.mcap", m)
     write_session(folder, measured, CLEAN)
     edit(folder, "unit: m}", f"unit: {declared}}}")
-    takes, findings = taken(folder)
-    for take, expected, remarks in zip(takes, right, findings, strict=True):
-        np.testing.assert_allclose(take.positions, expected.positions, rtol=1e-12)
+    raw_trials, findings = taken(folder)
+    for raw, expected, remarks in zip(raw_trials, right, findings, strict=True):
+        np.testing.assert_allclose(raw.positions, expected.positions, rtol=1e-12)
         assert f"are no arm in {declared}, as declared; taken as {taken_as}" in remarks.repairs[0]
 
 
 def test_wrong_vertical_is_put_right_by_the_tilts(tmp_path):
     truths = [static_truth(0.0), static_truth(30.0), static_truth(60.0), release_truth()]
-    takes, findings = session(tmp_path, truths=truths)
+    raw_trials, findings = session(tmp_path, truths=truths)
     assert [remarks.repairs + remarks.warnings for remarks in findings] == [[]] * 4
     edit(tmp_path, "up: [0, 1, 0]", "up: [0, 0, 1]")
-    takes, findings = taken(tmp_path)
-    for take, remarks in zip(takes, findings, strict=True):
-        np.testing.assert_array_equal(take.up, [0, 1, 0])
+    raw_trials, findings = taken(tmp_path)
+    for raw, remarks in zip(raw_trials, findings, strict=True):
+        np.testing.assert_array_equal(raw.up, [0, 1, 0])
         assert "with [0, 0, 1]" in remarks.repairs[-1]
         assert "with [0, 1, 0], which was taken" in remarks.repairs[-1]
 
@@ -202,18 +203,18 @@ def test_wrong_levels_are_named_and_change_nothing(tmp_path):
     session(tmp_path, truths=[static_truth(0.0), static_truth(30.0), static_truth(60.0)])
     for old, new in (("level: 30", "level: 85"), ("level: 0", "level: 50"), ("level: 60", "level: 10")):
         edit(tmp_path, old, new)
-    takes, findings = taken(tmp_path)
+    raw_trials, findings = taken(tmp_path)
     assert all(remarks.repairs == [] and "no other axis fits" in remarks.warnings[0] for remarks in findings)
-    np.testing.assert_array_equal(takes[0].up, [0, 1, 0])
+    np.testing.assert_array_equal(raw_trials[0].up, [0, 1, 0])
 
 
 def test_releases_alone_only_warn_of_a_wrong_vertical(tmp_path):
     session(tmp_path, truths=[release_truth()])
     edit(tmp_path, "up: [0, 1, 0]", "up: [0, 0, 1]")
-    takes, (findings,) = taken(tmp_path)
+    raw_trials, (findings,) = taken(tmp_path)
     assert "released arms come to rest" in findings.warnings[0]
     assert "with [0, 1, 0]: check `frame.up`" in findings.warnings[0]
-    np.testing.assert_array_equal(takes[0].up, [0, 0, 1])
+    np.testing.assert_array_equal(raw_trials[0].up, [0, 0, 1])
 
 
 def test_the_report_names_what_was_found(tmp_path, monkeypatch, capsys):

@@ -40,7 +40,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module", params=COMPRESSIONS, ids=lambda c: c.name.lower())
 def log(request, folder):
-    """(bytes, messages, take) of the curl's log in small chunks, compressed in one of the ways."""
+    """(bytes, messages, raw trial) of the curl's log in small chunks, compressed in one of the ways."""
     path = folder / "curl_40.mcap"
     original = path.read_bytes()
     with open(path, "wb") as file:
@@ -53,10 +53,10 @@ def log(request, folder):
                 channels[channel.topic] = writer.register_channel(channel.topic, "cdr", schema_id)
             writer.add_message(channels[channel.topic], message.log_time, message.data, message.publish_time)
         writer.finish()
-    data, ((_, take, findings),) = path.read_bytes(), load_raw_trials(folder, read_session(folder), LIMITS)
+    data, ((_, raw, findings),) = path.read_bytes(), load_raw_trials(folder, read_session(folder), LIMITS)
     assert findings.repairs == []
     whole = messages(path)
-    yield data, whole, take
+    yield data, whole, raw
     path.write_bytes(original)
 
 
@@ -162,7 +162,7 @@ def test_messages_are_the_original_ones_or_the_loss_is_said(folder, log, data):
 @AGAIN
 @given(data=st.data())
 def test_a_trial_is_refused_or_holds_measured_poses_only(folder, log, data):
-    whole, _, take = log
+    whole, _, raw = log
     damage = data.draw(st.sampled_from(DAMAGES))
     broken = damage(whole, data.draw)
     (folder / "curl_40.mcap").write_bytes(broken)
@@ -174,13 +174,13 @@ def test_a_trial_is_refused_or_holds_measured_poses_only(folder, log, data):
         assert "\n" not in str(result)
         assert min(np.ptp(poses), np.ptp(pulls)) < ENOUGH if poses and pulls else True
         return
-    rows = {row.tobytes() for row in take.positions}
+    rows = {row.tobytes() for row in raw.positions}
     assert {row.tobytes() for row in result.positions} <= rows
     assert len(result.positions) >= len(poses)
-    if len(result.positions) < len(take.positions):
+    if len(result.positions) < len(raw.positions):
         assert findings.repairs[0].startswith("log: ")
     else:
-        np.testing.assert_array_equal(result.time, take.time)
+        np.testing.assert_array_equal(result.time, raw.time)
 
 
 @pytest.mark.parametrize("damage", [drop_summary, duplicate, reorder])

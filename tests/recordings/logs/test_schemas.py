@@ -366,10 +366,10 @@ def test_float_arrays_count_by_log_time(tmp_path):
     assert "/tendon_commands: found 3 numbers without names, expected `tendons`" in str(refused)
     with open(tmp_path / "session.yaml", "a") as file:
         file.write("tendons: [tendon_1, tendon_2, tendon_3]\n")
-    ((_, take, findings),) = load_raw_trials(tmp_path, read_session(tmp_path), limits)
-    assert take.tendons == stamped.tendons
+    ((_, raw, findings),) = load_raw_trials(tmp_path, read_session(tmp_path), limits)
+    assert raw.tendons == stamped.tendons
     # the recorder dates all messages by one clock, so that of the offset of 137 ms only the delivery's jitter is left
-    pulls = np.interp(take.command_time, stamped.command_time - 0.137, stamped.commands[:, 0])
-    np.testing.assert_allclose(take.commands[:, 0], pulls, atol=2e-3)
+    pulls = np.interp(raw.command_time, stamped.command_time - 0.137, stamped.commands[:, 0])
+    np.testing.assert_allclose(raw.commands[:, 0], pulls, atol=2e-3)
     assert findings.by_log_times.offset == pytest.approx(0, abs=0.02)
-    assert abs(take.command_time[0]) < 0.02
+    assert abs(raw.command_time[0]) < 0.02

@@ -39,7 +39,7 @@ def test_a_lab_session_is_described_and_its_proposal_is_the_session(tmp_path, ca
     assert (session.base, session.clock, session.topics) == (right.base, right.clock, right.topics)
     experiments = {trial.file: (trial.experiment, trial.level) for trial in session.trials}
     assert experiments == {trial.file: (trial.experiment, trial.level) for trial in right.trials}
-    assert all(not isinstance(take, Exception) for _, take, _ in load_raw_trials(tmp_path, session, LIMITS))
+    assert all(not isinstance(raw, Exception) for _, raw, _ in load_raw_trials(tmp_path, session, LIMITS))
 
 
 def test_it_says_what_it_cannot_know(tmp_path, capsys):
@@ -81,9 +81,9 @@ def test_every_schema_gets_a_proposal_that_is_read(tmp_path, capsys, encoding, k
     if kind == "markers":
         assert session.base == "base"
     else:
-        ((_, take, _),) = load_raw_trials(tmp_path, session, LIMITS)
-        assert len(take.markers) == 2, take
-        assert np.isfinite(take.positions).any()
+        ((_, raw, _),) = load_raw_trials(tmp_path, session, LIMITS)
+        assert len(raw.markers) == 2, raw
+        assert np.isfinite(raw.positions).any()
 
 
 def test_a_damaged_log_is_described_as_such(tmp_path, capsys):

@@ -63,14 +63,14 @@ def test_an_export_becomes_a_session_that_is_ingested(tmp_path, measured, unit, 
     assert main(["--session", str(tmp_path / "session"), str(path)]) == 0
     session = read_session(tmp_path / "session")
     assert (session.frame.up, session.frame.unit, session.base, session.clock) == ((0, 1, 0), "m", "base", "frame")
-    ((_, take, findings),) = load_raw_trials(tmp_path / "session", session, LIMITS)
-    assert take.markers == MARKERS
-    assert take.experiment == "release"
+    ((_, raw, findings),) = load_raw_trials(tmp_path / "session", session, LIMITS)
+    assert raw.markers == MARKERS
+    assert raw.experiment == "release"
     assert findings.repairs == []
-    np.testing.assert_allclose(take.positions, measured.positions[:, 1:], atol=1e-8)
-    np.testing.assert_allclose(take.quaternions, measured.quaternions[:, 1:], atol=1e-8)
-    np.testing.assert_allclose(take.time, np.arange(len(take.time)) / 120, atol=1e-6)
-    assert np.isnan(take.positions).any()
+    np.testing.assert_allclose(raw.positions, measured.positions[:, 1:], atol=1e-8)
+    np.testing.assert_allclose(raw.quaternions, measured.quaternions[:, 1:], atol=1e-8)
+    np.testing.assert_allclose(raw.time, np.arange(len(raw.time)) / 120, atol=1e-6)
+    assert np.isnan(raw.positions).any()
 
 
 def test_decimal_commas_between_semicolons(tmp_path, measured):
@@ -90,9 +90,9 @@ def test_markers_alone_become_positions_alone(tmp_path, measured):
         "frame: {up: [0, 1, 0]}\nbase: {position: [0, 0, 0]}\ntrials:\n"
         "  - {file: swing.mcap, experiment: release, split: identify}\n"
     )
-    ((_, take, _),) = load_raw_trials(tmp_path / "session", read_session(tmp_path / "session"), LIMITS)
-    assert take.quaternions is None
-    np.testing.assert_allclose(take.positions, measured.positions, atol=1e-8)
+    ((_, raw, _),) = load_raw_trials(tmp_path / "session", read_session(tmp_path / "session"), LIMITS)
+    assert raw.quaternions is None
+    np.testing.assert_allclose(raw.positions, measured.positions, atol=1e-8)
 
 
 def test_the_start_of_the_capture_dates_the_log(tmp_path, measured):

@@ -1,10 +1,10 @@
-"""Trials and takes come back from Parquet as they were."""
+"""Trials and raw trials come back from Parquet as they were."""
 
 import numpy as np
 import pytest
 
 from trunkline.errors import InputError
-from trunkline.recordings.trials.raw_trial import RawTrial, read_takes, write_takes
+from trunkline.recordings.trials.raw_trial import RawTrial, read_raw_trials, write_raw_trials
 from trunkline.recordings.trials.splits import SPLITS
 from trunkline.recordings.trials.trial import Trial, read_trials, write_trials
 
@@ -33,7 +33,7 @@ def trial(name, frames, markers, tendons, oriented):
     )
 
 
-def take(name, frames, markers, tendons, commands, oriented):
+def raw(name, frames, markers, tendons, commands, oriented):
     return RawTrial(
         name=name,
         experiment="release",
@@ -62,9 +62,9 @@ def take(name, frames, markers, tendons, commands, oriented):
     [
         ([trial("a", 5, 3, 3, True), trial("b", 1, 4, 0, False)], write_trials, read_trials),
         (
-            [take("a", 7, 3, 2, 4, True), take("b", 5, 2, 0, 0, False), take("c", 6, 1, 1, 3, True)],
-            write_takes,
-            read_takes,
+            [raw("a", 7, 3, 2, 4, True), raw("b", 5, 2, 0, 0, False), raw("c", 6, 1, 1, 3, True)],
+            write_raw_trials,
+            read_raw_trials,
         ),
     ],
 )
@@ -80,7 +80,7 @@ def test_round_trip(tmp_path, rows, write, read):
                 assert getattr(copy, key) == value, key
 
 
-@pytest.mark.parametrize(("read", "stage"), [(read_takes, "ingest"), (read_trials, "filter")])
+@pytest.mark.parametrize(("read", "stage"), [(read_raw_trials, "ingest"), (read_trials, "filter")])
 def test_missing_tables_name_the_file_and_the_stage_to_run(tmp_path, read, stage):
     with pytest.raises(InputError, match=rf"trials\.parquet: no such file, .*dvc repro {stage}"):
         read(tmp_path, SPLITS)

@@ -8,7 +8,7 @@ import pytest
 from tests.tools.monitor.scores import drawn
 from trunkline.tools.monitor.attribution import attribute_change
 from trunkline.tools.monitor.baseline import Baseline
-from trunkline.tools.monitor.chart import chart_of
+from trunkline.tools.monitor.control_chart import chart_of
 
 
 def explained(change, seed: int, alias: bool = False):

@@ -11,7 +11,7 @@ from scipy.stats import chi2
 from tests.tools.monitor.cases import group, score
 from trunkline.tools.monitor.attribution import APART, attribute_change
 from trunkline.tools.monitor.baseline import POWERS, Departure, Group
-from trunkline.tools.monitor.chart import Charted
+from trunkline.tools.monitor.control_chart import Charted
 
 PLAIN = SimpleNamespace(reference=[score(curvature=np.eye(2))], outliers={}, departures=lambda _: {})
 

@@ -5,7 +5,7 @@ import pytest
 
 from tests.tools.monitor.scores import drawn
 from trunkline.tools.monitor.baseline import Baseline
-from trunkline.tools.monitor.chart import Chart, ParameterChart, chart_of, limit_of
+from trunkline.tools.monitor.control_chart import Chart, ParameterChart, chart_of, limit_of
 
 KINDS = ("static_tilt", "release", "curl")
 

@@ -5,7 +5,7 @@ import pytest
 
 from tests.tools.monitor.cases import departure, score
 from trunkline.tools.monitor.baseline import Departure
-from trunkline.tools.monitor.chart import ALONE, FORGETTING, LONG_RUN, Chart, Charted, ParameterChart
+from trunkline.tools.monitor.control_chart import ALONE, FORGETTING, LONG_RUN, Chart, Charted, ParameterChart
 from trunkline.tools.monitor.scores import Score
 
 LIMIT = 4.0

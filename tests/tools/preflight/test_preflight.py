@@ -134,9 +134,9 @@ def test_another_up_that_fits_better_is_named(model):
     trial = tilt(model, 90)
 
     def lines_with(of: list[Trial], up: tuple[float, ...]) -> list[str]:
-        takes = [mounted(trial, base, up, 1e-6) for trial in of]
+        raw_trials = [mounted(trial, base, up, 1e-6) for trial in of]
         arm, experiments, fit = to_identify_from(config, model, of)
-        return up_lines(arm, experiments, fit.markers, other_ups(takes))
+        return up_lines(arm, experiments, fit.markers, other_ups(raw_trials))
 
     right = tuple(np.round(base.apply(-trial.gravity / STANDARD_GRAVITY)) + 0.0)
     assert lines_with([trial], right) == []
@@ -160,8 +160,8 @@ def test_no_other_up_is_looked_for_where_none_can_be_right(model):
 
 
 def mounted(trial: Trial, base: Rotation, up: tuple[float, ...], noise: float = 0.0, session: str = "") -> RawTrial:
-    """As much of the take of a trial as tells its base: turned by `base`, as cameras see it with noise, in a frame of
-    which `up` is up."""
+    """A raw trial with the base of `trial`, turned by `base`, as cameras see it with noise, in a frame of which `up` is
+    up."""
     ones = np.ones((4, 1))
     fields = {"name": trial.name, "session": session, "up": np.array(up, float),
               "base_positions": 0 * ones * np.ones(3),

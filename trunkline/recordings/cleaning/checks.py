@@ -31,7 +31,7 @@ class TrialLimits:
 
 @dataclass
 class Findings:
-    """What came out about a take. repairs, warnings: one sentence each; what a warning names is left as it is.
+    """What came out about a raw trial. repairs, warnings: one sentence each; what a warning names is left as it is.
 
     faults: what cannot be true of the arm and the experiment, a sentence each; see `plausible`.
     where: the file and the trial, for messages.
@@ -48,6 +48,12 @@ class Findings:
     by_log_times: LoggedOffset | None = None
     by_motion: OffsetFit | None = None
     log: Log | None = None
+
+    def dropped(self, bad: np.ndarray, what: str, names: list[str]) -> None:
+        """Note the samples `bad` (T, B) of the bodies `names` as dropped, if there are any."""
+        if bad.any():
+            where = ", ".join(name for name, hit in zip(names, np.any(bad, axis=0), strict=True) if hit)
+            self.repairs.append(f"{int(bad.sum())} samples {what} dropped ({where})")
 
 
 def deciding(items: Iterable[Item], split: Callable[[Item], str]) -> tuple[list[Item], bool]:

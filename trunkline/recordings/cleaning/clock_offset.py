@@ -1,4 +1,4 @@
-"""What all takes of a session have in common, and only together tell: the motors' clock, and the vertical."""
+"""What all raw trials of a session have in common, and only together tell: the motors' clock, and the vertical."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -31,8 +31,8 @@ class MotorClock:
     lag: float | None = None
 
 
-def align_clocks(takes: list[RawTrial], findings: list[Findings], longest_lag: float) -> MotorClock:
-    """Give every take the offset of its motors' clock.
+def align_clocks(raw_trials: list[RawTrial], findings: list[Findings], longest_lag: float) -> MotorClock:
+    """Give every raw trial the offset of its motors' clock.
 
     By log times it is each trial's own. The arm's motion, in whose offset its lag is, checks them: no arm is ahead of
     its tendons, or far behind them. It decides where log times are missing or impossible, with a warning that the lag
@@ -42,32 +42,32 @@ def align_clocks(takes: list[RawTrial], findings: list[Findings], longest_lag: f
     Args:
         longest_lag: s, by which the arm may move after its tendons, and lags of trials may differ.
     """
-    pairs = list(zip(takes, findings, strict=True))
-    logged = {take.name: record.by_log_times.offset for take, record in pairs if record.by_log_times}
-    moved = {take.name: fit.offset for take, record in pairs if (fit := record.by_motion) and fit.certain}
+    pairs = list(zip(raw_trials, findings, strict=True))
+    logged = {raw.name: record.by_log_times.offset for raw, record in pairs if record.by_log_times}
+    moved = {raw.name: fit.offset for raw, record in pairs if (fit := record.by_motion) and fit.certain}
     lags = {name: moved[name] - offset for name, offset in logged.items() if name in moved}
-    clock, remarks = _agreed(takes, findings, logged, moved, lags, longest_lag)
-    for take, record in pairs:
-        take.clock_offset = clock.offset
+    clock, remarks = _agreed(raw_trials, findings, logged, moved, lags, longest_lag)
+    for raw, record in pairs:
+        raw.clock_offset = clock.offset
         record.warnings += remarks
-        if clock.by == "log times" and take.name in logged:
-            take.clock_offset = _trial_offset(clock, logged[take.name], lags.get(take.name), longest_lag, record)
+        if clock.by == "log times" and raw.name in logged:
+            raw.clock_offset = _trial_offset(clock, logged[raw.name], lags.get(raw.name), longest_lag, record)
     return clock
 
 
 def _agreed(
-    takes: list[RawTrial],
+    raw_trials: list[RawTrial],
     findings: list[Findings],
     logged: dict[str, float],
     moved: dict[str, float],
     lags: dict[str, float],
     longest_lag: float,
 ) -> tuple[MotorClock, list[str]]:
-    """The common offset of the takes, and remarks about it."""
-    splits = {take.name: take.split for take in takes}
+    """The common offset of the raw trials, and remarks about it."""
+    splits = {raw.name: raw.split for raw in raw_trials}
     chosen, others = deciding(logged or moved, splits.__getitem__)
     if not chosen:
-        driven = any(len(take.tendons) and not EXPERIMENTS[take.experiment].static for take in takes)
+        driven = any(len(raw.tendons) and not EXPERIMENTS[raw.experiment].static for raw in raw_trials)
         nothing = "clock: neither log times nor motion tell the motors' offset; it is taken for 0"
         return MotorClock(), [nothing] * driven
     offset, spread = agree([(logged or moved)[name] for name in chosen])
@@ -101,17 +101,17 @@ def _trial_offset(clock: MotorClock, logged: float, lag: float | None, longest_l
     return logged
 
 
-def set_gravity_direction(takes: list[RawTrial], findings: list[Findings], session: Session) -> None:
-    """Set the gravity direction that the session's tilts prove in every take; or warn of what looks wrong."""
+def set_gravity_direction(raw_trials: list[RawTrial], findings: list[Findings], session: Session) -> None:
+    """Set the gravity direction that the session's tilts prove in every raw trial; or warn of what looks wrong."""
     measured_base = not isinstance(session.base, FixedBase)
-    up, remark, fallback = check_gravity_direction(takes, measured_base)
-    for take, record in zip(takes, findings, strict=True):
+    up, remark, fallback = check_gravity_direction(raw_trials, measured_base)
+    for raw, record in zip(raw_trials, findings, strict=True):
         if up is not None:
-            take.up = up
+            raw.up = up
         if remark is not None:
             (record.warnings if up is None else record.repairs).append(remark)
         if fallback:
             reason = "those of the split identify do not tell"
             record.warnings.append(f"up: the vertical is by the tilts of other splits too, as {reason}")
     if measured_base and (up is not None or remark is None):
-        check_levels(takes, findings)
+        check_levels(raw_trials, findings)

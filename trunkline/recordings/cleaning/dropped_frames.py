@@ -4,6 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from trunkline.recordings.cleaning.checks import Findings
+from trunkline.recordings.signals.smoothing import noise_level
+
 SIDE = 3  # frames before and after a jump whose motion a parabola describes
 MOST = 9  # frames, one more than are looked for at one place; by then an arm has gone round a bend
 GAIN = 3.0  # how much better the parabola fits with the frames put back
@@ -18,6 +21,35 @@ class DroppedFrames:
 
     after: int
     frames: int
+
+
+def repair_dropped_frames(time: np.ndarray, positions: np.ndarray, motors: bool, findings: Findings) -> np.ndarray:
+    """Time (T,) with what even stamps hide put back, unless motors are dated by a clock that would not move along."""
+    noise = float(np.median(noise_level(positions.reshape(len(time), -1))))
+    lost = find_dropped_frames(time, positions, noise)
+    if not lost:
+        return time
+    count, at = sum(place.frames for place in lost), ", ".join(f"{time[place.after]:.2f}" for place in lost)
+    frames = "frame" if count == 1 else "frames"
+    sentence = f"{count} {frames} lost at {at} s, though the stamps go on evenly: all bodies jump ahead on their ways"
+    if motors:
+        findings.warnings.append(f"{sentence}; left so, as the motors have a clock of their own")
+        return time
+    findings.repairs.append(f"{sentence}; their time put back")
+    return put_back(time, lost)
+
+
+def longest_unbroken(time: np.ndarray, positions: np.ndarray, findings: Findings) -> slice:
+    """What to keep of a trial in which so many frames were lost at once that their time cannot be put back."""
+    part = unbroken(time, positions)
+    for begin, end in ((0, part.start), (part.stop, len(time))):
+        if end > begin:
+            at = time[part.start if begin == 0 else part.stop - 1]
+            findings.repairs.append(
+                f"more frames lost at {at:.2f} s than can be counted, though the stamps go on evenly; {end - begin} "
+                f"frames {'before' if begin == 0 else 'after'} it left out"
+            )
+    return part
 
 
 def find_dropped_frames(time: np.ndarray, positions: np.ndarray, noise: float) -> list[DroppedFrames]:

@@ -15,7 +15,9 @@ SPREAD = 20.0  # degrees between levels, so that not every direction on a cone f
 HANGS, LIES = np.radians(30), np.radians(60)  # from the vertical: an arm that hangs, and one that does not
 
 
-def check_gravity_direction(takes: list[RawTrial], measured_base: bool) -> tuple[np.ndarray | None, str | None, bool]:
+def check_gravity_direction(
+    raw_trials: list[RawTrial], measured_base: bool
+) -> tuple[np.ndarray | None, str | None, bool]:
     """(the vertical (3,) to take instead, or None; what to tell, or None; whether other splits than identify decided).
 
     It is replaced only where static trials at several tilts fit exactly one other axis of the frame: those of the
@@ -24,10 +26,10 @@ def check_gravity_direction(takes: list[RawTrial], measured_base: bool) -> tuple
     Args:
         measured_base: whether a body marks the mount; otherwise its orientation follows from the vertical itself.
     """
-    tilted = [take for take in takes if EXPERIMENTS[take.experiment].level is TILT and take.level is not None]
+    tilted = [raw for raw in raw_trials if EXPERIMENTS[raw.experiment].level is TILT and raw.level is not None]
     if not tilted or not measured_base:
-        return None, _check_hanging(takes), False
-    identifying = [take for take in tilted if take.split == IDENTIFY]
+        return None, _check_hanging(raw_trials), False
+    identifying = [raw for raw in tilted if raw.split == IDENTIFY]
     up, remark = _by_tilts(identifying) if identifying else (None, None)
     if len(identifying) == len(tilted) or up is not None or (identifying and remark is None):
         return up, remark, False
@@ -37,8 +39,8 @@ def check_gravity_direction(takes: list[RawTrial], measured_base: bool) -> tuple
 
 def _by_tilts(static: list[RawTrial]) -> tuple[np.ndarray | None, str | None]:
     """(another vertical that these tilts prove, or None; what to tell, or None where the declared one fits)."""
-    up, levels = static[0].up, np.radians([take.level for take in static if take.level is not None])
-    z = np.array([_axis(take) for take in static])
+    up, levels = static[0].up, np.radians([raw.level for raw in static if raw.level is not None])
+    z = np.array([_axis(raw) for raw in static])
     off = _misfit(z, up, levels)
     if off <= OFF:
         return None, None
@@ -51,19 +53,19 @@ def _by_tilts(static: list[RawTrial]) -> tuple[np.ndarray | None, str | None]:
     return None, f"{problem}, and no other axis fits: check the levels, `frame.up` and `base` in session.yaml"
 
 
-def check_levels(takes: list[RawTrial], findings: list[Findings]) -> None:
-    """Warn of each tilt whose base is not inclined as its level says, by the vertical that the takes have."""
-    for take, record in zip(takes, findings, strict=True):
-        if EXPERIMENTS[take.experiment].level is TILT and take.level is not None:
-            tilt = np.degrees(np.arccos(np.clip(_axis(take) @ take.up, -1, 1)))
-            if abs(tilt - take.level) > np.degrees(OFF):
-                problem = f"level: found {take.level:g}, but the base is tilted by {tilt:.0f}°"
+def check_levels(raw_trials: list[RawTrial], findings: list[Findings]) -> None:
+    """Warn of each tilt whose base is not inclined as its level says, by the vertical that the raw trials have."""
+    for raw, record in zip(raw_trials, findings, strict=True):
+        if EXPERIMENTS[raw.experiment].level is TILT and raw.level is not None:
+            tilt = np.degrees(np.arccos(np.clip(_axis(raw) @ raw.up, -1, 1)))
+            if abs(tilt - raw.level) > np.degrees(OFF):
+                problem = f"level: found {raw.level:g}, but the base is tilted by {tilt:.0f}°"
                 record.warnings.append(f"{problem}, expected at most {np.degrees(OFF):.0f}° between them")
 
 
-def _axis(take: RawTrial) -> np.ndarray:
+def _axis(raw: RawTrial) -> np.ndarray:
     """The base's z axis (3,) in the motion-capture frame."""
-    return average_base(take.base_positions, take.base_quaternions).rotation.apply([0, 0, 1])
+    return average_base(raw.base_positions, raw.base_quaternions).rotation.apply([0, 0, 1])
 
 
 def _misfit(z: np.ndarray, up: np.ndarray, levels: np.ndarray) -> float:
@@ -71,12 +73,12 @@ def _misfit(z: np.ndarray, up: np.ndarray, levels: np.ndarray) -> float:
     return float(np.median(np.abs(np.arccos(np.clip(z @ up, -1, 1)) - levels)))
 
 
-def _check_hanging(takes: list[RawTrial]) -> str | None:
+def _check_hanging(raw_trials: list[RawTrial]) -> str | None:
     """After a release an arm hangs more or less; told where all releases come to rest along another axis."""
-    hanging = [_hang(take) for take in takes if EXPERIMENTS[take.experiment].hangs]
+    hanging = [_hang(raw) for raw in raw_trials if EXPERIMENTS[raw.experiment].hangs]
     if not hanging:
         return None
-    down, up = np.array(hanging), takes[0].up
+    down, up = np.array(hanging), raw_trials[0].up
     angle = np.median(np.arccos(np.clip(-down @ up, -1, 1)))
     others = [np.median(np.arccos(np.clip(-down @ axis, -1, 1))) for axis in AXES]
     best = int(np.argmin(others))
@@ -86,10 +88,10 @@ def _check_hanging(takes: list[RawTrial]) -> str | None:
     return f"up: {problem}, {np.degrees(others[best]):.0f}° with {_show(AXES[best])}: check `frame.up` in session.yaml"
 
 
-def _hang(take: RawTrial) -> np.ndarray:
-    """The direction (3,) from the base to the farthest marker, over the last fifth of a take."""
-    ends = slice(-max(1, len(take.time) // 5), None)
-    middle = np.nanmedian(take.positions[ends], axis=0) - np.nanmedian(take.base_positions[ends], axis=0)
+def _hang(raw: RawTrial) -> np.ndarray:
+    """The direction (3,) from the base to the farthest marker, over the last fifth of a raw trial."""
+    ends = slice(-max(1, len(raw.time) // 5), None)
+    middle = np.nanmedian(raw.positions[ends], axis=0) - np.nanmedian(raw.base_positions[ends], axis=0)
     distance = np.where(np.isfinite(middle[:, 0]), np.linalg.norm(middle, axis=1), 0)
     return middle[np.argmax(distance)] / max(distance.max(), 1e-12)
 

@@ -1,7 +1,7 @@
-"""Markers taken for one another: labels that change places, told by the distances along the arm.
+"""Label swaps, found by the distances along the arm, and repaired.
 
 The distance between nearby markers hardly depends on the arm's shape. Where two labels are exchanged, both are
-at the other's usual distances from their neighbours. What is found here, `repairs` puts back.
+at the other's usual distances from their neighbours.
 """
 
 from dataclasses import dataclass
@@ -9,6 +9,8 @@ from itertools import permutations
 
 import numpy as np
 
+from trunkline.recordings.cleaning.checks import Findings
+from trunkline.recordings.cleaning.reference import Reference
 from trunkline.recordings.signals.runs import lasting
 
 LONGEST = 4  # labels in a round
@@ -17,7 +19,6 @@ REFERENCES = 4  # nearest other bodies by whose distances two markers are told a
 LEAST_CONTRAST = 3e-3  # m by which the distances of two markers must differ
 LONE = 3  # frames that one of the two, alone, has to be at the other's place
 CLEAR = 0.3  # the exchanged labels must fit this many times better
-SAMPLE = 200  # frames of a log that tell the usual distances
 
 
 @dataclass
@@ -26,23 +27,6 @@ class LabelSwap:
 
     bodies: tuple[int, ...]
     frames: np.ndarray
-
-
-def usual_distances(logs: list[np.ndarray]) -> np.ndarray:
-    """Median distances (B, B) in m between the bodies of logs (T, B, 3); NaN where two are never seen together."""
-    samples = []
-    for positions in logs:
-        some = positions[:: max(1, len(positions) // SAMPLE)]
-        some = np.where(np.isfinite(some), some, np.nan)
-        samples.append(np.linalg.norm(some[:, :, None] - some[:, None], axis=-1))
-    together = np.concatenate(samples)
-    distances = np.full(together.shape[1:], np.nan)
-    for first, second in zip(*np.triu_indices(len(distances), 1), strict=True):
-        apart = together[:, first, second]
-        apart = apart[np.isfinite(apart)]
-        if len(apart):
-            distances[first, second] = distances[second, first] = np.median(apart)
-    return distances
 
 
 def find_label_swaps(positions: np.ndarray, usual: np.ndarray, marked_base: bool = True) -> list[LabelSwap]:
@@ -65,6 +49,35 @@ def find_label_swaps(positions: np.ndarray, usual: np.ndarray, marked_base: bool
         better = left < least[flagged]
         least[flagged[better]], best[flagged[better]] = left[better], place
     return [LabelSwap(bodies, best == place) for place, bodies in enumerate(candidates) if (best == place).any()]
+
+
+def repair_label_swaps(
+    base: tuple[np.ndarray, np.ndarray],
+    positions: np.ndarray,
+    quaternions: np.ndarray | None,
+    time: np.ndarray,
+    reference: Reference,
+    findings: Findings,
+) -> None:
+    """Give labels that changed places back, in the poses of the base (where a body marks it) and of the markers, at
+    times (T,) s."""
+    if reference.distances is None:
+        return
+    names = [reference.base or "base", *reference.markers]
+    bodies = np.insert(positions, 0, base[0], axis=1)
+    turns = None if quaternions is None else np.insert(quaternions, 0, base[1], axis=1)
+    for swap in find_label_swaps(bodies, reference.distances, reference.base is not None):
+        wrong, right = np.array(swap.bodies), np.array([*swap.bodies[1:], swap.bodies[0]])
+        for values in (bodies, turns):
+            if values is not None:
+                values[np.ix_(swap.frames, right)] = values[np.ix_(swap.frames, wrong)]
+        count, who = int(swap.frames.sum()), " and ".join(repr(names[body]) for body in swap.bodies)
+        begin, end = time[np.flatnonzero(swap.frames)[[0, -1]]]
+        when = f"between {begin:.2f} and {end:.2f} s"
+        findings.repairs.append(f"{who} were taken for each other in {count} frames {when}, put right")
+    base[0][:], positions[:] = bodies[:, 0], bodies[:, 1:]
+    if turns is not None and quaternions is not None:
+        base[1][:], quaternions[:] = turns[:, 0], turns[:, 1:]
 
 
 def _candidates(usual: np.ndarray, marked_base: bool) -> list[tuple[int, ...]]:

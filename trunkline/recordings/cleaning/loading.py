@@ -1,4 +1,4 @@
-"""From the logs of a session to checked takes: what is usable, what was repaired, what had to be refused."""
+"""From the logs of a session to checked raw trials: what is usable, what was repaired, what had to be refused."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -8,9 +8,12 @@ import numpy as np
 from trunkline.errors import InputError
 from trunkline.recordings.cleaning.bag_time import logged_offset
 from trunkline.recordings.cleaning.checks import Findings, TrialLimits
+from trunkline.recordings.cleaning.dropped_frames import longest_unbroken, repair_dropped_frames
+from trunkline.recordings.cleaning.invalid_samples import valid_samples
+from trunkline.recordings.cleaning.label_swaps import repair_label_swaps
 from trunkline.recordings.cleaning.motors import check_motors, read_motors
 from trunkline.recordings.cleaning.reference import Reference, reference_of
-from trunkline.recordings.cleaning.repairs import drop_frozen, good_samples, longest_part, untangle, with_dropped_time
+from trunkline.recordings.cleaning.stale_poses import drop_stale_poses
 from trunkline.recordings.cleaning.trial_window import Stretch, check_seen, columns_of, read_stretch, split_base
 from trunkline.recordings.session.session import Session, TrialEntry
 from trunkline.recordings.session.source import LogSource, open_log
@@ -24,7 +27,7 @@ def load_raw_trials(
 ) -> Iterator[tuple[TrialEntry, RawTrial | InputError, Findings]]:
     """Read trial by trial. A trial that cannot be used comes as the error that says why.
 
-    Every take has the same markers: those that session.yaml maps, or all that any log shows.
+    Every raw trial has the same markers: those that session.yaml maps, or all that any log shows.
     """
     logs: dict[str, LogSource | InputError] = {}
     read: list[tuple[LogSource, Stretch] | InputError] = []
@@ -49,7 +52,7 @@ def load_raw_trials(
             yield trial, some, record
             continue
         try:
-            yield trial, _take(*some, trial, session, reference, limits, record), record
+            yield trial, _raw_trial(*some, trial, session, reference, limits, record), record
         except InputError as error:
             yield trial, error, record
 
@@ -62,7 +65,7 @@ def _opened(path: Path, session: Session) -> LogSource | InputError:
         return error
 
 
-def _take(
+def _raw_trial(
     source: LogSource,
     stretch: Stretch,
     trial: TrialEntry,
@@ -81,24 +84,24 @@ def _take(
     findings.warnings += reference.warnings
     bodies = reference.bodies
     columns = columns_of(source, bodies, where)
-    positions, quaternions = good_samples(source.poses, stretch.rows, columns, reference, findings)
-    drop_frozen(positions, quaternions, bodies, findings)
+    positions, quaternions = valid_samples(source.poses, stretch.rows, columns, reference, findings)
+    drop_stale_poses(positions, quaternions, bodies, findings)
     check_seen(positions, bodies, limits.coverage, where, findings)
     base_positions, base_quaternions, positions, quaternions = split_base(
         session, positions, quaternions, f"{where}: {source.pose_topic}"
     )
-    untangle((base_positions, base_quaternions), positions, quaternions, stretch.time, reference, findings)
+    repair_label_swaps((base_positions, base_quaternions), positions, quaternions, stretch.time, reference, findings)
     if not is_stepwise(trial.experiment):  # there the arm jumps from frame to frame
-        stretch.time = with_dropped_time(stretch.time, positions, bool(source.joint_topics), findings)
+        stretch.time = repair_dropped_frames(stretch.time, positions, bool(source.joint_topics), findings)
         if not source.joint_topics:
-            part = longest_part(stretch.time, positions, findings)
+            part = longest_unbroken(stretch.time, positions, findings)
             positions, base_positions, base_quaternions = positions[part], base_positions[part], base_quaternions[part]
             quaternions = None if quaternions is None else quaternions[part]
             stretch = stretch.part(part)
     motors = read_motors(source, session, stretch, limits, where, findings)
     if EXPERIMENTS[trial.experiment].needs_motors:
         check_motors(source, session, reference.joint_topics, motors, stretch, limits, where)
-    take = RawTrial(
+    raw = RawTrial(
         name=trial.name,
         experiment=trial.experiment,
         split=trial.split,
@@ -113,14 +116,14 @@ def _take(
         base_quaternions=base_quaternions,
         **vars(motors),
     )
-    findings.by_log_times, findings.by_motion = logged_offset(source, session, stretch), _by_motion(take, limits)
-    return take
+    findings.by_log_times, findings.by_motion = logged_offset(source, session, stretch), _by_motion(raw, limits)
+    return raw
 
 
-def _by_motion(take: RawTrial, limits: TrialLimits) -> OffsetFit | None:
+def _by_motion(raw: RawTrial, limits: TrialLimits) -> OffsetFit | None:
     """By how much the motors' clock is off, by what was wound, or else by what was commanded, while the arm moves."""
-    if EXPERIMENTS[take.experiment].static:
+    if EXPERIMENTS[raw.experiment].static:
         return None
-    wound = (take.tendon_time, take.tendon_positions)
-    motion = wound if len(take.tendon_time) else (take.command_time, take.commands)
-    return estimate_offset(take.time, take.positions, *motion, limits.clock_offset)
+    wound = (raw.tendon_time, raw.tendon_positions)
+    motion = wound if len(raw.tendon_time) else (raw.command_time, raw.commands)
+    return estimate_offset(raw.time, raw.positions, *motion, limits.clock_offset)

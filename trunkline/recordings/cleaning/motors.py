@@ -17,7 +17,7 @@ ROLES = ("command", "tendon position")
 
 @dataclass
 class MotorSignals:
-    """What moves the tendons around a trial, each stream on its own times: as in a take."""
+    """What moves the tendons around a trial, each stream on its own times: as in a raw trial."""
 
     tendons: tuple[str, ...]
     command_time: np.ndarray

@@ -15,23 +15,23 @@ NOISIER = 5.0  # times the measurements' noise, that no command has
 HELD = MIN_TRAVEL  # m, to either side, by which a tendon that is held may be wound
 
 
-def encoder_zeros(takes: list[RawTrial], idle: float) -> dict[str, float]:
-    """What each tendon's measured position reads where its command is 0, m, by the takes that pull.
+def encoder_zeros(raw_trials: list[RawTrial], idle: float) -> dict[str, float]:
+    """What each tendon's measured position reads where its command is 0, m, by the raw trials that pull.
 
     None of a tendon of which most of them are off by more than `idle`: its encoder starts anywhere in each trial.
     """
     readings: dict[str, list[float]] = {}
-    for take in takes:
-        if EXPERIMENTS[take.experiment].needs_motors and take.commands.size and take.tendon_positions.size:
-            ahead = np.median(take.tendon_positions - _commanded(take), axis=0)
-            for name, reads in zip(take.tendons, ahead.tolist(), strict=True):
+    for raw in raw_trials:
+        if EXPERIMENTS[raw.experiment].needs_motors and raw.commands.size and raw.tendon_positions.size:
+            ahead = np.median(raw.tendon_positions - _commanded(raw), axis=0)
+            for name, reads in zip(raw.tendons, ahead.tolist(), strict=True):
                 readings.setdefault(name, []).append(reads)
     middle = {name: float(np.median(reads)) for name, reads in readings.items()}
     return {name: zero for name, zero in middle.items() if np.median(np.abs(np.array(readings[name]) - zero)) <= idle}
 
 
-def check_pulls(take: RawTrial, length: float, idle: float, factor: float, zeros: dict[str, float]) -> list[str]:
-    """What cannot be true of a take's tendons, a sentence each.
+def check_pulls(raw: RawTrial, length: float, idle: float, factor: float, zeros: dict[str, float]) -> list[str]:
+    """What cannot be true of a raw trial's tendons, a sentence each.
 
     Args:
         length: m, of the arm, from which no tendon can be drawn in by more than that.
@@ -39,68 +39,68 @@ def check_pulls(take: RawTrial, length: float, idle: float, factor: float, zeros
         factor: by which pulls may differ from the level, and measured from commanded ones.
         zeros: as `encoder_zeros` gives them.
     """
-    kind = EXPERIMENTS[take.experiment]
-    if kind.needs_motors and kind.level is PULL and take.level is not None:
-        for key, pulls in (("commands", take.commands), ("tendon positions", take.tendon_positions)):
+    kind = EXPERIMENTS[raw.experiment]
+    if kind.needs_motors and kind.level is PULL and raw.level is not None:
+        for key, pulls in (("commands", raw.commands), ("tendon positions", raw.tendon_positions)):
             # from the straight arm, or where encoders start anywhere, from the trial's begin
-            faults = [_against_level(key, pulls - zero, 1e-3 * take.level, factor) for zero in (0.0, pulls[:1])]
+            faults = [_against_level(key, pulls - zero, 1e-3 * raw.level, factor) for zero in (0.0, pulls[:1])]
             if pulls.size and all(faults):
                 return faults[1]
     elif kind.needs_motors:
-        faults = _fixed_commands(take) if kind.static and not kind.stepwise else []
-        faults += _beyond("commands", take.commands, length)
-        faults += _beyond("tendon positions", take.tendon_positions - take.tendon_positions[:1], length)
+        faults = _fixed_commands(raw) if kind.static and not kind.stepwise else []
+        faults += _beyond("commands", raw.commands, length)
+        faults += _beyond("tendon positions", raw.tendon_positions - raw.tendon_positions[:1], length)
         if faults:
             return faults
-    elif faults := _pulled(take, kind.static, idle, zeros):
+    elif faults := _pulled(raw, kind.static, idle, zeros):
         return faults
-    if take.commands.size and take.tendon_positions.size:
-        return _against_commands(take, factor)
+    if raw.commands.size and raw.tendon_positions.size:
+        return _against_commands(raw, factor)
     return []
 
 
-def _pulled(take: RawTrial, static: bool, idle: float, zeros: dict[str, float]) -> list[str]:
+def _pulled(raw: RawTrial, static: bool, idle: float, zeros: dict[str, float]) -> list[str]:
     """In an experiment without motors, commands do not move while the arm does, and most of the time no tendon is drawn
     in. A loose one may well move by itself, and may be let out by any length.
 
     Measured positions tell it where what they read without a pull is known; and where there are no commands, as they
     stand for them then.
     """
-    expected = f"expected a {take.experiment} without actuation"
-    if take.commands.size and not static:
-        wound = np.ptp(take.commands, axis=0)
+    expected = f"expected a {raw.experiment} without actuation"
+    if raw.commands.size and not static:
+        wound = np.ptp(raw.commands, axis=0)
         most = int(np.argmax(wound))
         if wound[most] > idle:
-            problem = f"{take.tendons[most]!r} is wound by {1e3 * wound[most]:.4g} mm"
+            problem = f"{raw.tendons[most]!r} is wound by {1e3 * wound[most]:.4g} mm"
             return [f"experiment: commands: {problem}, {expected}"]
-    unknown = np.nan if take.commands.size else 0.0
-    zero = np.array([zeros.get(name, unknown) for name in take.tendons])
+    unknown = np.nan if raw.commands.size else 0.0
+    zero = np.array([zeros.get(name, unknown) for name in raw.tendons])
     for key, time, pulls in (
-        ("commands", take.command_time, take.commands),
-        ("tendon positions", take.tendon_time, take.tendon_positions - zero),
+        ("commands", raw.command_time, raw.commands),
+        ("tendon positions", raw.tendon_time, raw.tendon_positions - zero),
     ):
         if not pulls.size:
             continue
-        inside = (time >= 0) & (time <= take.time[-1])
+        inside = (time >= 0) & (time <= raw.time[-1])
         usual = np.nan_to_num(np.median(pulls[inside] if inside.any() else pulls, axis=0))
         most = int(np.argmax(usual))
         if usual[most] > idle:
-            return [f"experiment: {key}: {take.tendons[most]!r} is drawn in by {1e3 * usual[most]:.4g} mm, {expected}"]
+            return [f"experiment: {key}: {raw.tendons[most]!r} is drawn in by {1e3 * usual[most]:.4g} mm, {expected}"]
     return []
 
 
-def _fixed_commands(take: RawTrial) -> list[str]:
+def _fixed_commands(raw: RawTrial) -> list[str]:
     """In an experiment at rest, most of the time every command is about where it is in the middle: windows may touch
     the way to the next pull, the more so as the motors' clock is not set yet."""
-    inside = (take.command_time >= 0) & (take.command_time <= take.time[-1])
+    inside = (raw.command_time >= 0) & (raw.command_time <= raw.time[-1])
     if not inside.any():
         return []
-    off = np.abs(take.commands[inside] - np.median(take.commands[inside], axis=0))
+    off = np.abs(raw.commands[inside] - np.median(raw.commands[inside], axis=0))
     most = int(np.argmax(np.mean(off > HELD, axis=0)))
     if np.mean(off[:, most] > HELD) <= 0.5:
         return []
-    problem = f"{take.tendons[most]!r} is wound by {1e3 * np.ptp(take.commands[inside, most]):.4g} mm"
-    return [f"experiment: commands: {problem}, expected a {take.experiment} to hold them to within {1e3 * HELD:g} mm"]
+    problem = f"{raw.tendons[most]!r} is wound by {1e3 * np.ptp(raw.commands[inside, most]):.4g} mm"
+    return [f"experiment: commands: {problem}, expected a {raw.experiment} to hold them to within {1e3 * HELD:g} mm"]
 
 
 def _beyond(key: str, pulls: np.ndarray, length: float) -> list[str]:
@@ -126,11 +126,11 @@ def _against_level(key: str, wound: np.ndarray, level: float, factor: float) -> 
     return [f"{problem}, {expected}{hint}"]
 
 
-def _against_commands(take: RawTrial, factor: float) -> list[str]:
+def _against_commands(raw: RawTrial, factor: float) -> list[str]:
     """Each tendon's measured position follows its own command, forwards, by about as much, and not ahead of it."""
-    measured, commanded = take.tendon_positions, _commanded(take)
+    measured, commanded = raw.tendon_positions, _commanded(raw)
     faults = []
-    for tendon, name in enumerate(take.tendons):
+    for tendon, name in enumerate(raw.tendons):
         if max(np.ptp(measured[:, tendon]), np.ptp(commanded[:, tendon])) < MIN_TRAVEL:
             continue
         alike = [_correlation(measured[:, tendon], command) for command in commanded.T]
@@ -139,28 +139,28 @@ def _against_commands(take: RawTrial, factor: float) -> list[str]:
         if alike[tendon] < -FAILS:
             faults.append(f"tendons: {name!r} moves against its commands, {expected}: is the sign reversed?")
         elif alike[tendon] < FAILS and alike[best] > FOLLOWS:
-            faults.append(f"tendons: {name!r} follows the commands of {take.tendons[best]!r}, {expected}")
+            faults.append(f"tendons: {name!r} follows the commands of {raw.tendons[best]!r}, {expected}")
         else:
             travel, commanded_travel = np.ptp(measured[:, tendon]), np.ptp(commanded[:, tendon])
             if not commanded_travel / factor <= travel <= commanded_travel * factor:
                 problem = f"{name!r} moves by {travel:.4g} m where {commanded_travel:.4g} m are commanded"
                 faults.append(f"tendons: {problem}, {expected}, within a factor of {factor:g}")
-    return faults or _exchanged(take, commanded)
+    return faults or _exchanged(raw, commanded)
 
 
-def _exchanged(take: RawTrial, commanded: np.ndarray) -> list[str]:
+def _exchanged(raw: RawTrial, commanded: np.ndarray) -> list[str]:
     """Measurements lag behind commands and have noise; where it is the other way about, topics are exchanged."""
     most = int(np.argmax(np.ptp(commanded, axis=0)))
-    if np.ptp(commanded[:, most]) < MIN_TRAVEL or len(take.tendon_time) < 10:
+    if np.ptp(commanded[:, most]) < MIN_TRAVEL or len(raw.tendon_time) < 10:
         return []
     lags = np.arange(-LATEST, LATEST, 0.005)
-    time, measured = take.tendon_time, take.tendon_positions[:, most]
+    time, measured = raw.tendon_time, raw.tendon_positions[:, most]
     inside = (time > time[0] + LATEST) & (time < time[-1] - LATEST)
     if inside.sum() < 10:
         return []
-    shifted = [np.interp(time[inside] - lag, take.command_time, take.commands[:, most]) for lag in lags]
+    shifted = [np.interp(time[inside] - lag, raw.command_time, raw.commands[:, most]) for lag in lags]
     lag = float(lags[int(np.argmax([_correlation(measured[inside], command) for command in shifted]))])
-    noise = [float(noise_level(some)[most]) for some in (take.commands, take.tendon_positions)]
+    noise = [float(noise_level(some)[most]) for some in (raw.commands, raw.tendon_positions)]
     if lag >= -EARLY and not (lag <= EARLY and noise[0] > NOISIER * noise[1]):
         return []
     problem = f"commands are noisier, by {1e3 * noise[0]:.2g} mm, than what is measured, by {1e3 * noise[1]:.2g} mm"
@@ -169,9 +169,9 @@ def _exchanged(take: RawTrial, commanded: np.ndarray) -> list[str]:
     return [f"topics: {problem}: are `commands` and `tendon_positions` exchanged in session.yaml?"]
 
 
-def _commanded(take: RawTrial) -> np.ndarray:
+def _commanded(raw: RawTrial) -> np.ndarray:
     """Commands at the times of the measured positions, m. Shape (Tm, K)."""
-    return np.stack([np.interp(take.tendon_time, take.command_time, command) for command in take.commands.T], axis=1)
+    return np.stack([np.interp(raw.tendon_time, raw.command_time, command) for command in raw.commands.T], axis=1)
 
 
 def _correlation(first: np.ndarray, second: np.ndarray) -> float:

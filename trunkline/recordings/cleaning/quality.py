@@ -15,14 +15,14 @@ from trunkline.recordings.trials.raw_trial import RawTrial
 
 @dataclass
 class Quality:
-    """The quality of one take.
+    """The quality of one raw trial.
 
     interval: s, median time between frames. dropped: frames missing between others.
     coverage: (S,) share of frames in which a marker has a good sample. gaps: s, of each stretch without.
     position_noise: (S,) m, angle_noise: (S,) rad or None: per axis, standard deviation.
     """
 
-    take: RawTrial
+    raw: RawTrial
     findings: Findings
     interval: float
     dropped: int
@@ -32,21 +32,21 @@ class Quality:
     angle_noise: np.ndarray | None
 
 
-def judge(take: RawTrial, findings: Findings) -> Quality:
-    """Measure the quality of a take."""
-    steps = np.diff(take.time)
+def judge(raw: RawTrial, findings: Findings) -> Quality:
+    """Measure the quality of a raw trial."""
+    steps = np.diff(raw.time)
     interval = float(np.median(steps))
-    visible = np.isfinite(take.positions[..., 0])
-    gaps = [np.diff(take.time[good]) for good in visible.T]
-    shape = (len(take.time), len(take.markers), -1)
-    position_noise = noise_level(take.positions.reshape(len(take.time), -1)).reshape(shape[1:])
+    visible = np.isfinite(raw.positions[..., 0])
+    gaps = [np.diff(raw.time[good]) for good in visible.T]
+    shape = (len(raw.time), len(raw.markers), -1)
+    position_noise = noise_level(raw.positions.reshape(len(raw.time), -1)).reshape(shape[1:])
     angle_noise = None
-    if take.quaternions is not None:
-        component = noise_level(take.quaternions.reshape(len(take.time), -1)).reshape(shape[1:])
+    if raw.quaternions is not None:
+        component = noise_level(raw.quaternions.reshape(len(raw.time), -1)).reshape(shape[1:])
         # half an angle is in the vector part; what three axes bring is spread over four components
         angle_noise = 2 * np.sqrt(np.sum(component**2, axis=1) / 3)
     return Quality(
-        take,
+        raw,
         findings,
         interval,
         int(np.sum(np.round(steps / interval) - 1)),
@@ -58,11 +58,11 @@ def judge(take: RawTrial, findings: Findings) -> Quality:
 
 
 def by_sentence(qualities: list[Quality], sentences_of: Callable[[Findings], list[str]]) -> list[str]:
-    """What is said of takes, each sentence once, with the trials of which it is said."""
+    """What is said of raw trials, each sentence once, with the trials of which it is said."""
     names: dict[str, list[str]] = {}
     for quality in qualities:
         for sentence in sentences_of(quality.findings):
-            names.setdefault(sentence, []).append(quality.take.name)
+            names.setdefault(sentence, []).append(quality.raw.name)
     every = len(qualities)
     who = ["all trials" if len(trials) == every > 1 else ", ".join(trials) for trials in names.values()]
     return [f"{trials}: {sentence}" for trials, sentence in zip(who, names, strict=True)]
@@ -72,7 +72,7 @@ def report(qualities: list[Quality], gathered: CheckedSession) -> dict:
     """The quality report, per trial and for the session; None where there is nothing to measure."""
     several = len({log.path.parent for log in _logs(qualities)}) > 1
     return {
-        "trials": {quality.take.name: _trial(quality) for quality in qualities},
+        "trials": {quality.raw.name: _trial(quality) for quality in qualities},
         "refused": gathered.refused,
         "logs": {
             (f"{log.path.parent.name}/{log.path.name}" if several else log.path.name): {
@@ -108,16 +108,16 @@ def summary(qualities: list[Quality], gathered: CheckedSession) -> dict:
     """The session in a few numbers, for metrics.json. repairs: their number by split, and in all."""
     angles = [quality.angle_noise for quality in qualities if quality.angle_noise is not None]
     gaps, clock = np.concatenate([quality.gaps for quality in qualities]), gathered.clock
-    repairs = dict.fromkeys(("total", *(quality.take.split for quality in qualities)), 0)
+    repairs = dict.fromkeys(("total", *(quality.raw.split for quality in qualities)), 0)
     for quality in qualities:
-        for split in ("total", quality.take.split):
+        for split in ("total", quality.raw.split):
             repairs[split] += len(quality.findings.repairs)
     return {
         "trials": len(qualities),
         "refused": len(gathered.refused),
         "repairs": repairs,
         "warnings": sum(len(quality.findings.warnings) for quality in qualities),
-        "poses": sum(len(quality.take.time) * (len(quality.take.markers) + 1) for quality in qualities),
+        "poses": sum(len(quality.raw.time) * (len(quality.raw.markers) + 1) for quality in qualities),
         "coverage": float(np.mean([quality.coverage.mean() for quality in qualities])),
         "dropped_frames": sum(quality.dropped for quality in qualities),
         "gaps": len(gaps),
@@ -137,17 +137,17 @@ def _logs(qualities: list[Quality]) -> list[Log]:
 
 
 def _trial(quality: Quality) -> dict:
-    take, findings = quality.take, quality.findings
+    raw, findings = quality.raw, quality.findings
     logged, moved = findings.by_log_times, findings.by_motion
     return {
-        "experiment": take.experiment,
-        "split": take.split,
-        "frames": len(take.time),
-        "duration_s": float(take.time[-1]),
+        "experiment": raw.experiment,
+        "split": raw.split,
+        "frames": len(raw.time),
+        "duration_s": float(raw.time[-1]),
         "rate_hz": 1 / quality.interval,
         "dropped_frames": quality.dropped,
         "stamp_jitter_ms": None if findings.frames is None else 1e3 * findings.frames.jitter,
-        "coverage": dict(zip(take.markers, quality.coverage.tolist(), strict=True)),
+        "coverage": dict(zip(raw.markers, quality.coverage.tolist(), strict=True)),
         "gaps": len(quality.gaps),
         "longest_gap_ms": 1e3 * float(quality.gaps.max(initial=0)),
         "position_noise_mm": 1e3 * float(np.median(quality.position_noise)),

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from trunkline.recordings.cleaning.checks import deciding
-from trunkline.recordings.cleaning.label_swaps import usual_distances
 from trunkline.recordings.cleaning.trial_window import Stretch
+from trunkline.recordings.cleaning.usual_distances import usual_distances
 from trunkline.recordings.session.session import FixedBase, Session, TrialEntry
 from trunkline.recordings.session.source import LogSource
 from trunkline.recordings.signals.units import extent, likely_unit
@@ -19,7 +19,7 @@ UNIT = {"m": 1.0, "mm": 1e-3}
 class Reference:
     """What each trial is read and repaired by.
 
-    markers: name in the log to name in the model, in the order of every take. base: the body that marks the mount,
+    markers: name in the log to name in the model, in the order of every raw trial. base: the body that marks the mount,
     None where none does. scale: m per unit of the logs' positions.
     distances: between the base and the markers, see `usual_distances`; None where there is too little to compare.
     joint_topics: of all logs. repairs, warnings: what is to be said of every trial; see `Findings`.

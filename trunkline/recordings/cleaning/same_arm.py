@@ -1,4 +1,4 @@
-"""Several sessions together: whether they are of one arm, and their takes under names that no other has."""
+"""Several sessions together: whether they are of one arm, and their raw trials under names that no other has."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -7,15 +7,15 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.files import file_digest
-from trunkline.recordings.cleaning.label_swaps import usual_distances
 from trunkline.recordings.cleaning.session_checks import CheckedSession
+from trunkline.recordings.cleaning.usual_distances import usual_distances
 from trunkline.recordings.session.session import Session, read_session
 
 
 def check_each_session(
-    folders: dict[str, Path], take: Callable[[Path, Session], CheckedSession], distance: float
+    folders: dict[str, Path], read: Callable[[Path, Session], CheckedSession], distance: float
 ) -> dict[str, CheckedSession]:
-    """What `take` gathers of each of the sessions in `folders`, by name; of several, refused unless of one arm, and
+    """What `read` returns for each of the sessions in `folders`, by name; of several, refused unless of one arm, and
     under names that no other has.
 
     Args:
@@ -24,7 +24,7 @@ def check_each_session(
     sessions = {name: read_session(folder) for name, folder in folders.items()}
     if len(sessions) > 1:
         require_distinct_logs(folders, sessions)
-    sessions_read = {name: take(folders[name], session) for name, session in sessions.items()}
+    sessions_read = {name: read(folders[name], session) for name, session in sessions.items()}
     if len(sessions_read) > 1:
         require_same_arm(sessions_read, distance)
         for name, gathered in sessions_read.items():
@@ -33,10 +33,10 @@ def check_each_session(
 
 
 def name_apart(gathered: CheckedSession, session: str) -> None:
-    """Say of all takes, and of refused trials, to which session they belong: `session/name`, as no session has a / in
+    """Put the session before the names of its raw trials and refused trials: `session/name`, as no session has a / in
     its name."""
-    for take in gathered.takes:
-        take.session, take.name = session, f"{session}/{take.name}"
+    for raw in gathered.raw_trials:
+        raw.session, raw.name = session, f"{session}/{raw.name}"
     gathered.refused = {f"{session}/{name}": why for name, why in gathered.refused.items()}
 
 
@@ -50,7 +50,7 @@ def require_same_arm(sessions: dict[str, CheckedSession], distance: float) -> No
     for name, other in others:
         for key in ("markers", "tendons"):
             ours, theirs = (
-                next((list(getattr(t, key)) for t in session.takes if getattr(t, key)), [])
+                next((list(getattr(t, key)) for t in session.raw_trials if getattr(t, key)), [])
                 for session in (reference, other)
             )
             if ours and theirs and ours != theirs:
@@ -60,7 +60,8 @@ def require_same_arm(sessions: dict[str, CheckedSession], distance: float) -> No
         off = np.abs(ours - theirs)
         if np.nanmax(off) > distance * np.nanmax(ours):
             worst = int(np.nanargmax(off))
-            marker, before = reference.takes[0].markers[worst], f"{1e3 * ours[worst]:.0f} mm in the session {first}"
+            marker = reference.raw_trials[0].markers[worst]
+            before = f"{1e3 * ours[worst]:.0f} mm in the session {first}"
             problem = f"session {name}: found {marker!r} {1e3 * theirs[worst]:.0f} mm from the body before it"
             raise InputError(f"{problem}, expected about {before}, as one arm is identified from both")
 
@@ -78,7 +79,7 @@ def require_distinct_logs(folders: dict[str, Path], sessions: dict[str, Session]
 
 def _along(gathered: CheckedSession) -> np.ndarray:
     """Usual distances of each marker from the body before it, the base before the first, m. Shape (S,)."""
-    usual = usual_distances([np.insert(take.positions, 0, take.base_positions, axis=1) for take in gathered.takes])
+    usual = usual_distances([np.insert(raw.positions, 0, raw.base_positions, axis=1) for raw in gathered.raw_trials])
     return np.diagonal(usual, 1)
 
 

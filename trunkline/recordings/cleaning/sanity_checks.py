@@ -14,8 +14,8 @@ from pydantic import Field
 
 from trunkline.frames import rotation_from_wxyz
 from trunkline.recordings.cleaning.checks import Findings, deciding
-from trunkline.recordings.cleaning.label_swaps import usual_distances
 from trunkline.recordings.cleaning.pulls import check_pulls, encoder_zeros
+from trunkline.recordings.cleaning.usual_distances import usual_distances
 from trunkline.recordings.signals.smoothing import fill_gaps
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_stepwise
 from trunkline.recordings.trials.raw_trial import RawTrial
@@ -46,35 +46,35 @@ class SanityLimits:
 
 
 def check_sanity(
-    takes: list[RawTrial], findings: list[Findings], base: str | None, settings: SanityLimits
+    raw_trials: list[RawTrial], findings: list[Findings], base: str | None, settings: SanityLimits
 ) -> list[str]:
-    """Add to each take's findings what cannot be true of it; returned: what cannot be true of the session.
+    """Add to each raw trial's findings what cannot be true of it; returned: what cannot be true of the session.
 
-    What is usual is what the takes of the split `identify` say, or all where there are none of it.
+    What is usual is what the raw trials of the split `identify` say, or all where there are none of it.
 
     Args: base: the name of the body that marks the mount, None where none does.
     """
-    chosen, _ = deciding(takes, lambda take: take.split)
-    usual = usual_distances([_bodies(take) for take in chosen])
+    chosen, _ = deciding(raw_trials, lambda raw: raw.split)
+    usual = usual_distances([_bodies(raw) for raw in chosen])
     length = float(np.nanmax(usual[0]))
-    names, idle = (base or "base", *takes[0].markers), settings.still * length
+    names, idle = (base or "base", *raw_trials[0].markers), settings.still * length
     zeros = encoder_zeros(chosen, idle)
-    for take, record in zip(takes, findings, strict=True):
-        record.faults += _misplaced(take, usual, names, settings.distance * length)
-        record.faults += _motion(take, length, settings.still)
-        record.faults += check_pulls(take, length, idle, settings.pull, zeros)
-    faults = _order(takes[0].markers, usual) + _loose(chosen, usual, settings, length)
+    for raw, record in zip(raw_trials, findings, strict=True):
+        record.faults += _misplaced(raw, usual, names, settings.distance * length)
+        record.faults += _motion(raw, length, settings.still)
+        record.faults += check_pulls(raw, length, idle, settings.pull, zeros)
+    faults = _order(raw_trials[0].markers, usual) + _loose(chosen, usual, settings, length)
     return faults if base is None else faults + _base_at_rest(chosen, base)
 
 
-def _bodies(take: RawTrial) -> np.ndarray:
+def _bodies(raw: RawTrial) -> np.ndarray:
     """The base and the markers, (T, 1 + S, 3) m."""
-    return np.insert(take.positions, 0, take.base_positions, axis=1)
+    return np.insert(raw.positions, 0, raw.base_positions, axis=1)
 
 
-def _misplaced(take: RawTrial, usual: np.ndarray, names: tuple[str, ...], least: float) -> list[str]:
+def _misplaced(raw: RawTrial, usual: np.ndarray, names: tuple[str, ...], least: float) -> list[str]:
     """Bodies that are not where the session's other trials have them, by the distances from their neighbours."""
-    distances = usual_distances([_bodies(take)])
+    distances = usual_distances([_bodies(raw)])
     ratio = float(np.nanmedian((distances / usual)[~np.eye(len(usual), dtype=bool)]))
     if not 1 / OTHER_UNIT < ratio < OTHER_UNIT:
         place = f"bodies are {ratio:.4g} times as far apart as in the session's trials of identify"
@@ -96,18 +96,18 @@ def _misplaced(take: RawTrial, usual: np.ndarray, names: tuple[str, ...], least:
     return faults
 
 
-def _motion(take: RawTrial, length: float, still: float) -> list[str]:
+def _motion(raw: RawTrial, length: float, still: float) -> list[str]:
     """Whether an experiment at rest rests, and another moves."""
-    if is_stepwise(take.experiment):
+    if is_stepwise(raw.experiment):
         return []
-    static, blocks = EXPERIMENTS[take.experiment].static, _blocks(take.positions)
+    static, blocks = EXPERIMENTS[raw.experiment].static, _blocks(raw.positions)
     travel = np.linalg.norm(np.ptp(blocks, axis=0), axis=1)
     most = int(np.argmax(travel))
     if static == (travel[most] <= still * length):
         return []
     share = 100 * travel[most] / length
-    travelled = f"{take.markers[most]!r} moves by {_mm(travel[most])}, {share:.2g} % of the arm's length"
-    expected = f"expected {'at most' if static else 'more than'} {100 * still:g} % in a {take.experiment}"
+    travelled = f"{raw.markers[most]!r} moves by {_mm(travel[most])}, {share:.2g} % of the arm's length"
+    expected = f"expected {'at most' if static else 'more than'} {100 * still:g} % in a {raw.experiment}"
     others = ", ".join(name for name, kind in EXPERIMENTS.items() if kind.static != static)
     return [f"experiment: {travelled}, {expected}: is it another experiment ({others})?"]
 
@@ -144,16 +144,16 @@ def _way(usual: np.ndarray, order: list[int]) -> float:
     return float(sum(usual[a, b] for a, b in pairwise(order)))
 
 
-def _loose(takes: list[RawTrial], usual: np.ndarray, settings: SanityLimits, length: float) -> list[str]:
+def _loose(raw_trials: list[RawTrial], usual: np.ndarray, settings: SanityLimits, length: float) -> list[str]:
     """Markers that are not fixed to the arm: in most trials in which it moves they keep no distance from any other
     marker, or rest while one nearer to the base moves."""
-    least, still, count = settings.distance * length, settings.still * length, len(takes[0].markers)
+    least, still, count = settings.distance * length, settings.still * length, len(raw_trials[0].markers)
     apart, farther = [], usual[0, 1:, None] > usual[0, None, 1:]
     rests = []
-    for take in takes:
-        if EXPERIMENTS[take.experiment].static or count < 3:
+    for raw in raw_trials:
+        if EXPERIMENTS[raw.experiment].static or count < 3:
             continue
-        blocks = _blocks(take.positions)
+        blocks = _blocks(raw.positions)
         distances = np.linalg.norm(blocks[:, :, None] - blocks[:, None], axis=-1)
         spread = np.quantile(distances, 0.95, axis=0) - np.quantile(distances, 0.05, axis=0)
         apart.append(np.min(spread + np.where(np.eye(count), np.inf, 0.0), axis=1) > least)
@@ -165,25 +165,25 @@ def _loose(takes: list[RawTrial], usual: np.ndarray, settings: SanityLimits, len
         (rests, f"rests, to within {_mm(still)}, while markers nearer to the base move"),
     ):
         most = np.mean(flags, axis=0) > 0.5 if flags else np.zeros(count, bool)
-        hit = [name for name, some in zip(takes[0].markers, most, strict=True) if some]
+        hit = [name for name, some in zip(raw_trials[0].markers, most, strict=True) if some]
         faults += [f"{name!r} {motion}: is it on the arm?" for name in hit]
     return faults
 
 
-def _base_at_rest(takes: list[RawTrial], base: str) -> list[str]:
+def _base_at_rest(raw_trials: list[RawTrial], base: str) -> list[str]:
     """A base that moves or turns while a marker rests."""
     motion = []
-    for take in takes:
-        if EXPERIMENTS[take.experiment].static or take.quaternions is None:
+    for raw in raw_trials:
+        if EXPERIMENTS[raw.experiment].static or raw.quaternions is None:
             continue
-        turns = _turns(np.insert(take.quaternions, 0, take.base_quaternions, axis=1))
-        motion.append([_spread(_blocks(_bodies(take))), _spread(_blocks(turns))])
+        turns = _turns(np.insert(raw.quaternions, 0, raw.base_quaternions, axis=1))
+        motion.append([_spread(_blocks(_bodies(raw))), _spread(_blocks(turns))])
     if not motion:
         return []
     for moved, unit, scale in zip(np.median(motion, axis=0), ("mm", "°"), (1e3, np.degrees(1)), strict=True):
         rests = int(np.argmin(moved[1:])) + 1
         if moved[0] > CLEAR * moved[rests]:
-            problem = f"moves by {scale * moved[0]:.2f} {unit} while {takes[0].markers[rests - 1]!r} moves by"
+            problem = f"moves by {scale * moved[0]:.2f} {unit} while {raw_trials[0].markers[rests - 1]!r} moves by"
             expected = "expected the body at the mount, which rests"
             return [f"base: {base!r} {problem} {scale * moved[rests]:.2f} {unit}, {expected}"]
     return []

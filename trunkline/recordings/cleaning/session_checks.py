@@ -1,4 +1,4 @@
-"""All takes of a session together: which are used, and what only their comparison tells."""
+"""All raw trials of a session together: which are used, and what only their comparison tells."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -24,9 +24,9 @@ WITHOUT = {
 
 @dataclass
 class CheckedSession:
-    """takes, findings: of the trials that are used. refused: why a trial is not, by its name. clock: of the motors."""
+    """raw_trials, findings: of the trials that are used. refused: reasons, by trial. clock: of the motors."""
 
-    takes: list[RawTrial] = field(default_factory=list)
+    raw_trials: list[RawTrial] = field(default_factory=list)
     findings: list[Findings] = field(default_factory=list)
     refused: dict[str, str] = field(default_factory=dict)
     clock: MotorClock = field(default_factory=MotorClock)
@@ -53,58 +53,59 @@ def check_session(
             raise error
         gathered.refused[name] = str(error)
 
-    for trial, take, record in taken:
-        if isinstance(take, InputError):
-            refuse(trial.name, take)
+    for trial, raw, record in taken:
+        if isinstance(raw, InputError):
+            refuse(trial.name, raw)
         else:
-            gathered.takes.append(take)
+            gathered.raw_trials.append(raw)
             gathered.findings.append(record)
     base = None if isinstance(session.base, FixedBase) else session.base
-    session_faults = check_sanity(gathered.takes, gathered.findings, base, plausible) if gathered.takes else []
+    raw_trials, findings = gathered.raw_trials, gathered.findings
+    session_faults = check_sanity(raw_trials, findings, base, plausible) if raw_trials else []
     if plausible.otherwise == "refuse":
-        for take, record in zip(gathered.takes, gathered.findings, strict=True):
+        for raw, record in zip(raw_trials, findings, strict=True):
             if record.faults:
-                refuse(take.name, InputError(f"{record.where}: {'; '.join(record.faults)}"))
+                refuse(raw.name, InputError(f"{record.where}: {'; '.join(record.faults)}"))
         if session_faults:
             raise InputError(f"{where}: {'; '.join(session_faults)}")
         used = [not record.faults for record in gathered.findings]
-        gathered.takes = [take for take, use in zip(gathered.takes, used, strict=True) if use]
+        gathered.raw_trials = [raw for raw, use in zip(gathered.raw_trials, used, strict=True) if use]
         gathered.findings = [record for record, use in zip(gathered.findings, used, strict=True) if use]
-    if not gathered.takes:
+    if not gathered.raw_trials:
         first = next(iter(gathered.refused.values()))
         raise InputError(f"{where}: all {len(gathered.refused)} trials refused, the first: {first}")
-    missing = _missing(gathered.takes)
+    missing = _missing(gathered.raw_trials)
     for record in gathered.findings:
         record.warnings += record.faults + session_faults + missing
-    set_gravity_direction(gathered.takes, gathered.findings, session)
-    gathered.clock = align_clocks(gathered.takes, gathered.findings, plausible.clock)
+    set_gravity_direction(gathered.raw_trials, gathered.findings, session)
+    gathered.clock = align_clocks(gathered.raw_trials, gathered.findings, plausible.clock)
     return gathered
 
 
 def together(sessions: list[CheckedSession]) -> CheckedSession:
-    """Of several sessions of one arm all takes, each with its own offset by now; the clock is the one told least."""
+    """The raw trials of several sessions of one arm, each with its offset; the clock is that of the least certainty."""
     if len(sessions) == 1:
         return sessions[0]
-    takes = [take for session in sessions for take in session.takes]
+    raw_trials = [raw for session in sessions for raw in session.raw_trials]
     findings = [record for session in sessions for record in session.findings]
     refused = {name: why for session in sessions for name, why in session.refused.items()}
     clock = max((session.clock for session in sessions), key=lambda clock: clock.uncertainty or 0.0)
-    return CheckedSession(takes, findings, refused, clock)
+    return CheckedSession(raw_trials, findings, refused, clock)
 
 
 def require_enough(gathered: CheckedSession, planned: list[TrialEntry]) -> None:
     """Refuse what is left of a session that had trials of an experiment in a split, all of which were refused."""
-    left = {(take.experiment, take.split) for take in gathered.takes}
+    left = {(raw.experiment, raw.split) for raw in gathered.raw_trials}
     for trial in planned:
         if trial.name in gathered.refused and (trial.experiment, trial.split) not in left:
             expected = f"expected another {trial.experiment} of the split {trial.split} to go on with"
             raise InputError(f"{gathered.refused[trial.name]}; {expected}")
 
 
-def _missing(takes: list[RawTrial]) -> list[str]:
+def _missing(raw_trials: list[RawTrial]) -> list[str]:
     """Splits and experiments that the session lacks, and experiments that one of its splits lacks, a sentence each."""
-    splits, kinds = ({getattr(take, key) for take in takes} for key in ("split", "experiment"))
-    done = {(take.experiment, take.split) for take in takes}
+    splits, kinds = ({getattr(raw, key) for raw in raw_trials} for key in ("split", "experiment"))
+    done = {(raw.experiment, raw.split) for raw in raw_trials}
     sentences = [f"splits: no trial of the split {split}: {WITHOUT[split]}" for split in SPLITS if split not in splits]
     lacking = [name for name, kind in EXPERIMENTS.items() if name not in kinds and not kind.stepwise]
     if lacking and not any(map(is_stepwise, kinds)):  # an arm that rests throughout needs no other

@@ -1,7 +1,8 @@
-"""Frozen bodies: a pose that a driver repeats while it sees nothing."""
+"""Stale poses: those that a driver repeats while it sees nothing. They are dropped."""
 
 import numpy as np
 
+from trunkline.recordings.cleaning.checks import Findings
 from trunkline.recordings.signals.runs import lasting
 
 SHORTEST = 5  # frames that agree to the last bit; noise does not, and a rounded log is known by its single axes
@@ -24,3 +25,14 @@ def stale_samples(positions: np.ndarray) -> np.ndarray:
         if 0 < long.sum() < len(visible) / 2 and rest.any(axis=1).mean() <= ROUNDED:
             repeats[visible[1:][long], body] = True
     return repeats
+
+
+def drop_stale_poses(
+    positions: np.ndarray, quaternions: np.ndarray | None, names: list[str], findings: Findings
+) -> None:
+    """Make NaN of the poses that only repeat the one before."""
+    still = stale_samples(positions)
+    findings.dropped(still, "that only repeat the one before, to the last bit,", names)
+    positions[still] = np.nan
+    if quaternions is not None:
+        quaternions[still] = np.nan

@@ -1,1 +1,1 @@
-"""From a take to a trial: gaps, outliers, noise; one clock, the base frame."""
+"""From a raw trial to a trial: gaps, outliers, noise; one clock, the base frame."""

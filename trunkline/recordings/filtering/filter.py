@@ -1,4 +1,4 @@
-"""A take becomes a trial: outliers out, gaps bridged, one uniform clock, filtered, in the base frame."""
+"""A raw trial becomes a trial: outliers out, gaps bridged, one uniform clock, filtered, in the base frame."""
 
 from dataclasses import dataclass, replace
 from functools import partial
@@ -39,8 +39,8 @@ class Filter:
             raise ValueError(f"cutoff: found {self.cutoff} Hz, expected less than half the rate of {self.rate} Hz")
 
 
-def filter_raw_trial(take: RawTrial, settings: Filter) -> tuple[Trial, Effect]:
-    """Filter one take.
+def filter_raw_trial(raw: RawTrial, settings: Filter) -> tuple[Trial, Effect]:
+    """Filter one raw trial.
 
     Quaternions are filtered by component and normalised again: they are continuous in sign, and within the
     bandwidth of the filter the arm turns by little, so that this differs from the sphere in second order.
@@ -48,21 +48,21 @@ def filter_raw_trial(take: RawTrial, settings: Filter) -> tuple[Trial, Effect]:
     Raises:
         InputError: if a marker has too few good samples.
     """
-    base = average_base(take.base_positions, take.base_quaternions)
-    positions, quaternions = to_base_frame(base, take.positions, take.quaternions)
-    kind, motion = EXPERIMENTS[take.experiment], None
+    base = average_base(raw.base_positions, raw.base_quaternions)
+    positions, quaternions = to_base_frame(base, raw.positions, raw.quaternions)
+    kind, motion = EXPERIMENTS[raw.experiment], None
     if kind.stepwise:
-        return _settled(take, positions, quaternions, base)
-    grid = np.arange(int(take.time[-1] * settings.rate) + 1) / settings.rate
-    frames, count = len(grid), len(take.markers)
+        return _settled(raw, positions, quaternions, base)
+    grid = np.arange(int(raw.time[-1] * settings.rate) + 1) / settings.rate
+    frames, count = len(grid), len(raw.markers)
     width = 3 if quaternions is None else 7
     columns, measured = np.empty((frames, count, width)), np.empty((frames, count), bool)
     filled, dropped, removed = 0, 0, []
-    for index, name in enumerate(take.markers):
+    for index, name in enumerate(raw.markers):
         samples = positions[:, index]
         if quaternions is not None:
             samples = np.hstack([samples, quaternions[:, index]])
-        filtered = _marker(take.time, samples, grid, settings, f"trial {take.name}: {name!r}")
+        filtered = _marker(raw.time, samples, grid, settings, f"trial {raw.name}: {name!r}")
         columns[:, index], measured[:, index] = filtered.columns, filtered.measured
         filled, dropped = filled + filtered.filled, dropped + filtered.dropped
         removed.append(filtered.removed)
@@ -70,10 +70,10 @@ def filter_raw_trial(take: RawTrial, settings: Filter) -> tuple[Trial, Effect]:
     if width == 7:
         columns[..., 3:] /= np.linalg.norm(columns[..., 3:], axis=-1, keepdims=True)
 
-    commands, wound = _on_pose_clock(take, grid)
-    gravity = gravity_from_up(base, take.up)
+    commands, wound = _on_pose_clock(raw, grid)
+    gravity = gravity_from_up(base, raw.up)
     quaternions = None if quaternions is None else columns[..., 3:]
-    trial = _trial(take, gravity, grid, columns[..., :3], quaternions, measured, commands, wound)
+    trial = _trial(raw, gravity, grid, columns[..., :3], quaternions, measured, commands, wound)
     if kind.static:
         motion = float(np.sqrt(np.mean(np.var(trial.positions, axis=0))))
         trial = average_static(trial)
@@ -95,27 +95,27 @@ def filter_raw_trial(take: RawTrial, settings: Filter) -> tuple[Trial, Effect]:
 
 
 def _trial(
-    take: RawTrial, gravity: np.ndarray, time: np.ndarray, positions: np.ndarray, quaternions: np.ndarray | None,
+    raw: RawTrial, gravity: np.ndarray, time: np.ndarray, positions: np.ndarray, quaternions: np.ndarray | None,
     measured: np.ndarray, commands: np.ndarray, wound: np.ndarray,
 ) -> Trial:  # fmt: skip
-    """What the take was planned as, with these samples, shapes as in `Trial`."""
+    """What the raw trial was planned as, with these samples, shapes as in `Trial`."""
     return Trial(
-        name=take.name,
-        experiment=take.experiment,
-        split=take.split,
-        level=take.level,
-        load=take.load,
-        session=take.session,
+        name=raw.name,
+        experiment=raw.experiment,
+        split=raw.split,
+        level=raw.level,
+        load=raw.load,
+        session=raw.session,
         gravity=gravity,
         time=time,
-        markers=take.markers,
+        markers=raw.markers,
         positions=positions,
         quaternions=quaternions,
         measured=measured,
-        tendons=take.tendons,
+        tendons=raw.tendons,
         commands=commands,
         tendon_positions=wound,
-        repairs=take.repairs,
+        repairs=raw.repairs,
     )
 
 
@@ -132,13 +132,13 @@ def start_of(trial: Trial, kind: ExperimentKind, settings: Filter) -> dict:
 
 
 def _settled(
-    take: RawTrial, positions: np.ndarray, quaternions: np.ndarray | None, base: BasePose
+    raw: RawTrial, positions: np.ndarray, quaternions: np.ndarray | None, base: BasePose
 ) -> tuple[Trial, Effect]:
     """A trial whose every frame is a shape at rest of its own: nothing to filter, and no clock but the frames' own."""
     columns = positions if quaternions is None else np.concatenate([positions, quaternions], axis=2)
     measured = np.isfinite(columns[..., 0]) & np.isfinite(columns[..., -1])
-    commands, wound = _on_pose_clock(take, take.time)
-    trial = _trial(take, gravity_from_up(base, take.up), take.time, positions, quaternions, measured, commands, wound)
+    commands, wound = _on_pose_clock(raw, raw.time)
+    trial = _trial(raw, gravity_from_up(base, raw.up), raw.time, positions, quaternions, measured, commands, wound)
     effect = Effect(
         samples=measured.size, gap_share=1 - float(measured.mean()), filled_share=0.0, outliers=0, position_noise=0.0,
         angle_noise=None, tilt=tilt_of_gravity(trial.gravity), motion=0.0, base_shift=base.shift, base_turn=base.turn,
@@ -201,17 +201,17 @@ def average_static(trial: Trial) -> Trial:
     )
 
 
-def _on_pose_clock(take: RawTrial, grid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _on_pose_clock(raw: RawTrial, grid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Commands and tendon positions (G, K) m at the frames' times; a lacking one is the other, or 0."""
     streams = []
-    for time, pulls in ((take.command_time, take.commands), (take.tendon_time, take.tendon_positions)):
-        moved = fill_gaps(time + take.clock_offset, pulls) if len(time) else pulls
+    for time, pulls in ((raw.command_time, raw.commands), (raw.tendon_time, raw.tendon_positions)):
+        moved = fill_gaps(time + raw.clock_offset, pulls) if len(time) else pulls
         streams.append(
-            np.stack([np.interp(grid, time + take.clock_offset, column) for column in moved.T], axis=1)
+            np.stack([np.interp(grid, time + raw.clock_offset, column) for column in moved.T], axis=1)
             if moved.size
             else None
         )
     commands, wound = streams
-    nothing = np.zeros((len(grid), len(take.tendons)))
+    nothing = np.zeros((len(grid), len(raw.tendons)))
     commands = commands if commands is not None else wound if wound is not None else nothing
     return commands, wound if wound is not None else commands

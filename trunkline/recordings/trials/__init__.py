@@ -1,1 +1,1 @@
-"""What a trial is: its kind, when it begins, as recorded (take) and as filtered (trial), and their tables."""
+"""What a trial is: its kind, when it begins, as recorded (raw trial) and as filtered (trial), and their tables."""

@@ -1,4 +1,4 @@
-"""A take: one trial as recorded, checked but not filtered, in the motion-capture frame, on its own clocks."""
+"""A raw trial: one trial as recorded, checked but not filtered, in the motion-capture frame, on its own clocks."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -56,53 +56,57 @@ SCHEMA = pa.schema(
 )
 
 
-def write_takes(folder: Path, takes: list[RawTrial]) -> None:
+def write_raw_trials(folder: Path, raw_trials: list[RawTrial]) -> None:
     """Write trials.parquet (a row a trial), poses.parquet (a row a frame and body, the base first) and
     commands.parquet (a row a tendon and time; `stream` is "command" or "position")."""
     rows, poses, commands = [], [], []
-    for take in takes:
+    for raw in raw_trials:
         rows.append(
             {
-                "trial": take.name,
-                "experiment": take.experiment,
-                "split": take.split,
-                "level": take.level,
-                "load": take.load,
-                "session": take.session,
-                "up": take.up.tolist(),
-                "clock_offset": float(take.clock_offset),
-                "repairs": take.repairs,
-                "frames": len(take.time),
-                "commands": len(take.command_time),
-                "tendon_positions": len(take.tendon_time),
-                "markers": list(take.markers),
-                "tendons": list(take.tendons),
-                "orientations": take.quaternions is not None,
+                "trial": raw.name,
+                "experiment": raw.experiment,
+                "split": raw.split,
+                "level": raw.level,
+                "load": raw.load,
+                "session": raw.session,
+                "up": raw.up.tolist(),
+                "clock_offset": float(raw.clock_offset),
+                "repairs": raw.repairs,
+                "frames": len(raw.time),
+                "commands": len(raw.command_time),
+                "tendon_positions": len(raw.tendon_time),
+                "markers": list(raw.markers),
+                "tendons": list(raw.tendons),
+                "orientations": raw.quaternions is not None,
             }
         )
-        quaternions = take.quaternions
+        quaternions = raw.quaternions
         if quaternions is None:
-            quaternions = np.full((*take.positions.shape[:2], 4), np.nan)
-        positions = np.concatenate([take.base_positions[:, None], take.positions], axis=1)
-        quaternions = np.concatenate([take.base_quaternions[:, None], quaternions], axis=1)
-        poses.append(pose_table(take.name, take.time, (BASE, *take.markers), positions, quaternions))
+            quaternions = np.full((*raw.positions.shape[:2], 4), np.nan)
+        positions = np.concatenate([raw.base_positions[:, None], raw.positions], axis=1)
+        quaternions = np.concatenate([raw.base_quaternions[:, None], quaternions], axis=1)
+        poses.append(pose_table(raw.name, raw.time, (BASE, *raw.markers), positions, quaternions))
         for stream, time, values in (
-            ("command", take.command_time, take.commands),
-            ("position", take.tendon_time, take.tendon_positions),
+            ("command", raw.command_time, raw.commands),
+            ("position", raw.tendon_time, raw.tendon_positions),
         ):
-            table = long_table(take.name, time, "tendon", take.tendons, {"pull": values})
+            table = long_table(raw.name, time, "tendon", raw.tendons, {"pull": values})
             commands.append(table.append_column("stream", pa.array([stream] * len(table), pa.string())))
     folder = Path(folder)
-    schema = with_sessions(SCHEMA, [take.session for take in takes])
+    schema = with_sessions(SCHEMA, [raw.session for raw in raw_trials])
     pq.write_table(pa.Table.from_pylist(rows, schema), folder / "trials.parquet")
     pq.write_table(pa.concat_tables(poses), folder / "poses.parquet")
     pq.write_table(pa.concat_tables(commands), folder / "commands.parquet")
 
 
-def read_takes(folder: Path, splits: tuple[str, ...]) -> list[RawTrial]:
-    """The takes of `splits` that `write_takes` wrote into `folder`, in the same order; InputError as `read_tables`."""
+def read_raw_trials(folder: Path, splits: tuple[str, ...]) -> list[RawTrial]:
+    """The raw trials of `splits` that `write_raw_trials` wrote into `folder`, in the same order.
+
+    Raises:
+        InputError: as `read_tables`.
+    """
     rows, poses, pulls = read_tables(folder, "ingest")
-    takes, pose_row, pull_row = [], 0, 0
+    raw_trials, pose_row, pull_row = [], 0, 0
     for row in rows:
         shape = (row["frames"], 1 + len(row["markers"]))
         pose = {key: column[pose_row : pose_row + shape[0] * shape[1]] for key, column in poses.items()}
@@ -116,7 +120,7 @@ def read_takes(folder: Path, splits: tuple[str, ...]) -> list[RawTrial]:
             pull_row = span.stop
         positions = stack(pose, ("x", "y", "z"), shape)
         quaternions = stack(pose, ("qw", "qx", "qy", "qz"), shape)
-        takes.append(
+        raw_trials.append(
             RawTrial(
                 name=row["trial"],
                 experiment=row["experiment"],
@@ -140,4 +144,4 @@ def read_takes(folder: Path, splits: tuple[str, ...]) -> list[RawTrial]:
                 repairs=row["repairs"],
             )
         )
-    return [take for take in takes if take.split in splits]
+    return [raw for raw in raw_trials if raw.split in splits]

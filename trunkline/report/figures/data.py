@@ -31,7 +31,7 @@ def quality_figure(qualities: list[Quality], gathered: CheckedSession) -> Figure
     """The quality page: coverage over time, gaps, noise, rates, clock fit, repairs and refusals; panels with something
     to show. Of poses in steps, the time between them says nothing: they are counted."""
     numbered = dict(enumerate(qualities))
-    stepwise = {number: quality for number, quality in numbered.items() if is_stepwise(quality.take.experiment)}
+    stepwise = {number: quality for number, quality in numbered.items() if is_stepwise(quality.raw.experiment)}
     timed = {number: quality for number, quality in numbered.items() if number not in stepwise}
     fits = [fit for q in qualities for fit in (q.findings.by_motion, q.findings.by_log_times) if fit is not None]
     panels = [_gaps, _noise, _stamps] * bool(timed)
@@ -59,7 +59,7 @@ def _gaps(axis: Axes, qualities: dict[int, Quality]) -> None:
 
 
 def _noise(axis: Axes, qualities: dict[int, Quality]) -> None:
-    markers = next(iter(qualities.values())).take.markers
+    markers = next(iter(qualities.values())).raw.markers
     axis.boxplot(
         [[1e3 * quality.position_noise[i] for quality in qualities.values()] for i in range(len(markers))],
         tick_labels=[marker.removeprefix("unit_") for marker in markers],
@@ -80,14 +80,14 @@ def _stamps(axis: Axes, qualities: dict[int, Quality]) -> None:
 
 
 def _poses(axis: Axes, qualities: dict[int, Quality]) -> None:
-    counts = [len(quality.take.time) for quality in qualities.values()]
+    counts = [len(quality.raw.time) for quality in qualities.values()]
     _bars(axis, qualities, counts, 1)
     axis.set(title=f"At rest in steps: {sum(counts)} poses", ylabel="poses")
 
 
 def _bars(axis: Axes, qualities: dict[int, Quality], values: Sequence[float], least: float) -> None:
     """A bar a trial at its number, coloured by its kind; the axis ends above `least`."""
-    kinds = [quality.take.experiment for quality in qualities.values()]
+    kinds = [quality.raw.experiment for quality in qualities.values()]
     axis.bar(list(qualities), values, color=[COLORS[kind] for kind in kinds])
     axis.set(xlim=(min(qualities) - 1, max(qualities) + 1), ylim=(0, max(1.4 * np.nanmax([0, *values]), least)))
     axis.set_xlabel("trial")
@@ -125,19 +125,19 @@ def _words(axis: Axes, qualities: list[Quality], refused: dict[str, str]) -> Non
 
 def _coverage(axes: Axes, qualities: list[Quality]) -> None:
     """A band a trial, in it a row a marker: what was seen when. Of poses in steps each stands until the next."""
-    bins = int(max(quality.take.time[-1] for quality in qualities) / BIN) + 1
+    bins = int(max(quality.raw.time[-1] for quality in qualities) / BIN) + 1
     bands, ticks, row = [], [], 0
     for quality in qualities:
-        take = quality.take
-        place = (take.time / BIN).astype(int)
+        raw = quality.raw
+        place = (raw.time / BIN).astype(int)
         frames = np.bincount(place, minlength=bins)
         pose = np.searchsorted(place, np.arange(bins), side="right") - 1
-        tall = 1 + 4 // len(take.markers)  # rows a marker
-        apart = 1 + len(take.markers) // 10  # empty rows to the next band
-        band = np.full((tall * len(take.markers) + apart, bins), np.nan)
-        for index in range(len(take.markers)):
-            good = np.isfinite(take.positions[:, index, 0])
-            if is_stepwise(take.experiment):
+        tall = 1 + 4 // len(raw.markers)  # rows a marker
+        apart = 1 + len(raw.markers) // 10  # empty rows to the next band
+        band = np.full((tall * len(raw.markers) + apart, bins), np.nan)
+        for index in range(len(raw.markers)):
+            good = np.isfinite(raw.positions[:, index, 0])
+            if is_stepwise(raw.experiment):
                 share = good[pose]
             else:
                 share = np.bincount(place, weights=good, minlength=bins) / np.maximum(frames, 1)
@@ -145,7 +145,7 @@ def _coverage(axes: Axes, qualities: list[Quality]) -> None:
             level[place[-1] + 1 :] = np.nan
             band[tall * index : tall * (index + 1)] = level
         bands.append(band)
-        ticks.append(row + tall * len(take.markers) / 2)
+        ticks.append(row + tall * len(raw.markers) / 2)
         row += len(band)
     extent = (0, bins * BIN, row, 0)
     colors = ListedColormap([UNSEEN, PARTLY, SEEN])
@@ -158,23 +158,23 @@ def _coverage(axes: Axes, qualities: list[Quality]) -> None:
         vmax=2,
         interpolation="nearest",
     )
-    axes.set_yticks(ticks, [quality.take.name for quality in qualities], fontsize=7)
+    axes.set_yticks(ticks, [quality.raw.name for quality in qualities], fontsize=7)
     axes.set(xlabel="time (s)")
     axes.set_title("Coverage: each trial's markers, base on top; red where unseen, yellow where in part")
     axes.grid(False)
 
 
-def filter_figure(take: RawTrial, trial: Trial) -> Figure:
+def filter_figure(raw: RawTrial, trial: Trial) -> Figure:
     """One moving trial before and after the filter, at the marker that moves most."""
-    base = average_base(take.base_positions, take.base_quaternions)
-    moved, _ = to_base_frame(base, take.positions, None)
+    base = average_base(raw.base_positions, raw.base_quaternions)
+    moved, _ = to_base_frame(base, raw.positions, None)
     figure, axes = plt.subplots(2, 1, figsize=(9, 6), sharex=True)
     last = int(np.argmax(np.ptp(trial.positions, axis=0).sum(axis=1)))
     for axis, color in zip(range(3), (MEASURED, IDENTIFIED, VALIDATE), strict=True):
-        axes[0].plot(take.time, 1e3 * moved[:, last, axis], ".", ms=2, color=color, alpha=0.5)
+        axes[0].plot(raw.time, 1e3 * moved[:, last, axis], ".", ms=2, color=color, alpha=0.5)
         axes[0].plot(trial.time, 1e3 * trial.positions[:, last, axis], color=color, label="xyz"[axis])
-        rest = moved[:, last, axis] - np.interp(take.time, trial.time, trial.positions[:, last, axis])
-        axes[1].plot(take.time, 1e3 * rest, ".", ms=2, color=color)
+        rest = moved[:, last, axis] - np.interp(raw.time, trial.time, trial.positions[:, last, axis])
+        axes[1].plot(raw.time, 1e3 * rest, ".", ms=2, color=color)
     for panel in axes:
         panel.axvline(trial.start, color=INITIAL, lw=1)
         for begin, end in stretches(~trial.measured[:, last]):

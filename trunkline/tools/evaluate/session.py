@@ -28,7 +28,7 @@ def trials_of(folder: Path, root: Path, caller: str) -> list[Trial]:
 
 
 def read_trials_of(folder: Path, root: Path, caller: str) -> tuple[list[Trial], list[RawTrial]]:
-    """`trials_of`, and the takes that they were filtered from, in the same order; none where they came filtered.
+    """`trials_of`, and the raw trials that they were filtered from, in the same order; none where they came filtered.
 
     Args:
         folder: logs and session.yaml, several such folders of one arm, or what the stage `filter` writes.
@@ -56,21 +56,21 @@ def read_trials_of(folder: Path, root: Path, caller: str) -> tuple[list[Trial], 
 
 def _from_logs(folder: Path, root: Path, caller: str) -> tuple[list[Trial], list[RawTrial]]:
     ingest, settings = settings_of("ingest", root), settings_of("filter", root)
-    take = partial(_gathered, ingest=ingest, caller=caller)
-    quality = check_each_session(session_folders(folder), take, ingest.plausible.distance)
+    raw = partial(_gathered, ingest=ingest, caller=caller)
+    quality = check_each_session(session_folders(folder), raw, ingest.plausible.distance)
     gathered = together(list(quality.values()))
     for name, reason in gathered.refused.items():
         print(f"{caller}: left out {name}: {reason}", file=sys.stderr)
-    qualities = [judge(take, findings) for take, findings in zip(gathered.takes, gathered.findings, strict=True)]
+    qualities = [judge(raw, findings) for raw, findings in zip(gathered.raw_trials, gathered.findings, strict=True)]
     for line in by_sentence(qualities, lambda quality: quality.repairs):
         print(f"{caller}: repaired: {line}", file=sys.stderr)
     for line in by_sentence(qualities, lambda quality: quality.warnings):
         print(f"{caller}: warning: {line}", file=sys.stderr)
     trials = []
-    for take, quality in zip(gathered.takes, gathered.findings, strict=True):
-        take.repairs = len(quality.repairs)
-        trials.append(filter_raw_trial(take, settings)[0])
-    return trials, gathered.takes
+    for raw, quality in zip(gathered.raw_trials, gathered.findings, strict=True):
+        raw.repairs = len(quality.repairs)
+        trials.append(filter_raw_trial(raw, settings)[0])
+    return trials, gathered.raw_trials
 
 
 def _gathered(folder: Path, session: Session, ingest: Any, caller: str) -> CheckedSession:

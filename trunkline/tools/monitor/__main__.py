@@ -57,7 +57,7 @@ def _run(args: argparse.Namespace) -> int:
         except KeyboardInterrupt:
             unusable = 0
             print("monitor: interrupted; what was scored is kept")
-        changed = monitor.chart.changed() is not None
+        changed = monitor.control_chart.changed() is not None
         return ENDED + (CHANGED if changed else UNUSABLE if unusable else UNCHANGED)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import chdtri, stdtrit
 
 from trunkline.tools.monitor.baseline import Baseline
-from trunkline.tools.monitor.chart import Charted
+from trunkline.tools.monitor.control_chart import Charted
 
 APART = 3.84  # of χ², the 95th percentile for one degree of freedom: less does not separate two parameters
 CHANCE = 1e-3  # of more than what is left, below which one parameter does not explain it all

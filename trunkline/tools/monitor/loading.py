@@ -44,7 +44,7 @@ def load_logs(session: Path, files: set[str], root: Path) -> LoadedTrials:
         if len(loaded.refused) < len(taken):
             gathered = check_session(taken, read, ingest.plausible, "leave_out", f"{session}")
             loaded.refused |= gathered.refused
-            for raw, findings in zip(gathered.takes, gathered.findings, strict=True):
+            for raw, findings in zip(gathered.raw_trials, gathered.findings, strict=True):
                 raw.repairs = len(findings.repairs)
                 try:
                     loaded.trials[raw.name] = filter_raw_trial(raw, settings)[0]

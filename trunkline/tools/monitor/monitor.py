@@ -17,7 +17,7 @@ from trunkline.tools.evaluate.model import read_arm, written_beside
 from trunkline.tools.evaluate.session import trials_of
 from trunkline.tools.monitor.attribution import attribute_change
 from trunkline.tools.monitor.baseline import Baseline
-from trunkline.tools.monitor.chart import Chart, chart_of
+from trunkline.tools.monitor.control_chart import Chart, chart_of
 from trunkline.tools.monitor.history import History, alone, digest, read_score, score_row
 from trunkline.tools.monitor.inbox import name_of, planned, sessions_of, state_of, without_session
 from trunkline.tools.monitor.loading import load_logs
@@ -66,7 +66,7 @@ class DriftMonitor:
             monitor = cls(folder, out, settings, scorer, history, scores, PendingFiles(out / "awaited.json"))
             if is_new:
                 print("\n".join(f"monitor: {line}" for line in reference_lines(
-                    monitor.chart.baseline, monitor.chart, scorer.parameters)), flush=True)  # fmt: skip
+                    monitor.control_chart.baseline, monitor.control_chart, scorer.parameters)), flush=True)  # fmt: skip
             for line in monitor._alarm():
                 print(f"monitor: {line}", flush=True)
             yield monitor

@@ -8,7 +8,7 @@ import pandas as pd
 from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.tools.monitor.attribution import Attribution, Change
 from trunkline.tools.monitor.baseline import LEAST, Baseline
-from trunkline.tools.monitor.chart import Chart, Charted
+from trunkline.tools.monitor.control_chart import Chart, Charted
 
 TWO_SIDED = 1.96
 REPEATED = 2  # times a condition, on average, from which the reference knows few of those to come

@@ -56,12 +56,12 @@ def main(arguments: list[str] | None = None) -> int:
     configs = {stage: settings_of(stage, args.settings) for stage in STAGES if stage in params}
     if arm := (params.get("build_mjcf") or {}).get("arm"):
         print(f"arm: {arm}, as {args.settings / 'params.yaml'} has it", flush=True)
-    trials, takes = read_trials_of(args.session, args.settings, "check")
+    trials, raw_trials = read_trials_of(args.session, args.settings, "check")
     check_trials([trial for trial in trials if trial.split in DECIDING], model)
     print("\n".join(["recorded:", *(f"  {line}" for line in recorded_of_each(trials))]))
     if missing := missing_lines(trials):
         print("\n".join(["missing:", *(f"  {line}" for line in missing)]))
-    ups = other_ups(takes)
+    ups = other_ups(raw_trials)
     for stage, config in configs.items():
         check_parameters(stage, config, model)
         names = per_session_names(list(config.parameters), config.per_session, other_sessions(trials))

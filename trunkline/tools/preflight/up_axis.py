@@ -17,17 +17,17 @@ TRIED = 6  # trials, at most
 BETTER = 2.0  # times that the described arm must fit with another axis up before that is said
 
 
-def other_ups(takes: list[RawTrial]) -> dict[str, np.ndarray]:
+def other_ups(raw_trials: list[RawTrial]) -> dict[str, np.ndarray]:
     """Gravity in the base frame (6, 3), m/s², by trial, as it is with each of `AXES` up; none of trials that have no
     gravity, or whose base is upright by its very declaration, and none of several sessions, which each have an `up`."""
-    if len({take.session for take in takes}) > 1:
+    if len({raw.session for raw in raw_trials}) > 1:
         return {}
     gravities = {}
-    for take in takes:
-        base = average_base(take.base_positions, take.base_quaternions)
-        declared = not np.ptp(take.base_quaternions, axis=0).any() and np.allclose(base.rotation.apply(Z), take.up)
-        if take.up.any() and not declared:
-            gravities[take.name] = np.array([gravity_from_up(base, axis) for axis in AXES])
+    for raw in raw_trials:
+        base = average_base(raw.base_positions, raw.base_quaternions)
+        declared = not np.ptp(raw.base_quaternions, axis=0).any() and np.allclose(base.rotation.apply(Z), raw.up)
+        if raw.up.any() and not declared:
+            gravities[raw.name] = np.array([gravity_from_up(base, axis) for axis in AXES])
     return gravities
 
 
