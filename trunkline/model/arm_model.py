@@ -11,6 +11,7 @@ each cable beyond the straight arm's where it is 0. `sections` are the numbers o
 several.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from weakref import WeakKeyDictionary
@@ -19,6 +20,7 @@ import mujoco
 import numpy as np
 
 BRANCH, SLIDER, DIAGONAL, HOLE = "branch", "slider", "diagonal", "hole"
+CENTER = "_center"  # ends the name of a marker's site
 TIE = "_tie"  # ends the name of a branch's tendon: in a Unity scene it may not be called as the hinge
 CAPSTAN_FRICTION, SLIP_LENGTH = "capstan_friction", "slip_length"
 SLIP = 2e-4  # m, of models that do not say: see conf/build_mjcf/holes/rubbing.yaml
@@ -133,9 +135,15 @@ class ArmModel:
         """The mount."""
         return self.model.body("base").id
 
-    def marker_sites(self, markers: tuple[str, ...]) -> np.ndarray:
+    @cached_property
+    def markers(self) -> list[str]:
+        """Names of the markers that may be tracked, in the order of their sites."""
+        names = [self.model.site(site).name for site in range(self.model.nsite)]
+        return [name.removesuffix(CENTER) for name in names if name.endswith(CENTER) and name != f"base{CENTER}"]
+
+    def marker_sites(self, markers: Sequence[str]) -> np.ndarray:
         """Numbers of the sites that are the frames of `markers`, in their order. Shape (S,)."""
-        return np.array([self.model.site(f"{name}_center").id for name in markers], dtype=int)
+        return np.array([self.model.site(f"{name}{CENTER}").id for name in markers], dtype=int)
 
     def cable_sites(self, cable: int) -> np.ndarray:
         """Numbers of the sites through which the tendon `cable` runs, that of the mount first."""

@@ -19,7 +19,6 @@ from trunkline.identification.parameters.parameters import NAMES
 from trunkline.identification.parameters.per_session import (
     make_room,
     names_in,
-    other_sessions,
     per_session_names,
     unidentifiable_per_session,
 )
@@ -36,11 +35,12 @@ from trunkline.model_files import read_spec
 from trunkline.pipeline.stage import output_folder, write_json, write_metrics
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_static
 from trunkline.recordings.trials.splits import DECIDING, IDENTIFY, VALIDATE
-from trunkline.recordings.trials.trial import Trial, read_trials
+from trunkline.recordings.trials.trial import Trial, read_trials, sessions_of
 
 ARTIFACTS = Path("artifacts")
 CAD_MODEL = ARTIFACTS / "build_mjcf/arm.xml"
 TRIALS = Path("data/processed/filter")
+SCALARS = ("parameters", "per_session")  # their tables in parameters.json
 CSV = {"index": False, "float_format": "%.6g"}
 
 
@@ -96,7 +96,7 @@ def load(stage: str, config: IdentificationSettings, model_path: Path) -> FitInp
     # of an arm with tendons also the trials of later stages: a wrong name is an error now, not after minutes
     every = read_trials(TRIALS, DECIDING)
     check_trials(every if model.nu else reported, model)
-    names = per_session_names(list(config.parameters), config.per_session, other_sessions(every))
+    names = per_session_names(list(config.parameters), config.per_session, sessions_of(every)[1:])
     for line in unidentifiable_per_session(names, every, config.experiments):
         raise InputError(f"{stage}.{line}")
     if names:
@@ -171,12 +171,15 @@ def compared_models(
     models["cad"] = read_spec(CAD_MODEL).compile()
     if inputs.from_cad and inputs.config.markers == "unchanged":
         models["initial"] = models["cad"]
-    if not result.factors and not any(map(has_factors, whole)):
+    earlier = [read_table(ARTIFACTS / stage / TABLE) for stage in whole]
+    if not result.factors and not any(table.get("per_joint") for table in earlier):
         models["coarse"] = models["identified"]
     elif whole:
         extended = read_spec(CAD_MODEL)
         make_room(extended, names_in(inputs.model, NAMES))
-        models["coarse"] = with_parameters(extended.compile(), read_scalars(whole) | result.values)
+        rows = {name: row for table in earlier for key in SCALARS for name, row in table.get(key, {}).items()}
+        values = {name: row["value"] for name, row in rows.items()}
+        models["coarse"] = with_parameters(extended.compile(), values | result.values)
         # rest shape and markers are no matter of scalars
         for field in ("qpos_spring", "tendon_lengthspring", "site_pos", "site_sameframe"):
             getattr(models["coarse"], field)[:] = getattr(inputs.model, field)
@@ -201,21 +204,6 @@ def save(
         write_json(folder / TABLE, table)
         write_metrics(folder, metrics)
         write_tables(folder, result, bounds, markers, predictions, shapes=inputs.from_cad and rests)
-
-
-def has_factors(stage: str) -> bool:
-    """Whether an earlier stage gave joints their own factors."""
-    return bool(read_table(ARTIFACTS / stage / TABLE).get("per_joint"))
-
-
-def read_scalars(stages: tuple[str, ...]) -> dict[str, float]:
-    """Scalars that earlier stages identified, without any joint's own factor."""
-    values = {}
-    for stage in stages:
-        table = read_table(ARTIFACTS / stage / TABLE)
-        rows = table["parameters"] | table.get("per_session", {})
-        values |= {name: row["value"] for name, row in rows.items()}
-    return values
 
 
 def doubts(

@@ -9,11 +9,11 @@ from trunkline.identification.fit.fit import Fit
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.settings import IdentificationSettings
 from trunkline.identification.parameters.parameters import EVERY, names_of, parameter_named
-from trunkline.identification.parameters.per_session import names_in, other_sessions
+from trunkline.identification.parameters.per_session import names_in
 from trunkline.identification.simulate.experiment import Experiment, prepare
 from trunkline.identification.simulate.markers import with_measured_markers
 from trunkline.identification.simulate.resting import resting_shape
-from trunkline.recordings.trials.trial import Trial
+from trunkline.recordings.trials.trial import Trial, sessions_of
 
 EVERY_ANGLE = f"tendon_angle{EVERY}"
 
@@ -29,7 +29,7 @@ def set_up(
     fit = fit_of(config, trials[0].markers)
     names = names_in(model, config.parameters)
     fit.parameters = fit.parameters | {name: config.parameters[shared] for name, shared in names.items()}
-    if config.rest_shape == "measured" and (others := other_sessions(trials)):
+    if config.rest_shape == "measured" and (others := sessions_of(trials)[1:]):
         expected = "expected one, or rest_shape: unchanged"
         raise InputError(f"rest_shape: measured: found {1 + len(others)} sessions, {expected}")
     if config.rest_shape == "measured":

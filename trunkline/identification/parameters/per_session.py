@@ -31,11 +31,6 @@ def values_in(session: str, values: dict[str, np.ndarray]) -> dict[str, np.ndarr
     return {name: values.get(f"{name}{SESSION_MARK}{session}", value) for name, value in shared.items()}
 
 
-def other_sessions(trials: list[Trial]) -> list[str]:
-    """All but the first, in the order of the trials."""
-    return sessions_of(trials)[1:]
-
-
 def per_session_names(parameters: list[str], per_session: list[str], sessions: list[str]) -> dict[str, str]:
     """Names of the per-session parameters of `sessions` among a stage's `parameters`, with the shared names."""
     selected = [name for name in parameters if name in per_session]

@@ -231,10 +231,9 @@ def commanded_lengths(trial: Trial, model: mujoco.MjModel) -> np.ndarray:
 def check_names(trial: Trial, model: mujoco.MjModel) -> None:
     """Refuse a trial whose markers or tendons the model does not have, or that has only some of its tendons: those
     that it leaves out may have pulled."""
-    sites = [model.site(i).name for i in range(model.nsite)]
-    units = [name.removesuffix("_center") for name in sites if name.endswith("_center") and name != "base_center"]
-    tendons = ArmModel(model).cable_names
-    for key, used, names in (("markers", trial.markers, units), ("tendons", trial.tendons, tendons)):
+    arm = ArmModel(model)
+    tendons = arm.cable_names
+    for key, used, names in (("markers", trial.markers, arm.markers), ("tendons", trial.tendons, tendons)):
         unknown = [name for name in used if name not in names]
         if unknown:
             valid = f"names of the model: {', '.join(names)}" if names else "none, as the arm has none"

@@ -67,9 +67,8 @@ def _side_view(side: Axes, model: mujoco.MjModel, data: mujoco.MjData) -> None:
 
 def tracked_points(model: mujoco.MjModel) -> list[int]:
     """Numbers of the sites to draw as tracked: those that the description names, or else the units' centres."""
-    names = {site: model.site(site).name for site in range(model.nsite)}
-    centres = [site for site, name in names.items() if name.endswith("_center") and name != "base_center"]
-    return [site for site in centres if not names[site].startswith("unit_")] or centres
+    arm = ArmModel(model)
+    return arm.marker_sites([name for name in arm.markers if not name.startswith("unit_")] or arm.markers).tolist()
 
 
 def _in_words(mass: float) -> str:

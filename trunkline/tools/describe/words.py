@@ -111,12 +111,11 @@ def marker_lines(model: mujoco.MjModel) -> list[str]:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     lines = []
-    for site in range(model.nsite):
-        name = model.site(site).name
-        if name.endswith("_center") and name != "base_center" and not name.startswith("unit_"):
-            x, y, z = 1e3 * (data.site_xpos[site] - data.site("base_center").xpos)
+    for name in ArmModel(model).markers:
+        if not name.startswith("unit_"):
+            x, y, z = 1e3 * (data.site(f"{name}_center").xpos - data.site("base_center").xpos)
             aside = f", {np.hypot(x, y):.3g} mm aside" if np.hypot(x, y) > 1e-6 else ""
-            lines.append(f"  {name.removesuffix('_center')}: {-z:.4g} mm from the mount{aside}")
+            lines.append(f"  {name}: {-z:.4g} mm from the mount{aside}")
     return ["tracked points, beside the units' centres:", *lines] if lines else ["tracked points: the units' centres"]
 
 
@@ -152,13 +151,8 @@ def doubt_lines(model: mujoco.MjModel, session: Session | None) -> list[str]:
 
 def _unknown(model: mujoco.MjModel, session: Session) -> list[str]:
     """Names that a session gives to what this arm has not, a line a key."""
-    sites = [model.site(index).name for index in range(model.nsite)]
-    available = {
-        "markers": [name.removesuffix("_center") for name in sites
-                     if name.endswith("_center") and name != "base_center"],
-        "tendons": ArmModel(model).cable_names,
-    }
-    available["motors"] = available["tendons"]
+    arm = ArmModel(model)
+    available = {"markers": arm.markers, "tendons": arm.cable_names, "motors": arm.cable_names}
     declared = {
         "markers": (session.markers or {}).values(),
         "tendons": (session.tendons or {}).values(),

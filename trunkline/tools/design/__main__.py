@@ -17,14 +17,14 @@ import mujoco
 from trunkline.errors import InputError, in_one_line, nearest
 from trunkline.identification.fit.settings import IdentificationSettings
 from trunkline.identification.fit.setup import check_parameters
-from trunkline.identification.parameters.per_session import make_room, other_sessions, per_session_names
+from trunkline.identification.parameters.per_session import make_room, per_session_names
 from trunkline.identification.stages import STAGES, final_model
 from trunkline.model.arm.kinds import described_arm
 from trunkline.pipeline.config import load_folder, own_or_project, settings_of
 from trunkline.program import program_name
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.recordings.trials.splits import IDENTIFY
-from trunkline.recordings.trials.trial import Trial
+from trunkline.recordings.trials.trial import Trial, sessions_of
 from trunkline.settings import read_yaml
 from trunkline.tools.design.candidates import Candidate, candidates
 from trunkline.tools.design.goals import GOALS, Goal, weights_for
@@ -109,7 +109,7 @@ def with_room(spec: mujoco.MjSpec, trials: list[Trial], root: Path) -> mujoco.Mj
     """The arm, with a number for what each session of `trials` has for itself: one that was not identified from them
     has none."""
     for config in _settings(root).values():
-        make_room(spec, per_session_names(list(config.parameters), config.per_session, other_sessions(trials)))
+        make_room(spec, per_session_names(list(config.parameters), config.per_session, sessions_of(trials)[1:]))
     return spec.compile()
 
 

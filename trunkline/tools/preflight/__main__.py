@@ -13,7 +13,6 @@ from trunkline.errors import in_one_line
 from trunkline.identification.fit.setup import check_parameters
 from trunkline.identification.parameters.per_session import (
     make_room,
-    other_sessions,
     per_session_names,
     unidentifiable_per_session,
 )
@@ -30,6 +29,7 @@ from trunkline.pipeline.config import own_or_project, settings_of
 from trunkline.program import program_name
 from trunkline.recordings.trials.inventory import missing_lines, recorded_of_each
 from trunkline.recordings.trials.splits import DECIDING, IDENTIFY
+from trunkline.recordings.trials.trial import sessions_of
 from trunkline.settings import read_yaml
 from trunkline.tools.evaluate.session import read_trials_of
 from trunkline.tools.preflight.up_axis import other_ups, up_lines
@@ -64,7 +64,7 @@ def main(arguments: list[str] | None = None) -> int:
     ups = other_ups(raw_trials)
     for stage, config in configs.items():
         check_parameters(stage, config, model)
-        names = per_session_names(list(config.parameters), config.per_session, other_sessions(trials))
+        names = per_session_names(list(config.parameters), config.per_session, sessions_of(trials)[1:])
         make_room(spec, names)
         model = spec.compile()
         lacking = unidentifiable(config, trials) or unidentifiable_per_session(names, trials, config.experiments)
