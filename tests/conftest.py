@@ -10,9 +10,7 @@ from pathlib import Path, PurePosixPath
 import pytest
 
 from tests.support.skips import Skips, read_rows
-from trunkline.compute.numerics import hold_arithmetic
 
-hold_arithmetic()  # before anything imports NumPy
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # as in `stages`
 
 # Files and folders whose tests run the kernels of trunkline.model.statics. To compile them takes most of a minute the
