@@ -2,7 +2,3 @@
 
 They share a scene (a session whose server is a process of its own), an operator, a witness of the robot and a page.
 """
-
-from trunkline.compute.numerics import hold_arithmetic
-
-hold_arithmetic()

@@ -1,5 +1,1 @@
 """Studies that choose: options, losses, real arms. They read the session and write tables; speed is in benchmarks/."""
-
-from trunkline.compute.numerics import hold_arithmetic
-
-hold_arithmetic()

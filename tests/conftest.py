@@ -4,14 +4,14 @@ Marks `xdist_group` would be the way to say so, but pytest 9.2 hides them from x
 every file over all workers, so that each of them makes every fixture and compiles every kernel for itself.
 """
 
+import os
 from pathlib import Path, PurePosixPath
 
 import pytest
 
 from tests.support.skips import Skips, read_rows
-from trunkline.compute.numerics import hold_arithmetic
 
-hold_arithmetic()  # before anything imports NumPy
+os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # as in `stages`
 
 # Files and folders whose tests run the kernels of trunkline.model.statics. To compile them takes most of a minute the
 # first time, in every worker that needs them before the first has written them to the cache. So these share a worker.

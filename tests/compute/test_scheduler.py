@@ -22,7 +22,6 @@ from tests.support.small_arm import small_spec
 from trunkline.compute import cluster as workers
 from trunkline.compute import scheduler
 from trunkline.compute.cluster import VARIABLE
-from trunkline.compute.environment import fingerprint_for
 from trunkline.compute.scheduler import arriving, pieces, spread
 from trunkline.errors import InputError
 from trunkline.identification.fit.problem import Bounds, Problem
@@ -211,6 +210,7 @@ def test_rehearsals_arrive_from_workers_too(monkeypatch, tmp_path):
         other = replace(source, code="other")
         answers = iter([source, *[other] * 9])
         monkeypatch.setattr(runs, "source_of", lambda file: next(answers))
+        workers._unpacked.cache_clear()  # another worker
         with pytest.raises(InputError, match="found code and settings other, expected code as here"):
             runs.make([runs.Run("touch", 9)], package, source, tmp_path / "runs.csv", workers=1)
         assert len(runs.read_results(tmp_path / "runs.csv")) == 5
@@ -234,18 +234,43 @@ def _mistaken(_, piece):
 @pytest.mark.parametrize("joined_late", [False, True])
 def test_a_worker_with_another_library_is_refused_in_one_line(spreading, monkeypatch, joined_late):
     spreading()
-    real = fingerprint_for(_mistaken)
-    wanted = replace(real, parts=real.parts | {"mujoco": "9.9.9"})
-    monkeypatch.setattr(workers, "fingerprint_for", lambda _: wanted)
+    real = workers.environment("tests")
+    monkeypatch.setattr(workers, "environment", lambda package: real | {"mujoco": "9.9.9"})
     here = scheduler._cluster()
-    monkeypatch.setattr(here, "_alike", set())
+    monkeypatch.setattr(here, "_checked", set())
     if joined_late:
-        monkeypatch.setattr(here, "_check", lambda expected: None)
+        monkeypatch.setattr(here, "_check", lambda package: None)
     else:
         monkeypatch.setattr(workers, "_do", None)  # no work is sent
-    message = rf"^{VARIABLE}: worker tcp://\S+: found mujoco {real.parts['mujoco']}, expected 9\.9\.9 as here$"
+    message = rf"^{VARIABLE}: worker tcp://\S+: found mujoco {real['mujoco']}, expected 9\.9\.9 as here$"
     with pytest.raises(InputError, match=message):
         spread(_mistaken, [1, 2])
+
+
+def _missing():
+    """Where a worker lacks the code."""
+    raise ModuleNotFoundError("No module named 'trunkline'")
+
+
+def test_a_worker_without_the_library_is_refused_in_one_line(spreading, monkeypatch):
+    spreading()
+    here = scheduler._cluster()
+    monkeypatch.setattr(here, "_checked", set())
+    monkeypatch.setattr(workers, "difference", lambda package, expected: _missing())
+    with pytest.raises(InputError, match=r"found no trunkline like this one \(.*No module named"):
+        spread(_mistaken, [1, 2])
+
+
+def test_code_is_part_of_the_environment(tmp_path, monkeypatch):
+    (tmp_path / "room").mkdir()
+    (tmp_path / "room" / "__init__.py").write_text("x = 1")
+    monkeypatch.syspath_prepend(tmp_path)
+    before = workers.environment("room")
+    assert {"Python", "trunkline", "mujoco", "mink", "code of trunkline", "code of room"} <= set(before)
+    (tmp_path / "room" / "more.py").write_text("y = 2")
+    workers.environment.cache_clear()
+    after = workers.environment("room")
+    assert [name for name in before if before[name] != after[name]] == ["code of room"]
 
 
 @pytest.mark.parametrize(
@@ -287,12 +312,13 @@ def test_a_scheduler_that_goes_away_is_told_in_one_line(monkeypatch, tmp_path):
         while not file.exists():
             assert processes[0].poll() is None, file.with_suffix(".log").read_text()
             time.sleep(0.1)
-        monkeypatch.setattr(workers, "CONNECTING", 5.0)
+        monkeypatch.setattr(workers, "CONNECTING", 120.0)
+        monkeypatch.setattr(workers, "FIRST_WORKER", 0.1)
         address = scheduler_address(file)
         monkeypatch.setenv(VARIABLE, address)
         with pytest.raises(InputError, match=f"^{VARIABLE}: found no workers at {address}, expected at least one$"):
             spread(_slowly, [1])
-        monkeypatch.setattr(workers, "CONNECTING", 60.0)
+        monkeypatch.setattr(workers, "FIRST_WORKER", 120.0)
         worker = ["trunkline.compute.worker", address, "--nworkers", "1", "--no-nanny", "--no-dashboard"]
         processes.append(_started(tmp_path / "worker", *worker, "--local-directory", str(tmp_path)))
         rows = arriving(_slowly, list(range(100)))

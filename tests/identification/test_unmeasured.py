@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.support.swings import FRAMES, LIKE, MARKERS, TIP, experiment, swing, trial
+from tests.support.swings import FRAMES, LIKE, MARKERS, TIME, TIP, experiment, swing, trial
 from trunkline.identification.evaluation.baselines import hanging_still
 from trunkline.identification.evaluation.error_tables import marker_table, trial_table
 from trunkline.identification.evaluation.evaluation import Prediction, errors_of, scores
 from trunkline.identification.evaluation.repeatability import end_shape
 from trunkline.identification.fit.fit import Fit
+from trunkline.identification.fit.identify import _few
 from trunkline.identification.results.scoring import fingerprint
 from trunkline.identification.simulate.loss import (
     RESIDUALS,
@@ -20,7 +21,7 @@ from trunkline.identification.simulate.loss import (
     position_error,
     velocity_error,
 )
-from trunkline.identification.uncertainty.trial_diagnostics import exchanged_labels, started_off
+from trunkline.identification.uncertainty.trial_diagnostics import exchanged_labels, moving_start, started_off
 
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 FIT = Fit(MARKERS, {}, (), "positions", WEIGHTS, None)  # type: ignore[arg-type]
@@ -91,6 +92,18 @@ def late(positions, measured):
     return started_off(np.concatenate([SIMULATED[25:], SIMULATED[:25]]), experiment(positions, measured), FIT)
 
 
+def swaying(positions, measured):
+    """As if a hand still swung the arm when it let go, in frame 40."""
+    swayed = positions + 0.3 * TIME[:, None, None] * np.array([0.0, 1.0, 0.0])  # m, at 0.3 m/s
+    return moving_start(trial(swayed, measured, start=0.4), experiment(swayed[41:], measured[41:]))
+
+
+def widest(positions, measured):
+    """Which of three trials swings farthest."""
+    widths = [(swing(0.02), None, "narrow"), (positions, measured, "partly measured"), (swing(0.08), None, "wide")]
+    return [e.name for e in _few([experiment(p, mask, name=name) for p, mask, name in widths], 3)]
+
+
 # by what they give, from positions (T, S, 3) and where they were measured (T, S)
 COMPARED = {
     "E_internal": lambda p, mask: internal_error(SIMULATED, p, mask),
@@ -108,6 +121,8 @@ COMPARED = {
     "what tells a trial from another": lambda p, mask: fingerprint(trial(p, mask)),
     "whether it starts otherwise": sentence(started_off),
     "whether labels are exchanged": sentence(exchanged_labels),
+    "whether a hand moves it": swaying,
+    "which trial swings widest": widest,
     "that it starts otherwise": late,
     "that labels are exchanged": exchanged,
 }
@@ -123,7 +138,7 @@ def test_what_nobody_measured_counts_nowhere(compared, measured, filler):
     filled = np.where(measured[..., None], real, filler)
     if compared in (late, exchanged) and measured is HIDDEN["the first frames"]:
         assert expected
-    if isinstance(expected, str):
+    if isinstance(expected, str | list) and compared not in (of_trial, of_path):
         assert compared(filled, measured) == expected
     else:
         np.testing.assert_allclose(compared(filled, measured), expected, rtol=1e-9)

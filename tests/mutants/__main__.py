@@ -57,9 +57,6 @@ def _run(chosen: list[Mutant], asked: argparse.Namespace) -> Pairs:
 def _prepare() -> None:
     """What is to be so before NumPy is imported: as in the tests, and one thread, as processes run on all cores."""
     os.environ |= dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "TRUNKLINE_THREADS"), "1")
-    from trunkline.compute.numerics import hold_arithmetic
-
-    hold_arithmetic()
     for module in [name for name in sys.modules if name.partition(".")[0] == "trunkline"]:
         del sys.modules[module]  # each process imports its own, with the mutant
 

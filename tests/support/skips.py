@@ -22,7 +22,6 @@ WHERE = {
     "no path": lambda name: not (ROOT / name).exists(),
     "no variable": lambda name: not os.environ.get(name),
     "variable": lambda setting: setting in (f"{name}={value}" for name, value in os.environ.items()),
-    "no processor flag": lambda flag: flag not in Path("/proc/cpuinfo").read_text().split(),
 }
 ENDED = (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)  # with which a run ends that nothing failed in
 WHOLE = ("", "realtime", "not realtime")  # marks by which the two runs of `make test` share all tests

@@ -1,24 +1,31 @@
-"""The workers of a Dask scheduler: that they are as this process, what they are sent, what can go wrong with them."""
+"""Work on the workers of a Dask scheduler."""
 
 import functools
+import hashlib
 import logging
 import os
 import pickle
-import queue
+import platform
+import re
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
+from importlib.metadata import PackageNotFoundError, requires, version
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
-from trunkline.compute.environment import Fingerprint, difference_from, fingerprint, fingerprint_for
 from trunkline.errors import InputError
 
 VARIABLE = "TRUNKLINE_SCHEDULER"
+LIBRARY = "trunkline"
 CONNECTING = 10.0  # s until a scheduler that does not answer counts as none
+FIRST_WORKER = 10.0  # s until one without workers is an error
 NO_WORKERS = 60.0  # s without any worker until work ends: a killed one comes back sooner
 LOOK = 1.0  # s between looks at whether the scheduler and its workers are still there
-KEPT = 8  # things that all pieces need, until workers may forget the oldest
+SHARED = 8  # values that all pieces need, until the oldest is forgotten
 
 _thread = threading.local()  # `at_a_piece`: it does one for a scheduler
 
@@ -43,10 +50,10 @@ class Cluster:
                 f"{VARIABLE}: found {address} but no library distributed, expected trunkline[cluster]"
             ) from None
         for name in [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == "distributed"]:
-            logging.getLogger(name).setLevel(logging.CRITICAL)  # what goes wrong is told in one line here
+            logging.getLogger(name).setLevel(logging.CRITICAL)  # what goes wrong is one line here
         self._address, self._dask = address, distributed
-        self._shared: dict[int, tuple[Any, Any]] = {}
-        self._alike: set[tuple[str, str]] = set()
+        self._shared: dict[int, tuple[Any, Any]] = {}  # value and its future, by the value's id
+        self._checked: set[tuple[str, str]] = set()  # workers' addresses, each with a package
         try:
             self._client: Any = distributed.Client(address, timeout=CONNECTING, set_as_default=False)
         except ValueError:
@@ -54,7 +61,7 @@ class Cluster:
         except OSError as error:  # a TimeoutError is one
             raise InputError(f"{VARIABLE}: found no scheduler at {address}, expected one that answers") from error
         try:
-            self._client.wait_for_workers(1, timeout=CONNECTING)
+            self._client.wait_for_workers(1, timeout=FIRST_WORKER)
         except OSError as error:
             self._client.close(timeout=1)
             raise InputError(f"{VARIABLE}: found no workers at {address}, expected at least one") from error
@@ -64,28 +71,31 @@ class Cluster:
 
     def threads(self) -> int:
         """Of all workers."""
-        with self._failing():
+        with self._in_one_line():
             return sum(self._client.nthreads().values())
 
     def arriving(self, work: Callable, parts: list, shared: Any) -> Iterator[tuple[int, Any]]:
         """As `trunkline.compute.scheduler.arriving`."""
-        expected, futures = fingerprint_for(work), []
-        with self._failing():
+        left, package = {}, work.__module__.partition(".")[0]
+        # packed: Dask would look for tasks of its own in them, and may hand over arrays that cannot be written to
+        packed = [pickle.dumps(part) for part in parts]
+        with self._in_one_line():
             try:
-                self._check(expected)
-                do, packed = functools.partial(_do, work, expected), [pickle.dumps(part) for part in parts]
+                self._check(package)
+                do = functools.partial(_do, work, package, environment(package))
                 futures = self._client.map(do, [self._send(shared)] * len(parts), packed, pure=False)
-                for index in self._done(futures):
-                    yield index, pickle.loads(futures[index].result())
-                    futures[index].release()
+                left = dict(zip(futures, range(len(parts)), strict=True))
+                del futures  # what is done is released as it leaves `left`
+                while left:
+                    for future in self._done(list(left)):
+                        yield left.pop(future), pickle.loads(future.result())
             finally:
-                if futures and self.answers():
-                    self._client.cancel(futures)
+                if left and self.answers():
+                    self._client.cancel(list(left))
 
     @contextmanager
-    def _failing(self) -> Iterator[None]:
-        """What Dask's errors mean, in one line; the work's own stay as they are."""
-        cancelled = self._dask.client.FutureCancelledError
+    def _in_one_line(self) -> Iterator[None]:
+        """What Dask's errors mean; the work's own stay as they are."""
         try:
             yield
         except self._dask.KilledWorker as error:
@@ -93,92 +103,113 @@ class Cluster:
                 f"{VARIABLE}: several workers of {self._address} died of the same piece of work, expected them to have "
                 "the memory for it"
             ) from error
-        except (cancelled, OSError, RuntimeError) as error:
-            if self.answers() and not isinstance(error, cancelled):
+        except (CancelledError, OSError, RuntimeError) as error:
+            if self.answers() and not isinstance(error, CancelledError):
                 raise
-            raise self._gone() from error
+            raise InputError(
+                f"{VARIABLE}: the scheduler at {self._address} went away, expected it to stay until the end"
+            ) from error
 
-    def _gone(self) -> InputError:
-        return InputError(f"{VARIABLE}: the scheduler at {self._address} went away, expected it to stay until the end")
-
-    def _done(self, futures: list) -> Iterator[int]:
-        """The number of each future as it is done."""
-        done: queue.SimpleQueue = queue.SimpleQueue()
-        for index, future in enumerate(futures):
-            future.add_done_callback(lambda _, index=index: done.put(index))
-        left, last_progress = len(futures), time.monotonic()
-        while left:
+    def _done(self, futures: list) -> set:
+        """Those that are done, at least one of them."""
+        last_worker = time.monotonic()
+        while True:
             try:
-                index = done.get(timeout=LOOK)
-            except queue.Empty:
+                with self._client.as_current():
+                    return self._dask.wait(futures, LOOK, "FIRST_COMPLETED").done
+            except TimeoutError:
                 if not self.answers():
-                    raise self._gone() from None
+                    raise
                 if self._client.scheduler_info()["workers"]:
-                    last_progress = time.monotonic()
-                elif time.monotonic() - last_progress > NO_WORKERS:
+                    last_worker = time.monotonic()
+                elif time.monotonic() - last_worker > NO_WORKERS:
                     raise InputError(
                         f"{VARIABLE}: found no workers at {self._address} for {NO_WORKERS:.0f} s, expected one"
                     ) from None
-                continue
-            yield index
-            left, last_progress = left - 1, time.monotonic()
+
+    def _check(self, package: str) -> None:
+        """Refuse workers with another environment before they have any work; those that come later refuse it."""
+        new = [a for a in self._client.scheduler_info(n_workers=-1)["workers"] if (a, package) not in self._checked]
+        expected = environment(package)
+        answers = self._client.run(difference, package, expected, workers=new, on_error="return") if new else {}
+        for address, mismatch in answers.items():
+            if isinstance(mismatch, Exception):
+                mismatch = f"found no {LIBRARY} like this one ({mismatch!r}), expected the same code"
+            if mismatch:
+                raise InputError(f"{VARIABLE}: worker {address}: {mismatch}")
+            self._checked.add((address, package))
 
     def _send(self, shared: Any) -> Any:
-        """`shared` as a separate task, which the scheduler does again if the workers that had it were killed."""
+        """`shared` as a task, which the scheduler repeats if the workers that had it were killed; scattered data would
+        be lost."""
         if id(shared) not in self._shared:
-            if len(self._shared) == KEPT:
+            if len(self._shared) == SHARED:
                 self._shared.pop(next(iter(self._shared)))
-            packed = _SharedValue(pickle.dumps(shared))
-            self._shared[id(shared)] = shared, self._client.submit(_itself, packed, pure=False)
+            self._shared[id(shared)] = shared, self._client.submit(_itself, pickle.dumps(shared), pure=False)
         return self._shared[id(shared)][1]
 
-    def _check(self, expected: Fingerprint) -> None:
-        """Refuse workers that are not as this process, before they have any work; those that come later refuse it."""
-        there = self._client.scheduler_info(n_workers=-1)["workers"]
-        new = [address for address in there if (address, expected.code_of) not in self._alike]
-        answers = self._client.run(fingerprint, expected.code_of, workers=new, on_error="return") if new else {}
-        for address, answer in answers.items():
-            if mismatch := difference_from(answer, expected):
-                raise InputError(f"{VARIABLE}: worker {address}: {mismatch}")
-            self._alike.add((address, expected.code_of))
+
+def difference(package: str, expected: dict[str, str]) -> str:
+    """The first thing in which this process's environment is not the expected one; empty if in none."""
+    here = environment(package)
+    for name, value in expected.items():
+        if here.get(name) != value:
+            return f"found {name} {here.get(name)}, expected {value} as here"
+    return ""
 
 
-class _SharedValue:
-    """What all pieces need, as bytes until a thread of a worker asks: each has its own, as batches are no two
-    threads' at once."""
+@functools.cache
+def environment(package: str) -> dict[str, str]:
+    """Versions of what the library and its extra `teleop` need, and the code of the library and of `package`, by name.
 
-    def __init__(self, packed: bytes) -> None:
-        self._packed, self._local = packed, threading.local()
-
-    def __reduce__(self):
-        return _SharedValue, (self._packed,)
-
-    def unpacked(self) -> Any:
-        if not hasattr(self._local, "value"):
-            self._local.value = pickle.loads(self._packed)
-        return self._local.value
+    Dask's `get_versions` would import each library, and knows nothing of code.
+    """
+    asked = [line for line in requires(LIBRARY) or [] if "extra ==" not in line or '"teleop"' in line.replace("'", '"')]
+    names = [LIBRARY, *sorted(re.split(r"[^\w.-]", line)[0] for line in asked)]
+    parts = {"Python": platform.python_version()} | {name: _version(name) for name in names}
+    return parts | {f"code of {name}": _digest(name) for name in (LIBRARY, package)}
 
 
-def _itself(packed: _SharedValue) -> _SharedValue:
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "none"
+
+
+def _digest(package: str) -> str:
+    """Of all the package's code."""
+    spec, total = find_spec(package), hashlib.sha256()
+    if spec is None or not spec.submodule_search_locations:
+        return "none"
+    root = Path(next(iter(spec.submodule_search_locations)))
+    for file in sorted(root.rglob("*.py")):
+        total.update(file.relative_to(root).as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
+    return total.hexdigest()[:12]
+
+
+def _itself(packed: bytes) -> bytes:
     return packed
 
 
-def _do(work: Callable, expected: Fingerprint, packed: _SharedValue, part: bytes) -> bytes:
-    """What a worker, which has to be as `expected`, does with a piece.
+@functools.lru_cache(SHARED)
+def _unpacked(packed: bytes, thread: int) -> Any:
+    """Each thread has its own, as batches are no two threads' at once."""
+    return pickle.loads(packed)
 
-    Part and result are packed here: Dask would look for tasks of its own in the one, and may hand over arrays that
-    cannot be written to.
-    """
-    if mismatch := difference_from(fingerprint(expected.code_of), expected):
+
+def _do(work: Callable, package: str, expected: dict[str, str], shared: bytes, part: bytes) -> bytes:
+    """What a worker does with a piece, if its environment is the expected one."""
+    if mismatch := difference(package, expected):
         import distributed
 
         raise InputError(f"{VARIABLE}: worker {distributed.get_worker().address}: {mismatch}")
     from threadpoolctl import threadpool_limits
 
     os.environ.setdefault("TRUNKLINE_THREADS", "1")  # workers are as many as the machine has cores
-    value, _thread.at_a_piece = packed.unpacked(), True
+    _thread.at_a_piece = True
     try:
         with threadpool_limits(1, user_api="blas"):  # as run_stage
-            return pickle.dumps(work(value, pickle.loads(part)))
+            return pickle.dumps(work(_unpacked(shared, threading.get_ident()), pickle.loads(part)))
     finally:
         _thread.at_a_piece = False

@@ -1,5 +1,5 @@
 """Where work is done: on this machine, or on the workers of a Dask scheduler. An environment matter, never a tracked
-parameter: results are the same bits.
+parameter: on processors of the same kind, results are the same bits.
 
 `TRUNKLINE_SCHEDULER` names the scheduler's address; nothing, the default, is this machine. Work comes in pieces of
 which none depends on another. docs/speed.md says how to start scheduler and workers.

@@ -1,14 +1,13 @@
 """A worker of a Dask scheduler, as `TRUNKLINE_SCHEDULER` needs it: `trunkline worker tcp://host:8786`
 
-It is `dask worker` with one thread in each process, as many as there are cores (`--nworkers`), and the arithmetic that
-stages have; further options are Dask's (`python -m distributed.cli.dask_worker --help`).
+It is `dask worker` with one thread in each process, as many as there are cores (`--nworkers`); further options are
+Dask's (`python -m distributed.cli.dask_worker --help`).
 """
 
 import argparse
 import os
 import sys
 
-from trunkline.compute.numerics import hold_arithmetic
 from trunkline.compute.threads import thread_count
 from trunkline.errors import InputError, in_one_line
 from trunkline.program import program_name
@@ -25,7 +24,6 @@ def main(arguments: list[str] | None = None) -> int:
         raise InputError(
             "trunkline.compute.worker: found no library distributed, expected trunkline[cluster]"
         ) from None
-    hold_arithmetic()  # before the processes begin, as NumPy reads it when it is imported
     count = [] if "--nworkers" in words else ["--nworkers", str(thread_count())]
     command = [sys.executable, "-m", "distributed.cli.dask_worker", "--nthreads", "1", *count, *words]
     os.environ["TRUNKLINE_THREADS"] = "1"

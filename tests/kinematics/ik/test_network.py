@@ -174,17 +174,22 @@ def test_onnx_file_is_the_network_and_says_what_it_takes(trained, samples):
     assert (out <= commands.max(axis=0) + 1e-6).all()
 
 
-def test_same_seed_gives_the_same_file_on_one_core_and_on_two(chain, samples, monkeypatch):
+def test_same_seed_and_threads_give_the_same_file_and_other_threads_nearly_the_same_answers(
+    chain, samples, monkeypatch
+):
+    poses, commands, lengths = data_of(samples)
     is_train = np.arange(len(samples)) % 5 > 0
-    files = []
-    for threads in (1, 2):
+    files, answers = [], []
+    for threads in (1, 2, 2):
         monkeypatch.setenv("TRUNKLINE_THREADS", str(threads))
-        torch.set_num_threads(threads)
         training = Training(16, 2, 64, 1e-3, 3)
-        network = train(*data_of(samples), loss_of(chain, samples), is_train, training, lambda *_: None)
+        network = train(poses, commands, lengths, loss_of(chain, samples), is_train, training, lambda *_: None)
+        assert isinstance(network, InverseKinematics)
         files.append(to_onnx(network, ["a", "b", "c"], 0.005).SerializeToString())
-    assert files[0] == files[1]
-    assert isinstance(network, InverseKinematics)
+        with torch.no_grad():
+            answers.append(network(torch.tensor(poses, dtype=torch.float32)).commands.numpy())
+    assert files[1] == files[2]
+    np.testing.assert_allclose(answers[0], answers[1], rtol=0, atol=1e-3 * np.ptp(commands))
 
 
 def test_a_learning_rate_that_diverges_is_an_error_of_one_line(chain, samples):

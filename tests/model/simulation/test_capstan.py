@@ -9,6 +9,7 @@ from trunkline.identification.parameters.parameters import candidate_fields
 from trunkline.identification.parameters.saving import save_model
 from trunkline.model.arm.guide_holes import GuideHoles, add_holes
 from trunkline.model.arm_model import CAPSTAN_FRICTION, ArmModel
+from trunkline.model.simulation.capstan import capstan_friction_of
 from trunkline.model.simulation.drive import drive
 from trunkline.model.simulation.motion import batch_of, hold, move
 from trunkline.model.simulation.rest import settle
@@ -92,6 +93,22 @@ def test_without_friction_holes_change_nothing():
     np.testing.assert_allclose(moved[1], moved[0], atol=1e-9)
     np.testing.assert_allclose(moved[2], moved[0], atol=1e-9)
     assert np.abs(moved[3] - moved[0])[1].max() > 1e-4
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_simulation_that_diverges_leaves_the_limits_of_others_as_they_are():
+    model, limits = rubbing_arm(), []
+    for bend, speed in ((0.1, 1.0), (1e5, 1.0), (1e5, -1.0)):
+        batch = batch_of(model, 2)
+        batch.bind("qpos")[:, 1::2], batch.bind("qvel")[:, 1::2] = [[0.1], [bend]], [[1.0], [speed]]
+        hold(batch, model, np.tile(model.tendon_length0[cables(model)] - 0.01, (2, 1)))
+        friction = capstan_friction_of(batch)
+        friction.begin(np.arange(2))
+        friction.refresh(np.arange(2))
+        limits.append(batch.expand("tendon_frictionloss").copy())
+    assert limits[0].any()
+    np.testing.assert_array_equal([both[0] for both in limits], np.tile(limits[0][0], (3, 1)))
+    assert not all(np.isfinite(both).all() for both in limits), "one of the two overflows"
 
 
 def test_rest_is_the_middle_of_what_friction_holds():

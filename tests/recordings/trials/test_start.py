@@ -4,9 +4,23 @@ import numpy as np
 import pytest
 
 from trunkline.recordings.signals.smoothing import low_pass
-from trunkline.recordings.trials.start import cycle_time, free_time, release_time
+from trunkline.recordings.trials import start
+from trunkline.recordings.trials.start import cycle_time
 
 RATE = 120.0
+
+
+def release_time(time, positions, smooth, measured=None):
+    """Of markers that were all measured, if nothing else is said."""
+    return start.release_time(time, positions, everywhere(positions) if measured is None else measured, smooth)
+
+
+def free_time(time, positions, begin, measured=None):
+    return start.free_time(time, positions, everywhere(positions) if measured is None else measured, begin)
+
+
+def everywhere(positions):
+    return np.ones(positions.shape[:2], bool)
 
 
 def smooth(columns):
@@ -86,6 +100,22 @@ def test_the_arm_is_free_when_the_hand_has_gone(gentle):
     positions = low_pass(positions.reshape(len(time), -1), RATE, 20.0, 4).reshape(positions.shape)
     begin = release_time(time, positions, smooth).time
     assert free_time(time, positions, begin) == pytest.approx(0.5 + gentle, abs=0.035)
+
+
+@pytest.mark.parametrize("hidden", [slice(20, 62), slice(None)])
+def test_what_nobody_measured_does_not_tell_when_the_arm_is_let_go(hidden):
+    """Whatever bridges the gap: the tip jumps in the hold, or all the time."""
+    time, positions = ring_down(0.5037, 3e-4, 0)
+    measured = everywhere(positions)
+    measured[hidden, 2] = False
+    wrong = positions.copy()
+    wrong[:, 2] += np.where(np.arange(len(time)) % 30 < 15, 0.3, -0.3)[:, None] * ~measured[:, 2, None]
+    begins = [release_time(time, marked, smooth, measured) for marked in (positions, wrong)]
+    assert begins[0] == begins[1]
+    assert begins[0].time == pytest.approx(0.5037, abs=1.5 / RATE)
+    frees = [free_time(time, marked, begins[0].time, measured) for marked in (positions, wrong)]
+    assert frees[0] == frees[1]
+    assert release_time(time, wrong, smooth).time != pytest.approx(0.5037, abs=1.5 / RATE)
 
 
 def test_an_arm_that_swings_from_the_first_frame_was_released_before():

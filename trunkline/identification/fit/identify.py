@@ -132,7 +132,8 @@ def values_of(parameters, vector: np.ndarray) -> dict[str, float]:
 
 def _few(experiments: list[Experiment], count: int) -> list[Experiment]:
     """`count` of them, from the one that swings out least to the one that swings out most, evenly between."""
-    order = np.argsort([np.linalg.norm(e.positions[..., :2], axis=-1).max() for e in experiments], kind="stable")
+    swings = [np.linalg.norm(e.positions[e.measured][:, :2], axis=-1).max(initial=0) for e in experiments]
+    order = np.argsort(swings, kind="stable")
     places = np.linspace(0, len(order) - 1, min(count, len(order))).round().astype(int)
     return [experiments[i] for i in order[places]]
 

@@ -12,6 +12,7 @@ from trunkline.identification.fit.fit import Fit
 from trunkline.identification.simulate.experiment import QUIET_FRAMES, Experiment, start_frames
 from trunkline.identification.simulate.loss import RESIDUALS, loss_of
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_static
+from trunkline.recordings.trials.start import robust_length
 from trunkline.recordings.trials.trial import Trial
 
 BETTER = 0.6  # of the loss: what explains a trial leaves less than this
@@ -123,12 +124,12 @@ def moving_start(trial: Trial, experiment: Experiment) -> str:
     if is_static(trial.experiment) or trial.in_motion or frame < 1:
         return ""
     first = max(frame - 2 * QUIET_FRAMES, 0)
-    speeds = np.linalg.norm(trial.positions[frame] - trial.positions[first], axis=-1) / (
-        trial.time[frame] - trial.time[first]
-    )
-    steps = np.linalg.norm(np.diff(experiment.positions, axis=0), axis=-1) / experiment.frame_step
-    speed, top = float(np.quantile(speeds, 0.75)), float(np.quantile(steps, 0.75, axis=1).max())
-    if speed < SWAYING * top:
+    measured = trial.measured[frame] & trial.measured[first]
+    moved = (trial.positions[frame] - trial.positions[first])[None] / (trial.time[frame] - trial.time[first])
+    speed = float(robust_length(moved, measured[None])[0])
+    steps = np.diff(experiment.positions, axis=0) / experiment.frame_step
+    top = float(robust_length(steps, experiment.measured[1:] & experiment.measured[:-1]).max())
+    if not measured.any() or speed < SWAYING * top:
         return ""
     return f"the arm moves at {1e3 * speed:.0f} mm/s when it is let go, and is simulated from rest"
 

@@ -1,11 +1,10 @@
 """The inverse kinematics: a small network from gravity and tip pose to the commands of the motors."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import torch
 from torch import nn
-from torch.autograd.function import FunctionCtx
 
 from trunkline.kinematics.ik.inputs import position_of
 
@@ -29,32 +28,6 @@ class Answer(NamedTuple):
     commands: torch.Tensor
     lengths: torch.Tensor
     tip: torch.Tensor
-
-
-class _Affine(torch.autograd.Function):
-    """x Wᵀ + b by OpenBLAS, whose digits `trunkline.compute.numerics` holds; PyTorch's own products (MKL) are others on
-    each kind of processor, and training makes other networks of other last digits."""
-
-    @staticmethod
-    @np.errstate(over="ignore", invalid="ignore")  # `train` tells of errors that are not finite
-    def forward(ctx: FunctionCtx, x: torch.Tensor, weight: torch.Tensor, bias: torch.Tensor) -> torch.Tensor:
-        ctx.save_for_backward(x, weight)
-        return torch.from_numpy(x.detach().numpy() @ weight.detach().numpy().T + bias.detach().numpy())
-
-    @staticmethod
-    @np.errstate(over="ignore", invalid="ignore")
-    def backward(ctx: Any, *slopes: torch.Tensor) -> tuple[torch.Tensor | None, torch.Tensor, torch.Tensor]:
-        x, weight = (saved.detach().numpy() for saved in ctx.saved_tensors)
-        slope = slopes[0].numpy()
-        back = torch.from_numpy(slope @ weight) if ctx.needs_input_grad[0] else None
-        return back, torch.from_numpy(slope.T @ x), torch.from_numpy(slope.sum(axis=0))
-
-
-class Linear(nn.Linear):
-    """The same digits on every processor."""
-
-    def forward(self, input: torch.Tensor) -> torch.Tensor:
-        return _Affine.apply(input, self.weight, self.bias)
 
 
 class InverseKinematics(nn.Module):
@@ -86,18 +59,8 @@ class InverseKinematics(nn.Module):
             self.register_buffer(name, values.to(torch.float32))
         tendons, columns = commands.shape[1], inputs.shape[1] - 7
         self.inputs = inputs.shape[1]
-        self.layers = nn.Sequential(
-            Linear(raw.shape[1], width), nn.ReLU(),
-            Linear(width, width), nn.ReLU(),
-            Linear(width, width), nn.ReLU(),
-            Linear(width, 2 * tendons),
-        )  # fmt: skip
-        self.tip_layers = nn.Sequential(
-            Linear((2 if columns == 1 else columns) + tendons, width), nn.ReLU(),
-            Linear(width, width), nn.ReLU(),
-            Linear(width, width), nn.ReLU(),
-            Linear(width, 3),
-        )  # fmt: skip
+        self.layers = _perceptron(raw.shape[1], width, 2 * tendons)
+        self.tip_layers = _perceptron((2 if columns == 1 else columns) + tendons, width, 3)
 
     def normalise(self, inputs: torch.Tensor) -> torch.Tensor:
         return (features(inputs) - self.mean) * self.scale
@@ -119,6 +82,15 @@ class InverseKinematics(nn.Module):
         commands = self.middle + self.half_range * pulls
         lengths = commands + self.most_stretch * stretches.clamp(0, 1)
         return Answer(commands, lengths, self.foresee(gravity_features(inputs), pulls))
+
+
+def _perceptron(inputs: int, width: int, outputs: int) -> nn.Sequential:
+    return nn.Sequential(
+        nn.Linear(inputs, width), nn.ReLU(),
+        nn.Linear(width, width), nn.ReLU(),
+        nn.Linear(width, width), nn.ReLU(),
+        nn.Linear(width, outputs),
+    )  # fmt: skip
 
 
 def _range(values: np.ndarray) -> tuple[torch.Tensor, torch.Tensor]:
@@ -144,5 +116,4 @@ def gravity_features(inputs: torch.Tensor) -> torch.Tensor:
     gravity = inputs[:, :-7]
     if gravity.shape[1] != 1:
         return gravity
-    angle = gravity.to(torch.float64)  # a sine's last digit is each processor's own (MKL): here it is rounded away
-    return torch.cat([torch.sin(angle), torch.cos(angle)], dim=1).to(gravity.dtype)
+    return torch.cat([torch.sin(gravity), torch.cos(gravity)], dim=1)

@@ -1,15 +1,13 @@
-"""Training of the network on the tip error to first order: Adam, each batch in parts that cores share."""
+"""Training of the network on the tip error to first order."""
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
 import numpy as np
 import torch
 from pydantic import Field
-from torch import nn
-from torch.optim.adam import adam
+from torch.optim.lr_scheduler import CosineAnnealingLR, LinearLR, SequentialLR
 
 from trunkline.compute.threads import thread_count
 from trunkline.errors import InputError
@@ -23,10 +21,7 @@ TIE = 0.02  # weight of plain command errors, which alone tie down how long a sl
 STRETCH = 1.0  # weight of errors of the lengths over the commands
 SLACK = 1e-3  # m, most by which slack tendons are paid out where the tip is foreseen: that moves it nowhere
 WARM_UP = 0.1  # share of the steps in which the learning rate rises from zero, while Adam learns each weight's scale
-ADAM = {  # its usual numbers
-    "beta1": 0.9, "beta2": 0.999, "eps": 1e-8, "weight_decay": 0.0, "amsgrad": False, "maximize": False, "fused": True,
-}  # fmt: skip
-PARTS = 2  # of a batch, whose gradients are summed in this order whatever thread found them: more cores, same network
+LOWEST = 1e-3  # learning rate at both ends over the largest
 
 
 @dataclass
@@ -91,7 +86,8 @@ def train(
 ) -> InverseKinematics:
     """Train on the samples where `is_train`, with Adam, on the tip error to first order.
 
-    One thread a part of a batch: sums in another order would give other last digits, and then other networks.
+    The same machine and `TRUNKLINE_THREADS` give the same network; other ones sum in another order, so that last digits
+    differ.
 
     Args:
         inputs: as `inputs` has them. Shape (N, 7, 8 or 10).
@@ -101,77 +97,69 @@ def train(
     Raises:
         InputError: the error is no longer finite.
     """
-    torch.set_num_threads(1)
+    torch.set_num_threads(thread_count())
     torch.manual_seed(training.seed)
     network = InverseKinematics(training.width, inputs[is_train], commands[is_train], lengths[is_train])
-    parameters: list[torch.Tensor] = list(network.parameters())
     data = samples(network, inputs, commands, lengths, loss)
     rows = torch.tensor(np.flatnonzero(is_train))
     others = data.at(torch.tensor(np.flatnonzero(~is_train)))
     shuffle = torch.Generator().manual_seed(training.seed)
     batches = len(rows) // training.batch
-    steps = max(1, training.epochs * batches)
-    # for the function behind torch.optim.Adam: the class imports torch's compiler, which takes seconds
-    first, second = ([torch.zeros_like(parameter) for parameter in parameters] for _ in range(2))
-    counts = [torch.zeros(()) for _ in parameters]
-
-    def slopes(part: TrainingSamples, spare: torch.Tensor) -> tuple[tuple[torch.Tensor, ...], torch.Tensor]:
-        """Gradient of the batch's mean objective as far as these samples make it, and the sum of their tip errors."""
-        commands, stretches = network.unclipped(part.x)
-        delta = commands - part.command
-        moved = part.loss(delta)
-        missed = network.foresee(part.pulling, part.pulls + spare * part.spare) - part.tip
-        plain = (TIE * delta.abs() + STRETCH * (stretches - part.stretch).abs()).sum() / delta.shape[1]
-        objective = (rounded(moved).sum() + rounded(missed).sum() + plain) / training.batch
-        return torch.autograd.grad(objective, parameters), moved.detach()[:, :3].norm(dim=1).sum()
-
-    @torch.no_grad()
-    def tip_error(part: TrainingSamples) -> torch.Tensor:
-        return part.loss(network.unclipped(part.x)[0] - part.command)[:, :3].norm(dim=1)
-
-    done, size = 0, -(-training.batch // PARTS)
-    with ThreadPoolExecutor(min(PARTS, thread_count()), initializer=torch.set_num_threads, initargs=(1,)) as pool:
-        for epoch in range(1, training.epochs + 1):
-            total = 0.0
-            order = data.at(rows[torch.randperm(len(rows), generator=shuffle)])  # in a row: batches are parts of it
-            spares = torch.rand(len(rows), data.spare.shape[1], generator=shuffle)
-            for batch in pieces(batches * training.batch, training.batch):
-                parts = [slice(batch.start + p.start, batch.start + p.stop) for p in pieces(training.batch, size)]
-                results = pool.map(slopes, [order.at(part) for part in parts], [spares[part] for part in parts])
-                (gradient, error), *rest = results
-                for more, further in rest:
-                    for mine, other in zip(gradient, more, strict=True):
-                        mine += other
-                    error += further
-                speed = training.learning_rate * rate(done / steps)
-                with torch.no_grad():
-                    adam(parameters, list(gradient), first, second, [], counts, lr=speed, **ADAM)
-                done += 1
-                total += float(error) / training.batch
-            if not np.isfinite(total):
-                raise InputError(
-                    f"train_ik.learning_rate: found {training.learning_rate}, by which the tip error is not finite in"
-                    f" epoch {epoch}, expected a smaller one"
-                )
-            errors = pool.map(tip_error, map(others.at, pieces(len(others.x), 4096)))
-            validate = torch.cat(list(errors))
-            report(epoch, total / batches, float(validate.mean()))
+    optimizer = torch.optim.Adam(network.parameters(), lr=training.learning_rate, fused=True)
+    schedule = warm_up_and_cosine(optimizer, training.epochs * batches)
+    for epoch in range(1, training.epochs + 1):
+        total = 0.0
+        order = data.at(rows[torch.randperm(len(rows), generator=shuffle)])  # in a row: batches are parts of it
+        spares = torch.rand(len(rows), data.spare.shape[1], generator=shuffle)
+        for start in range(0, batches * training.batch, training.batch):
+            batch = slice(start, start + training.batch)
+            mean, tip = objective(network, order.at(batch), spares[batch])
+            optimizer.zero_grad()
+            mean.backward()
+            optimizer.step()
+            schedule.step()
+            total += float(tip)
+        if not np.isfinite(total):
+            raise InputError(
+                f"train_ik.learning_rate: found {training.learning_rate}, by which the tip error is not finite in"
+                f" epoch {epoch}, expected a smaller one"
+            )
+        with torch.no_grad():
+            deltas = network.unclipped(others.x)[0] - others.command
+            report(epoch, total / batches, float(tip_distance(others.loss(deltas)).mean()))
     return network.eval()
 
 
+def objective(
+    network: InverseKinematics, batch: TrainingSamples, spare: torch.Tensor
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """What is minimised, the mean over a batch of B, and the mean tip error to first order, m.
+
+    Args:
+        spare: share of its `spare` by which each slack tendon is paid out where the tip is foreseen. Shape (B, K).
+    """
+    commands, stretches = network.unclipped(batch.x)
+    delta = commands - batch.command
+    moved = batch.loss(delta)
+    missed = network.foresee(batch.pulling, batch.pulls + spare * batch.spare) - batch.tip
+    plain = TIE * delta.abs().mean() + STRETCH * (stretches - batch.stretch).abs().mean()
+    return rounded(moved).mean() + rounded(missed).mean() + plain, tip_distance(moved.detach()).mean()
+
+
+def tip_distance(moved: torch.Tensor) -> torch.Tensor:
+    """How far tips moved, m, of the changes of pose (N, D) of `TipLoss`. Shape (N,)."""
+    return moved[:, :3].norm(dim=1)
+
+
 def rounded(errors: torch.Tensor) -> torch.Tensor:
-    """√(|e|² + ROUNDING²) of errors (N, D). As a norm, since PyTorch's square root (MKL) is another in its last digit
-    on each kind of processor."""
-    return torch.linalg.vector_norm(nn.functional.pad(errors, (0, 1), value=ROUNDING), dim=1)
+    """√(|e|² + ROUNDING²) of errors (N, D)."""
+    return (errors.square().sum(dim=1) + ROUNDING**2).sqrt()
 
 
-def pieces(count: int, size: int) -> list[slice]:
-    """Of range(count), each of `size` but the last one."""
-    return [slice(start, min(start + size, count)) for start in range(0, count, size)]
-
-
-def rate(done: float) -> float:
-    """The learning rate over the largest, when a share `done` of all steps is: up evenly, down along a cosine."""
-    if done < WARM_UP:
-        return done / WARM_UP
-    return 0.001 + 0.999 * (1 + np.cos(np.pi * (done - WARM_UP) / (1 - WARM_UP))) / 2
+def warm_up_and_cosine(optimizer: torch.optim.Optimizer, steps: int) -> SequentialLR:
+    """The learning rate over `steps`: up evenly to the optimizer's, then down along a cosine, from and to LOWEST."""
+    rising = max(1, round(WARM_UP * steps))
+    warm_up = LinearLR(optimizer, LOWEST, total_iters=rising)
+    largest = float(optimizer.param_groups[0]["initial_lr"])
+    cosine = CosineAnnealingLR(optimizer, max(1, steps - rising), eta_min=LOWEST * largest)
+    return SequentialLR(optimizer, [warm_up, cosine], [rising])

@@ -57,8 +57,9 @@ class CapstanFriction:
         side = np.clip(-self._speed[ids][:, self._tendons] / CREEP, -1, 1)  # (B, K, P)
         falls = side * turns
         tension = np.maximum(-self._force[ids][:, self._actuators], 0)[..., None]
-        before = np.exp(-(np.cumsum(falls, axis=2) - falls / 2))
-        limits = tension * before * turns
+        with np.errstate(over="ignore", invalid="ignore"):  # bends of thousands of rad: MuJoCo warns that they diverge
+            before = np.exp(-(np.cumsum(falls, axis=2) - falls / 2))
+            limits = tension * before * turns
         self._limits[np.ix_(ids, self._tendons.ravel())] = limits.reshape(len(ids), -1)
         self._turn_arms(ids)
 

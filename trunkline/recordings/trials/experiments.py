@@ -9,8 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from trunkline.recordings.trials.recording import TrialRecording
 from trunkline.recordings.trials.start import Smooth, Start, cycle_time, free_time, release_time
+from trunkline.recordings.trials.trial import Trial
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,8 @@ class ExperimentKind:
     static: bool
     needs_motors: bool
     words: tuple[str, ...]
-    start: Callable[[TrialRecording, Smooth], Start] | None = None
-    free: Callable[[TrialRecording, float], float] | None = None
+    start: Callable[[Trial, Smooth], Start] | None = None
+    free: Callable[[Trial, float], float] | None = None
     stepwise: bool = False
     hangs: bool = False
     without: str = ""
@@ -74,8 +74,8 @@ EXPERIMENTS: dict[str, ExperimentKind] = {
         static=False,
         needs_motors=False,
         words=("release",),
-        start=lambda trial, smooth: release_time(trial.time, trial.positions, smooth),
-        free=lambda trial, begin: free_time(trial.time, trial.positions, begin),
+        start=lambda trial, smooth: release_time(trial.time, trial.positions, trial.measured, smooth),
+        free=lambda trial, begin: free_time(trial.time, trial.positions, trial.measured, begin),
         hangs=True,
     ),
     "curl": ExperimentKind(

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import binary_erosion
 
 AHEAD, BEHIND = 0.033, 0.1  # s: how far a hand's motion is foreseen, and from how much of it
 SHORTEST = 0.08  # s of a hold, before which nothing is foreseen
@@ -42,7 +43,7 @@ class Start:
     swaying: bool = False
 
 
-def release_time(time: np.ndarray, positions: np.ndarray, smooth: Smooth) -> Start:
+def release_time(time: np.ndarray, positions: np.ndarray, measured: np.ndarray, smooth: Smooth) -> Start:
     """When the arm was let go; at 0 s and in motion if it is on its way from the first frame.
 
     A hand sways and creeps, but smoothly: where the arm will be a moment later can be foreseen. An arm that is let go
@@ -52,34 +53,39 @@ def release_time(time: np.ndarray, positions: np.ndarray, smooth: Smooth) -> Sta
     fit, how far it is from the first guess, which was made in another way, and a frame.
 
     Args:
-        time (T,) s, uniform. positions (T, S, 3) m, filtered, of an arm that is held, then swings.
+        time (T,) s, uniform. positions (T, S, 3) m, filtered, of an arm that is held, then swings. measured (T, S):
+            where they count.
     """
     step = float(time[1] - time[0])
-    speed = robust_length(np.gradient(positions, time, axis=0))
-    end = _end_of_hold(positions[: np.argmax(speed) + 1 + _frames(AHEAD, step)], step)
+    speed = robust_length(np.gradient(positions, time, axis=0), _within(measured, 1))
+    until = np.argmax(speed) + 1 + _frames(AHEAD, step)
+    end = _end_of_hold(positions[:until], measured[:until], step)
     if end is None:
         return Start(0.0, step / np.sqrt(12), float(speed[0]), in_motion=True)
-    begin, variance, swayed = _let_go(time, positions, smooth, float(time[end]))
+    begin, variance, swayed = _let_go(time, positions, measured, smooth, float(time[end]))
     sigma = float(np.sqrt(variance + (begin - time[end]) ** 2 / 3 + step**2 / 12))
     return Start(begin, sigma, swayed, swaying=swayed > SWAYING * float(speed.max()))
 
 
 def _let_go(
-    time: np.ndarray, positions: np.ndarray, smooth: Smooth, guess: float
+    time: np.ndarray, positions: np.ndarray, measured: np.ndarray, smooth: Smooth, guess: float
 ) -> tuple[float, float, float]:
     """The instant near `guess`, s, from which powers of the time since explain the motion best, its variance, and the
     speed, m/s, that the hand had given the arm by then."""
     step = float(time[1] - time[0])
     window = (time >= guess - HOLD) & (time <= guess + FREE)
-    measured = positions[window].reshape(window.sum(), -1)
+    markers = measured[window].all(axis=0)
+    if not markers.any():
+        markers = np.ones_like(markers)  # each has a gap there: what bridges it is all that there is
+    motion = positions[window][:, markers].reshape(window.sum(), -1)
     before_release = np.vander((time[window] - guess) / HOLD, DEGREE + 1)
     instants = np.arange(max(guess - SEARCHED, time[window][0]), guess + min(SEARCHED, FREE / 2), step / TRIES)
 
     def explain(instant: float, powers: tuple[float, ...]) -> tuple[float, np.ndarray]:
         since = np.maximum(time - instant, 0)[:, None] / FREE
         design = np.hstack([before_release, smooth(since ** np.array(powers))[window]])
-        fit = np.linalg.lstsq(design, measured)[0]
-        return float(np.square(measured - design @ fit).sum()), fit
+        fit = np.linalg.lstsq(design, motion)[0]
+        return float(np.square(motion - design @ fit).sum()), fit
 
     residuals, fits = np.full(len(instants), np.inf), []
     for powers in LEAVING:
@@ -87,7 +93,7 @@ def _let_go(
         if min(errors) < PLAINLY * residuals.min():
             residuals, fits = np.array(errors), tried
     best = int(np.argmin(residuals))
-    spare = max(measured.size / 3 - fits[best].size, 1)  # of three frames, the low-pass leaves about one
+    spare = max(motion.size / 3 - fits[best].size, 1)  # of three frames, the low-pass leaves about one
     inner = int(np.clip(best, 1, len(instants) - 2))
     curvature = (residuals[inner - 1] - 2 * residuals[inner] + residuals[inner + 1]) / (step / TRIES) ** 2
     variance = 2 * residuals[best] / spare / curvature if curvature > 0 else SEARCHED**2
@@ -97,13 +103,14 @@ def _let_go(
 def _speed(polynomials: np.ndarray, at: float) -> float:
     """Speed, m/s, of markers that move as polynomials (DEGREE + 1, 3 S) of time over HOLD, highest power first."""
     velocity = np.stack([np.polyval(np.polyder(column), at) for column in polynomials.T]) / HOLD
-    return float(robust_length(velocity.reshape(1, -1, 3))[0])
+    velocity = velocity.reshape(1, -1, 3)
+    return float(robust_length(velocity, np.ones(velocity.shape[:2], bool))[0])
 
 
-def _end_of_hold(positions: np.ndarray, step: float) -> int | None:
+def _end_of_hold(positions: np.ndarray, measured: np.ndarray, step: float) -> int | None:
     """The last frame (T, S, 3) in which the hand still had the arm; None if it never had."""
     ahead, shortest = _frames(AHEAD, step), _frames(SHORTEST, step)
-    departed = departures(positions, _frames(BEHIND, step), ahead, shortest)
+    departed = departures(positions, measured, _frames(BEHIND, step), ahead, shortest)
     if not len(departed):
         return None
     top = departed.max()
@@ -113,11 +120,14 @@ def _end_of_hold(positions: np.ndarray, step: float) -> int | None:
     return shortest + int(quiet[-1]) + ahead - 1 if len(quiet) >= FORESEEN_FRAMES else None
 
 
-def departures(positions: np.ndarray, behind: int, ahead: int, shortest: int) -> np.ndarray:
+def departures(
+    positions: np.ndarray, measured: np.ndarray, behind: int, ahead: int, shortest: int
+) -> np.ndarray:
     """How far the arm is, after `ahead` frames, from where a parabola through the last `behind` led, m.
 
     Args:
-        positions: (T, S, 3) m. shortest: frames, fewer than `behind`, from which on something is foreseen.
+        positions: (T, S, 3) m. measured: where they count, (T, S). shortest: frames, fewer than `behind`, from which on
+            something is foreseen.
 
     Returns:
         From frame `shortest` on, as far as others are `ahead`. Shape (T - shortest - ahead,), if that is positive.
@@ -128,7 +138,8 @@ def departures(positions: np.ndarray, behind: int, ahead: int, shortest: int) ->
         powers = np.vander(np.arange(-past, 1) / past, 3)
         weights = np.vander([ahead / past], 3) @ np.linalg.pinv(powers)
         led = np.tensordot(weights, positions[frame - past : frame + 1], 1)
-        distances.append(robust_length(positions[frame + ahead] - led)[0])
+        counts = measured[frame - past : frame + 1].all(axis=0) & measured[frame + ahead]
+        distances.append(robust_length(positions[frame + ahead] - led, counts[None])[0])
     return np.array(distances)
 
 
@@ -136,25 +147,38 @@ def _frames(seconds: float, step: float) -> int:
     return max(round(seconds / step), 2)
 
 
-def free_time(time: np.ndarray, positions: np.ndarray, begin: float) -> float:
+def free_time(time: np.ndarray, positions: np.ndarray, measured: np.ndarray, begin: float) -> float:
     """When a hand that lets go gently is gone, s: it moves along from `begin` on, the arm pulling ever harder.
 
     An arm that is let go at once accelerates most at once. Where its acceleration still grows, something holds it; so
     it is free from the largest acceleration of its farthest travelling marker before that one's top speed.
 
     Args:
-        time (T,) s, uniform. positions (T, S, 3) m, filtered. begin: s, when the arm began to move.
+        time (T,) s, uniform. positions (T, S, 3) m, filtered. measured (T, S): where they count. begin: s, when the
+            arm began to move.
     """
-    tip = positions[:, np.argmax(np.ptp(positions, axis=0).max(axis=-1))]
+    counts = np.broadcast_to(measured[..., None], positions.shape)
+    way = positions.max(axis=0, where=counts, initial=-np.inf) - positions.min(axis=0, where=counts, initial=np.inf)
+    farthest = int(np.argmax(way.max(axis=-1)))
+    tip, counts = positions[:, farthest], _within(measured, 2)[:, farthest]
     velocity = np.gradient(tip, time, axis=0)
     speed, pull = (np.linalg.norm(v, axis=1) for v in (velocity, np.gradient(velocity, time, axis=0)))
-    swings = np.flatnonzero((time >= begin) & (np.arange(len(time)) <= np.argmax(speed)))
+    top = np.argmax(np.where(counts, speed, 0))
+    swings = np.flatnonzero(counts & (time >= begin) & (np.arange(len(time)) <= top))
     return float(time[swings[np.argmax(pull[swings])]]) if len(swings) else begin
 
 
-def robust_length(vectors: np.ndarray) -> np.ndarray:
-    """Upper quartile over the markers of the lengths of (T, S, 3): a few hidden markers do not matter. (T,)."""
-    return np.quantile(np.linalg.norm(vectors, axis=2), 0.75, axis=1)
+def _within(measured: np.ndarray, frames: int) -> np.ndarray:
+    """Where so many frames to either side were measured too, of (T, S)."""
+    return binary_erosion(measured, np.ones((2 * frames + 1, 1)), border_value=1)
+
+
+def robust_length(vectors: np.ndarray, measured: np.ndarray) -> np.ndarray:
+    """Upper quartile over the measured (T, S) markers of the lengths of (T, S, 3): a few exchanged ones do not matter.
+    0 where none was measured. Shape (T,)."""
+    lengths = np.where(measured, np.linalg.norm(vectors, axis=2), np.nan)
+    lengths[~measured.any(axis=1)] = 0
+    return np.nanquantile(lengths, 0.75, axis=1)
 
 
 def cycle_time(time: np.ndarray, commands: np.ndarray) -> Start:
