@@ -107,12 +107,6 @@ class GraspPreviewer:
         resting = RestCriterion(opens, np.array(board.low), np.array(board.high), twin.model)
         return PlanPrediction(preview(twin, trajectory, posterior, resting, s.futures, seed, go_on=go_on), begins)
 
-    def reach(self, plan: Plan, world: World, seed: int) -> PlanPrediction:
-        """Futures of a plan that grasps nothing, beside nothing that may be touched."""
-        trajectory = self.whole(plan)
-        twin = compose_twin(self.robot_model, world, None, trajectory.joints[0], trajectory.commands[0], self.settings)
-        return self.free(twin, trajectory, seed)
-
     def free(
         self, twin: ComposedTwin, trajectory: CommandTrajectory, seed: int, go_on: Callable[[], None] = lambda: None
     ) -> PlanPrediction:
