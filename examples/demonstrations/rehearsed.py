@@ -16,6 +16,7 @@ from rehearsal.session import RATE, Session
 from trunkline.ar.session.log_format import LogFormat, Record, Subject
 from trunkline.ar.session.log_writer import LogWriter
 from trunkline.errors import InputError, in_one_line
+from trunkline.version import __version__
 
 ZERO = 1_700_000_000 * 10**9  # ns since 1970 at which every run begins
 JOINTS = tuple(f"joint_{number}" for number in range(1, 8))
@@ -42,7 +43,7 @@ class Kept(LogWriter):
 def record(session: Session, journal: Kept) -> None:
     """Let a session that has not begun be logged as a live one is."""
     journal.session, session.controller.log_writer = session, journal
-    session.controller.begin(RATE)
+    session.controller.begin(RATE, __version__)
 
 
 @in_one_line

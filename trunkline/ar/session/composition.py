@@ -28,6 +28,7 @@ from trunkline.ar.teleop.vectors import DOWN
 from trunkline.kinematics.panda.shipped import JOINTS
 from trunkline.model.elements import actuators
 from trunkline.unity import unpacked
+from trunkline.version import __version__
 
 SEARCH = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])  # rad, where the search for the ready pose begins
 BELOW, AROUND = 1.0, 3.0  # m, of the floor as a solid
@@ -74,7 +75,7 @@ def make(
     robot = robot_of(simulation, hardware)
     core = Teleoperation(teleop.core, package.reach, package.digest, teleop.mount_offset)
     controller = SessionController(core, robot, previewer, world, teleop.handling.lift, log_writer, package.period)
-    controller.begin(config.rate)
+    controller.begin(config.rate, __version__)
     log_writer.await_begun()
     return SessionParts(controller, package.digest, drawing, Shells.of(maps), robot, previewer, log_writer)
 

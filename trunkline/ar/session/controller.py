@@ -46,7 +46,6 @@ from trunkline.ar.teleop.messages import (
     World,
 )
 from trunkline.ar.teleop.plan import Plan
-from trunkline.version import __version__
 
 HERE = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))  # of poses that are in the base frame already
 NUMBER = re.compile(r"[\d.]+")
@@ -106,11 +105,12 @@ class SessionController:
         self._logged: tuple = ()
         self._follow = FollowControl(previewer.submit, robot.hear)
 
-    def begin(self, rate: float) -> None:
-        """The log's first line: all that a replay needs besides the package. rate: of ticks, Hz."""
+    def begin(self, rate: float, version: str = "") -> None:
+        """The log's first line: all that a replay needs besides the package. rate: of ticks, Hz. version: of
+        Trunkline."""
         core, subject = self.core, self.log_writer.subject
         self.log_writer.event(
-            "begin", version=__version__, package=core.package, rate=rate, settings=core.settings,
+            "begin", version=version, package=core.package, rate=rate, settings=core.settings,
             mount_offset=core.mount_offset, tip={"body": subject.tip[0], "place": subject.tip[1]},
             hardware=subject.hardware,
         )  # fmt: skip
