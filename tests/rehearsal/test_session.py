@@ -14,7 +14,7 @@ from rehearsal.operator.scripts import Operator
 from rehearsal.session import REFERENCE, Session
 from tests.ar.teleop.test_plan import BENT, LIMITS, NETWORK, OFFSET, START, STRAIGHT
 from tests.support.operator import PACKAGE, Everywhere, config
-from trunkline.ar.hybrid.preview import Stated
+from trunkline.ar.hybrid.rollout_batch import Stated
 from trunkline.ar.preview.grasp_preview import GraspPreviewer
 from trunkline.ar.teleop.messages import World
 from trunkline.ar.teleop.planner import Planner

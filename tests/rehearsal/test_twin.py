@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from rehearsal import settings
 from tests.ar.hybrid.conftest import hybrid_settings, rubbing_arm
 from trunkline.ar.hybrid.posterior import Posterior, nominal_sample
-from trunkline.ar.hybrid.preview import joined
+from trunkline.ar.hybrid.rollout_batch import joined
 from trunkline.ar.hybrid.rollouts import CommandTrajectory, rollouts
 from trunkline.ar.preview.preview_twin import RobotModel, compose_twin
 from trunkline.ar.teleop.messages import Box, Thing, World

@@ -9,8 +9,8 @@ from tests.ar.hybrid.test_rollouts import SIZE, way_of
 from trunkline.ar.hybrid.assistant import best, try_places
 from trunkline.ar.hybrid.compose import Placed, compose
 from trunkline.ar.hybrid.objects import GraspObject
+from trunkline.ar.hybrid.outcomes import Holding
 from trunkline.ar.hybrid.posterior import Contact, Posterior
-from trunkline.ar.hybrid.preview import Holding
 from trunkline.ar.hybrid.rollouts import ComposedTwin
 from trunkline.ar.hybrid.string import hang
 from trunkline.kinematics.panda.mounts import FixedMount

@@ -8,8 +8,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from trunkline.ar.hybrid.outcomes import Holding
 from trunkline.ar.hybrid.posterior import Posterior, PosteriorSamples, sample
-from trunkline.ar.hybrid.preview import Holding, interruptible, joined
+from trunkline.ar.hybrid.rollout_batch import interruptible, joined
 from trunkline.ar.hybrid.rollouts import CommandTrajectory, ComposedTwin, rollouts
 
 

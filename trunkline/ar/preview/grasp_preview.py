@@ -11,9 +11,9 @@ import numpy as np
 
 from trunkline.ar.hybrid.assistant import best, try_places
 from trunkline.ar.hybrid.grasp_poses import Grip
+from trunkline.ar.hybrid.outcomes import Holding, RestCriterion
 from trunkline.ar.hybrid.posterior import Contact
-from trunkline.ar.hybrid.preview import Holding, PlanPreview, preview
-from trunkline.ar.hybrid.released import RestCriterion
+from trunkline.ar.hybrid.rollout_batch import PlanPreview, preview
 from trunkline.ar.hybrid.rollouts import CommandTrajectory, ComposedTwin
 from trunkline.ar.preview.preview_twin import RobotModel, compose_twin
 from trunkline.ar.preview.settings import Previewing

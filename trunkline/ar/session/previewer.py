@@ -14,7 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
-from trunkline.ar.hybrid.preview import WITHIN, nominal
+from trunkline.ar.hybrid.rollout_batch import WITHIN, nominal
 from trunkline.ar.hybrid.rollouts import FRAME, CommandTrajectory, ComposedTwin
 from trunkline.ar.preview.grasp_preview import GraspPreviewer, PlanPrediction
 from trunkline.ar.preview.package import Package

@@ -15,7 +15,6 @@ from pathlib import Path
 from aiohttp import WSCloseCode, WSMsgType, web
 
 from trunkline.ar.session import binary, controller_input, messages
-from trunkline.ar.session.alignment import mark_at
 from trunkline.ar.session.alignment_procedure import AlignmentProcedure
 from trunkline.ar.session.anchors import Anchor, Anchors
 from trunkline.ar.session.auth import HEADERS, Origins, PairingCode, same
@@ -26,6 +25,7 @@ from trunkline.ar.session.controller_input import controller_pose
 from trunkline.ar.session.gc_policy import GCPolicy
 from trunkline.ar.session.lease import Control
 from trunkline.ar.session.previewer import PredictionAnswer, PreviewBegun, PreviewPiece
+from trunkline.ar.session.registration import mark_at
 from trunkline.ar.session.robot import next_report_time
 from trunkline.ar.session.routes import Routes
 from trunkline.ar.session.scene import Shells
