@@ -23,10 +23,10 @@ from benchmarks.watching import Door, Span, alone, attended, crowd, pressed, sto
 from qualification.command import qualify
 from qualification.guests import ADDRESS
 from trunkline.ar.session import binary
-from trunkline.ar.session.certificate import make_certificate, tls_context
 from trunkline.ar.session.composition import SessionParts
 from trunkline.ar.session.server import Server
 from trunkline.ar.session.session import Address, opened
+from trunkline.ar.session.tls import make_certificate, tls_context
 
 CROWD = 10  # watchers, of whom one does not read in the end
 LOOKED, CLOSELY = 0.05, 0.002  # s between two looks at the server's processor, and at the robot

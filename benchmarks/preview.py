@@ -18,7 +18,8 @@ import numpy as np
 from trunkline.ar.hybrid.compose import Placed, compose
 from trunkline.ar.hybrid.grasps import CABLES, Grasp, object_in_base
 from trunkline.ar.hybrid.objects import GraspObject
-from trunkline.ar.hybrid.preview import Holding, nominal, preview
+from trunkline.ar.hybrid.outcomes import Holding
+from trunkline.ar.hybrid.rollout_batch import nominal, preview
 from trunkline.ar.hybrid.rollouts import CommandTrajectory, ComposedTwin
 from trunkline.ar.hybrid.settings import HybridModelSettings
 from trunkline.ar.hybrid.uncertainty import uncertainty_of

@@ -12,7 +12,6 @@ should do nothing else. Goals of presses, alignment, clocks, the page, the log a
 tests/ar/teleop/test_presses.py, tests/ar/session, tests/ar/drivers/test_ros.py.
 """
 
-import queue
 import sys
 import time
 from collections.abc import Iterator
@@ -29,7 +28,8 @@ from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import preview_process
 from trunkline.ar.session.composition import SEARCH, simulation_of, solids, subject_of
 from trunkline.ar.session.log_reader import tip_path
-from trunkline.ar.session.preview_process import Order, PlanAnswer, PreviewBegun, PreviewPiece, PreviewProcess
+from trunkline.ar.session.preview_process import PreviewProcess
+from trunkline.ar.session.previewer import Answer, Order, PlanAnswer, PreviewBegun, PreviewPiece
 from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.session.simulated import Simulation, TwinPlant
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
@@ -45,7 +45,7 @@ PLANS, MOST = 12, 100  # that are previewed, and places that are tried for them
 ENOUGH = 3.6  # s of a preview
 AROUND, HEADING = (0.15, 0.3, 0.1), 0.5  # m of mounts about the first, rad
 PULLS, LOOSE = (0.03, 0.12), 0.2  # m by which the first cable is pulled, and the others paid out
-COMES = 600.0  # s that the process may take
+COMES, POLLED = 600.0, 0.001  # s that the process may take, and after which it is looked whether it has answered
 PUSHED = 2e-3  # m by which a thing has moved that was pushed; on its string it never rests
 
 
@@ -74,8 +74,8 @@ def rows(path: Path) -> list[Row]:
     joints = RigidIK(teleop.mount_offset).solve(SEARCH, config.ready, DOWN, 0.0)
     simulation = simulation_of(package, teleop, config, joints)
     world = make_world(solids(config), () if config.thing is None else (config.thing,))
-    with planning(path, teleop, config, simulation, world) as (process, heard):
-        found = list(previews(process, heard, package, config, simulation, world))
+    with planning(path, teleop, config, simulation, world) as process:
+        found = list(previews(process, package, config, simulation, world))
     first, enough, whole = np.array([(one.first, one.enough, one.whole) for one in found]).T
     shown, long = np.array([one.times[-1] for one in found]), np.isfinite(enough)
     apart: dict[bool, list[np.ndarray]] = {False: [], True: []}
@@ -106,22 +106,20 @@ def _told(values: np.ndarray, scale: float, unit: str) -> str:
 @contextmanager
 def planning(
     path: Path, teleop: Teleop, config: SessionConfig, simulation: Simulation, world: World
-) -> Iterator[tuple[PreviewProcess, queue.Queue]]:
-    """The process once it is ready, and what it answers: (time at which it came, answer)."""
-    heard: queue.Queue = queue.Queue()
+) -> Iterator[PreviewProcess]:
+    """The process once it is ready."""
     setup = path.resolve(), teleop, config.preview, simulation.bodies, world
-    process = PreviewProcess(preview_process.run, setup, lambda answer: heard.put((time.monotonic(), answer)))
+    process = PreviewProcess(preview_process.run, setup)
     try:
         if not process.ready.wait(COMES):
             raise InputError(f"the process that plans: not ready after {COMES:g} s")
-        yield process, heard
+        yield process
     finally:
         process.close()
 
 
 def previews(
     process: PreviewProcess,
-    heard: queue.Queue,
     package: Package,
     config: SessionConfig,
     simulation: Simulation,
@@ -132,8 +130,8 @@ def previews(
     for serial in range(1, MOST + 1):
         targets = _targets(rng, package, config.ready)
         request = Request(serial, targets, world.digest, package.digest)
-        process.order(Order(request, world, simulation.joints, simulation.commands))
-        found = _heard(heard, serial)
+        process.submit(Order(request, world, simulation.joints, simulation.commands))
+        found = _heard(process, serial)
         if found is not None:
             made += 1
             yield found
@@ -152,11 +150,19 @@ def _targets(rng: np.random.Generator, package: Package, ready: Vector) -> Targe
     return Targets(mount, Target((a, b, c)), DOWN, targets.heading, 0, 0.0)
 
 
-def _heard(heard: queue.Queue, serial: int) -> Previewed | None:
+def _answers(process: PreviewProcess) -> Iterator[tuple[float, Answer | None]]:
+    """Each with the time at which it came, s."""
+    until = time.monotonic() + COMES
+    while (now := time.monotonic()) < until:
+        yield from ((now, answer) for answer in process.poll())
+        time.sleep(POLLED)
+    raise InputError(f"the process that plans: no answer within {COMES:g} s")
+
+
+def _heard(process: PreviewProcess, serial: int) -> Previewed | None:
     """The answers to order `serial`, those to the one before left out; None where it is refused."""
     plan, step, began, pieces = None, 0.0, 0.0, []
-    while True:
-        at, answer = heard.get(timeout=COMES)
+    for at, answer in _answers(process):
         if answer is None:
             raise InputError("the process that plans: it has ended")
         if (answer.report.serial if isinstance(answer, PlanAnswer) else answer.serial) != serial:

@@ -30,10 +30,10 @@ from qualification.guests import ADDRESS
 from trunkline.ar.drivers.settings import ExecutionConfig as Execution
 from trunkline.ar.drivers.simulated_motors import SIMULATED
 from trunkline.ar.session import lease
-from trunkline.ar.session.alignment import mark_at
 from trunkline.ar.session.composition import SessionParts
 from trunkline.ar.session.controller import Robot
 from trunkline.ar.session.hardware import hardware_of
+from trunkline.ar.session.registration import mark_at
 from trunkline.ar.session.server import Server
 from trunkline.ar.session.session import opened
 from trunkline.ar.session.settings import AlignmentSettings, SessionConfig

@@ -15,6 +15,7 @@ import resource
 import sys
 import time
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -24,10 +25,20 @@ from qualification.command import qualify
 from qualification.guests import ADDRESS, HZ, RIGID, SEEN, TIP, Guest, Hands, hands_at, knock, until
 from trunkline.ar.preview.package import Package, read_package
 from trunkline.ar.preview.world_model import make_world
-from trunkline.ar.session import messages, preview_process
+from trunkline.ar.session import messages
 from trunkline.ar.session.auth import make_token
 from trunkline.ar.session.composition import SEARCH
 from trunkline.ar.session.controller import SessionController
+from trunkline.ar.session.previewer import (
+    Answer,
+    FollowRequest,
+    InlinePreviewer,
+    Order,
+    PlanAnswer,
+    PredictionAnswer,
+    PreviewBegun,
+    PreviewPiece,
+)
 from trunkline.ar.session.robot import RobotState
 from trunkline.ar.session.server import Composition, Server
 from trunkline.ar.session.session import listening
@@ -76,11 +87,9 @@ class Planning:
 
     def __init__(self, robot: Robot) -> None:
         self.robot, self.limits, self.made = robot.robot, robot.limits, 0
-        self.server: Server | None = None
 
-    def order(self, order: preview_process.Order | preview_process.FollowRequest) -> None:
-        assert isinstance(order, preview_process.Order)
-        assert self.server is not None
+    def answers(self, order: Order | FollowRequest) -> Iterator[Answer]:
+        assert isinstance(order, Order)
         request, robot = order.request, self.robot
         self.made += 1
         here = np.append(robot.joints, robot.commands)
@@ -89,19 +98,11 @@ class Planning:
         plan = Plan(0.01, rows[:, :JOINTS], rows[:, JOINTS:], (("approach", 0),), request.package, request.world)
         digest, poses = plan.digest(), np.zeros((15, BODIES, 7), dtype=np.float32)
         told = messages.PredictionMessage(digest, None, None, None, (0.0,), ((0.0, 0.0, 0.0),), (0.0,), 0.9, 12)
-        for answer in (
-            preview_process.PlanAnswer(PlanReport(request.serial, digest, "", plan.package, plan.world), plan),
-            preview_process.PreviewBegun(
-                request.serial, messages.PreviewMessage(digest, 0.02, 0.3, 0.02, (("approach", 0.0),))
-            ),
-            preview_process.PreviewPiece(request.serial, 0, 0.02, poses, False),
-            preview_process.PreviewPiece(request.serial, 15, 0.32, poses, True),
-            preview_process.PredictionAnswer(request.serial, told),
-        ):
-            self.server.foreseen(answer)
-
-    def leave(self) -> None:
-        pass
+        yield PlanAnswer(PlanReport(request.serial, digest, "", plan.package, plan.world), plan)
+        yield PreviewBegun(request.serial, messages.PreviewMessage(digest, 0.02, 0.3, 0.02, (("approach", 0.0),)))
+        yield PreviewPiece(request.serial, 0, 0.02, poses, False)
+        yield PreviewPiece(request.serial, 15, 0.32, poses, True)
+        yield PredictionAnswer(request.serial, told)
 
 
 class Stepped(Server):
@@ -126,7 +127,8 @@ async def session(package: Package, hours: float) -> None:
     robot, clock, said = Robot(package, teleop), [0.0], Counter()
     planning = Planning(robot)
     core = Teleoperation(teleop.core, package.reach, package.digest, teleop.mount_offset)
-    controller, token = SessionController(core, robot, planning, make_world(()), teleop.handling.lift), make_token()
+    previewer, token = InlinePreviewer(planning.answers), make_token()
+    controller = SessionController(core, robot, previewer, make_world(()), teleop.handling.lift)
 
     def log(line: str) -> None:
         said["silent"] += line.endswith("was silent")
@@ -134,7 +136,7 @@ async def session(package: Package, hours: float) -> None:
 
     scene = {"bodies": [f"b{n}" for n in range(BODIES)]}
     house = Composition(controller, token, ADDRESS.origins, package.digest, scene, None, HZ, Path("nowhere"), log)
-    server = planning.server = Stepped(house, lambda: clock[0])
+    server = Stepped(house, lambda: clock[0])
     began = time.monotonic()
     async with listening(server, ADDRESS), ClientSession() as sockets:
 

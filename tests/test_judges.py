@@ -44,8 +44,8 @@ JUDGES = {  # by function, the test that has its table, and its file below tests
         "rehearsal/test_held.py",
         "test_the_first_grasps_hold_what_is_lifted_does_not_slip_and_does_not_hang",
     ),
-    "trunkline.ar.hybrid.preview:Holding.holds": ("ar/hybrid/test_preview.py", "test_what_counts_as_held"),
-    "trunkline.ar.hybrid.released:RestCriterion.holds": ("ar/hybrid/test_released.py", "test_what_rests"),
+    "trunkline.ar.hybrid.outcomes:Holding.holds": ("ar/hybrid/test_rollout_batch.py", "test_what_counts_as_held"),
+    "trunkline.ar.hybrid.outcomes:RestCriterion.holds": ("ar/hybrid/test_outcomes.py", "test_what_rests"),
     "trunkline.identification.fit.identify:_at_bound": (
         "identification/test_bounds.py",
         "test_a_parameter_is_at_a_bound_within_a_share_of_its_own_range",

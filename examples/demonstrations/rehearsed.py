@@ -3,25 +3,20 @@
     python -m examples.demonstrations.rehearsed artifacts/package_unity/*.tgz --experiment reach --runs 5
     trunkline export-dataset rehearsed/*.mcap --out dataset
 
-A run is the rehearsal's own of that seed, to the last bit: it is only listened to.
+A run is the rehearsal's own of that seed, to the last bit: its session controller logs as that of a live session does.
 """
 
 import argparse
 import sys
-from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import cast
 
-import numpy as np
-
-from rehearsal.experiments.bench import Bench, bench_of, perform
+from rehearsal.experiments.bench import bench_of, perform
 from rehearsal.experiments.registry import EXPERIMENTS
 from rehearsal.session import RATE, Session
 from trunkline.ar.session.log_format import LogFormat, Record, Subject
 from trunkline.ar.session.log_writer import LogWriter
-from trunkline.ar.session.robot import RobotState
-from trunkline.ar.teleop.core import Teleoperation
 from trunkline.errors import InputError, in_one_line
+from trunkline.version import __version__
 
 ZERO = 1_700_000_000 * 10**9  # ns since 1970 at which every run begins
 JOINTS = tuple(f"joint_{number}" for number in range(1, 8))
@@ -45,74 +40,10 @@ class Kept(LogWriter):
         self.file.close()
 
 
-@dataclass(frozen=True)
-class Logged(Bench):
-    """A bench whose sessions are heard by a journal."""
-
-    journal: LogWriter = LogWriter()
-
-    def session(self, *args, **kwargs) -> Session:
-        session, journal = super().session(*args, **kwargs), self.journal
-        assert isinstance(journal, Kept)
-        journal.session = session
-        journal.event("begin", package=session.package.digest, rate=RATE, tip={"body": "tip", "place": [0.0, 0.0, 0.0]})
-        listen(session, journal)
-        return session
-
-
-class RecordedCore:
-    """A core whose steps are told to a journal."""
-
-    def __init__(self, core: Teleoperation, journal: LogWriter) -> None:
-        self.core, self.journal = core, journal
-
-    def step(self, state, inputs, dt):
-        state, intent = self.core.step(state, inputs, dt)
-        self.journal.step(dt, inputs, intent)
-        return state, intent
-
-    def __getattr__(self, name: str):
-        return getattr(self.core, name)
-
-
-def listen(session: Session, journal: LogWriter) -> None:
-    """Tell the journal all that passes in a session, and change nothing of it."""
-    frame, readings, start = session.frame, session.robot.readings, session.executor.start
-    last: dict = {}
-
-    def saw():
-        last["seen"] = readings()
-        return last["seen"]
-
-    def started(plan, digest):
-        refused = start(plan, digest)
-        journal.event("execute", digest=digest, refused=refused)
-        return refused
-
-    def changed(name: str, value: object) -> bool:
-        before, last[name] = last.get(name), value
-        return value is not None and value != before
-
-    def framed():
-        view, now = frame(), last["seen"]
-        straight, sent = session.package.straight, session.executor
-        tip = np.concatenate([now.tip, now.tip_quaternion])
-        journal.robot_state(
-            RobotState(session.now, 0.0, sent.joints, sent.commands, tip, tip[None], now.joints, straight - now.wound)
-        )
-        if changed("world", session.world):
-            journal.event("world", world=session.world)
-        if changed("report", session.report):
-            journal.event("planned", report=session.report)
-            if session.foreseen is not None and session.report is not None:
-                event = {"digest": session.report.digest, "probability": session.foreseen.probability, "spread": []}
-                journal.event("foreseen", foreseen=event)
-        if changed("robot", sent.state()):
-            journal.event("robot", robot=sent.state())
-        return view
-
-    session.frame, session.robot.readings, session.executor.start = framed, saw, started
-    session.core = cast(Teleoperation, RecordedCore(session.core, journal))
+def record(session: Session, journal: Kept) -> None:
+    """Let a session that has not begun be logged as a live one is."""
+    journal.session, session.controller.log_writer = session, journal
+    session.controller.begin(RATE, __version__)
 
 
 @in_one_line
@@ -132,8 +63,9 @@ def main(arguments: list[str] | None = None) -> int:
             raise InputError(f"{path}: found a log there, expected a folder without one of that name")
         tendons = tuple(f"tendon_{number + 1}" for number in range(len(bench.package.straight)))
         journal = Kept(path, Subject(("tip",), JOINTS, tendons, bench.package.straight, ("tip", (0.0, 0.0, 0.0))))
-        logged = Logged(**{field.name: getattr(bench, field.name) for field in fields(bench)}, journal=journal)
-        result, _ = perform(EXPERIMENTS[options.experiment](logged, seed))
+        staged = EXPERIMENTS[options.experiment](bench, seed)
+        record(staged.session, journal)
+        result, _ = perform(staged)
         journal.close()
         print(f"{path}: {result.seconds:.1f} s, {'success' if result.success else result.cause}", flush=True)
     return 0

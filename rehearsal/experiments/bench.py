@@ -67,17 +67,12 @@ class Bench:
         return Operator(self.person, (left, right), offset, radius, band, rng, self.judged)
 
     @property
-    def foresight(self) -> GraspPreviewer | None:
-        """What plans are previewed with; None where nobody looks at a preview."""
-        if not self.judged:
-            return None
+    def foresight(self) -> GraspPreviewer:
+        """What plans are previewed with."""
         assert self.world_model is not None
         return GraspPreviewer(self.world_model, self.package.grips(self.config), self.previewing)
 
-    def session(
-        self, operator: Operator, thing: np.ndarray | None, seed: int, place: Place,
-        foresight: GraspPreviewer | None = None,
-    ) -> Session:  # fmt: skip
+    def session(self, operator: Operator, thing: np.ndarray | None, seed: int, place: Place) -> Session:
         """The stand-in at its ready pose; a sphere hangs at `thing` (3,), m, or there is none."""
         s = self.settings
         x, y, z = s.mount_ready
@@ -89,7 +84,7 @@ class Bench:
         robot = StandInRobot(self.arm, Scene(FLOOR, hung, {}, hook), self.stand_in, ready, seed)
         world = World("floor", (FLOOR_BOX,))
         hands = operator.left, operator.right
-        return Session(self.package, self.config, robot, hands, world, place, foresight)
+        return Session(self.package, self.config, robot, hands, world, place, self.foresight, self.judged)
 
 
 def bench_of(file: Path) -> Bench:
@@ -173,7 +168,7 @@ def rehearse(session: Session, script: Script) -> tuple[object, list[SessionFram
         view = session.frame()
         views.append(view)
         if session.moved:
-            truth, sent = session.robot.truth(), session.executor
+            truth, sent = session.robot.truth(), session.executor.axes
             thing, (units, _) = session.place(session.now), session.robot.links()
             frames.append(SessionFrame(session.now, view.intent.mode, truth, thing, sent.joints, sent.commands, units))
         try:

@@ -103,7 +103,7 @@ def session_of(
     )  # fmt: skip
     return Session(
         bench.package, bench.config, robot, (operator.left, operator.right), make_world(boxes, (object_seen,)),
-        lambda now: robot.truth().grip, bench.foresight,
+        lambda now: robot.truth().grip, bench.foresight, bench.judged,
     )  # fmt: skip
 
 
@@ -140,9 +140,9 @@ def tell(result: Result, ending: Ending, session: Session, succeeded: bool) -> N
     """What the preview had said, and how far off it was."""
     result.plans, result.probability = ending.plans, ending.probability
     result.agreed = agreed(ending.probability, succeeded)
-    if np.isfinite(ending.probability) and session.foreseen is not None:
-        nominal = session.foreseen.preview.nominal
-        apart = tip_difference(session.tips, session.foreseen.begins + nominal.time, nominal.tip[0])
+    if np.isfinite(ending.probability) and session.prediction is not None:
+        nominal = session.prediction.preview.nominal
+        apart = tip_difference(session.tips, session.prediction.begins + nominal.time, nominal.tip[0])
         result.path_pct = 100 * apart / session.package.geometry.length
 
 

@@ -10,13 +10,13 @@ from rehearsal.experiments.bench import Bench, SessionFrame, Staged, executed
 from rehearsal.experiments.result import LATER, Result
 from rehearsal.operator.scripts import Ending
 from rehearsal.session import Session
-from trunkline.ar.hybrid.preview import Stated
+from trunkline.ar.session.messages import PredictionMessage
 
 
 def reach(bench: Bench, seed: int) -> Staged:
     rng = np.random.default_rng([seed, 0])
     thing, operator = bench.place(rng), bench.operator(rng)
-    session = bench.session(operator, thing, seed, lambda now: thing, bench.foresight)
+    session = bench.session(operator, thing, seed, lambda now: thing)
     least, radius = bench.arm.chain.units - bench.settings.tip_units, bench.settings.diameter / 2
 
     def judge(result: Result, ending: Ending, frames: list[SessionFrame], _) -> str:
@@ -27,9 +27,9 @@ def reach(bench: Bench, seed: int) -> Staged:
         return failure(ending, frames, least, radius)
 
     def watch(result: Result, ending: Ending, frames: list[SessionFrame]) -> None:
-        foreseen = session.foresee() if ending.done else None
+        foreseen = session.predict() if ending.done and bench.judged else None
         if foreseen is not None:
-            tell_end(result, foreseen.preview.stated, tips_after(session, frames))
+            tell_end(result, foreseen, tips_after(session, frames))
 
     return Staged("reach", seed, session, operator.reach(), judge, watch=watch)
 
@@ -76,11 +76,11 @@ def _touches(frame: SessionFrame) -> bool:
     return bool(frame.truth.arm_thing.any() or frame.truth.arm_world.any())
 
 
-def tell_end(result: Result, stated: Stated, tips: dict[str, np.ndarray]) -> None:
+def tell_end(result: Result, foreseen: PredictionMessage, tips: dict[str, np.ndarray]) -> None:
     """How far the robot's tip was from where the preview had it end, at the end and later; tips (3,), m, by LATER."""
-    result.radius_mm = 1e3 * float(stated.radii[-1])
+    result.radius_mm = 1e3 * foreseen.spread[-1]
     for name, tip in tips.items():
-        setattr(result, f"{name}_mm", 1e3 * float(np.linalg.norm(tip - stated.tips[-1])))
+        setattr(result, f"{name}_mm", 1e3 * float(np.linalg.norm(tip - foreseen.tip[-1])))
 
 
 def tips_after(session: Session, frames: list[SessionFrame]) -> dict[str, np.ndarray]:

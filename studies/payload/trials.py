@@ -17,6 +17,7 @@ from pydantic import Field
 from scipy.spatial.transform import Rotation
 
 from trunkline.ar.hybrid.objects import GRIP, object_geoms
+from trunkline.ar.hybrid.outcomes import stays
 from trunkline.ar.hybrid.worlds import HOOK_LENGTH
 from trunkline.frames import STANDARD_GRAVITY, rotation_from_wxyz, wxyz_from_rotation
 from trunkline.model.arm_model import ArmModel
@@ -121,7 +122,7 @@ class Tried:
         """Whether the object ended within `sag` m of where it was let go, and no further than `slip` m more from the
         arm's nearest unit. The arm itself may swing. Shape (B,)."""
         with np.errstate(invalid="ignore"):
-            return (self.dropped < sag) & (self.distance[:, -1] < self.distance[:, self.let_go] + slip)
+            return stays(self.dropped, self.distance[:, self.let_go], self.distance[:, -1], sag, slip)
 
 
 def try_grasps(

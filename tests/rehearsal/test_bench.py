@@ -11,7 +11,7 @@ from rehearsal.experiments import grasp as grasps
 from rehearsal.experiments import handle as handles
 from rehearsal.experiments import reach as reaches
 from rehearsal.experiments.bench import Staged, perform
-from rehearsal.experiments.follow import follow, on_path
+from rehearsal.experiments.follow import on_path
 from rehearsal.experiments.grasp import grasp
 from rehearsal.experiments.handle import handle
 from rehearsal.experiments.reach import reach
@@ -61,10 +61,10 @@ class Nothing:
         return lambda *args: iter(())
 
 
-def bench(session=None) -> SimpleNamespace:
+def bench(session=None, judged=True) -> SimpleNamespace:
     return SimpleNamespace(
         place=lambda rng: THING, operator=lambda rng: Nothing(), session=lambda *args: session, settings=FREE,
-        arm=SimpleNamespace(chain=SimpleNamespace(units=UNITS)), foresight="foresight",
+        arm=SimpleNamespace(chain=SimpleNamespace(units=UNITS)), judged=judged,
         config=SimpleNamespace(core=SimpleNamespace(follow_delay=0.4)),
     )  # fmt: skip
 
@@ -91,24 +91,15 @@ def test_an_aim_beside_the_object_is_one_beyond_its_radius(aimed, kind):
 
 
 @pytest.mark.parametrize(
-    ("done", "foreseen", "radius"), [(True, True, 4.0), (False, True, np.nan), (True, False, np.nan)]
+    ("done", "judged", "radius"), [(True, True, 4.0), (False, True, np.nan), (True, False, np.nan)]
 )
-def test_what_was_stated_of_a_reach_is_told_where_it_was_done(monkeypatch, done, foreseen, radius):
-    stated = SimpleNamespace(radii=np.array([0.004]), tips=np.zeros((1, 3)))
-    preview = SimpleNamespace(preview=SimpleNamespace(stated=stated)) if foreseen else None
+def test_what_was_stated_of_a_reach_is_told_where_it_was_done(monkeypatch, done, judged, radius):
+    """And where anybody looks at previews."""
+    stated = SimpleNamespace(spread=(0.004,), tip=((0.0, 0.0, 0.0),))
     monkeypatch.setattr(reaches, "tips_after", lambda session, frames: {"after_2s": np.array([0.0, 0.003, 0.0])})
-    result, stage_run = Result("reach", 0, True), reach(bench(SimpleNamespace(foresee=lambda: preview)), 0)  # type: ignore[arg-type]
+    result, stage_run = Result("reach", 0, True), reach(bench(SimpleNamespace(predict=lambda: stated), judged), 0)  # type: ignore[arg-type]
     stage_run.watch(result, Ending(done), [])  # type: ignore[misc]
     np.testing.assert_equal((result.radius_mm, result.after_2s_mm), (radius, radius - 1))
-
-
-def test_a_reach_has_the_foresight_of_its_bench_and_following_has_none():
-    sessions = []
-    stage = bench()
-    stage.session = lambda *all: sessions.append(all)
-    reach(stage, 0), follow(stage, 0)  # type: ignore[arg-type]
-    assert [len(all) for all in sessions] == [5, 4]
-    assert sessions[0][4] == "foresight"
 
 
 @pytest.mark.parametrize(("seconds", "success"), [(FREE.interruption, True), (FREE.interruption + 0.25, False)])
@@ -127,7 +118,7 @@ def test_following_may_be_interrupted_for_as_long_as_the_settings_say(seconds, s
 @pytest.fixture
 def stood(monkeypatch):
     """Grasps and hand-overs without a robot."""
-    session = SimpleNamespace(foreseen=None, robot=SimpleNamespace(scene=SCENE))
+    session = SimpleNamespace(prediction=None, robot=SimpleNamespace(scene=SCENE))
     offered = SimpleNamespace(name="standing basket", thing=SimpleNamespace(position=[0.5, 0.0, 0.2]))
     for module in (grasps, handles):
         monkeypatch.setattr(module, "offered", lambda *args: offered)

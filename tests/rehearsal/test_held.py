@@ -243,7 +243,7 @@ def session(begins: float = 10.0):
     preview = SimpleNamespace(nominal=nominal)
     package = SimpleNamespace(geometry=SimpleNamespace(length=0.4))
     foreseen = SimpleNamespace(preview=preview, begins=begins)
-    return SimpleNamespace(foreseen=foreseen, package=package, tips=[at(begins + 1.5, 0.5, 0.0, 0.02)])
+    return SimpleNamespace(prediction=foreseen, package=package, tips=[at(begins + 1.5, 0.5, 0.0, 0.02)])
 
 
 @pytest.mark.parametrize(("probability", "foreseen", "expected"), [
@@ -254,6 +254,6 @@ def session(begins: float = 10.0):
 ])  # fmt: skip
 def test_what_was_stated_of_a_grasp_is_told_with_how_far_off_its_path_was(probability, foreseen, expected):
     result, ran = Result("grasp", 0, True), session()
-    ran.foreseen = ran.foreseen if foreseen else None
+    ran.prediction = ran.prediction if foreseen else None
     tell(result, Ending(True, plans=3, probability=probability), ran, True)  # type: ignore[arg-type]
     np.testing.assert_allclose((result.plans, result.probability, result.agreed, result.path_pct), expected)

@@ -11,7 +11,7 @@ from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending
 from rehearsal.session import Session
 from tests.rehearsal.frames import FORCE, TIP, UNITS, frame
-from trunkline.ar.hybrid.preview import Stated
+from trunkline.ar.session.messages import PredictionMessage
 
 RADIUS = 0.03
 NAN = (np.nan, 0.0, 0.0)
@@ -80,11 +80,13 @@ def test_the_first_contact_decides_who_has_reached(ending, frames, cause):
 
 def test_how_far_the_tip_ends_from_where_it_was_said_to_is_told_in_mm():
     """By the last of what was stated."""
-    stated = Stated(np.array([0.0, 0.1]), np.array([[9.0, 9.0, 9.0], [0.1, 0.2, 0.3]]), np.array([0.5, 0.004]))
+    stated = PredictionMessage(
+        "", None, None, None, (0.0, 0.1), ((9.0, 9.0, 9.0), (0.1, 0.2, 0.3)), (0.5, 0.004), 0.9, 12
+    )
     tips = {
         "at_end": np.array([0.1, 0.2, 0.303]),
         "after_2s": np.array([0.1, 0.204, 0.303]),
-        "after_10s": stated.tips[1],
+        "after_10s": np.array(stated.tip[1]),
     }
     result = Result("reach", 0, True)
     tell_end(result, stated, tips)

@@ -14,11 +14,20 @@ from rehearsal.operator.scripts import Operator
 from rehearsal.session import REFERENCE, Session
 from tests.ar.teleop.test_plan import BENT, LIMITS, NETWORK, OFFSET, START, STRAIGHT
 from tests.support.operator import PACKAGE, Everywhere, config
+from trunkline.ar.hybrid.rollout_batch import Stated
+from trunkline.ar.preview.grasp_preview import GraspPreviewer
 from trunkline.ar.teleop.messages import World
 from trunkline.ar.teleop.planner import Planner
 from trunkline.ar.teleop.rigid_ik import RigidIK
 
 THING = np.array([0.6, 0.1, 0.1])
+PREDICTION = SimpleNamespace(
+    preview=SimpleNamespace(
+        stated=Stated(np.zeros(1), np.zeros((1, 3)), np.zeros(1)), interval=None, probability=None, samples=()
+    ),
+    begins=0.0,
+    offer=None,
+)
 
 
 class Arc:
@@ -40,12 +49,15 @@ class Sent:
     """A robot that is where it is sent."""
 
     def __init__(self):
-        self.joints, self.sent = np.array([START]), []
+        self.joints, self.sent, self.time = np.array([START]), [], 0.0
         self.instruments = SimpleNamespace(turn=Rotation.identity(), shift=np.zeros(3))
 
     def readings(self):
         none = np.full(4, np.nan)
-        return SimpleNamespace(joints=self.joints[0], tip=np.zeros(3), thing=none[:3], thing_quaternion=none)
+        return SimpleNamespace(
+            joints=self.joints[0], wound=np.zeros(3), tip=np.zeros(3), tip_quaternion=none, thing=none[:3],
+            thing_quaternion=none,
+        )  # fmt: skip
 
     def links(self):
         return np.zeros((1, 3)), np.zeros((1, 3))
@@ -66,7 +78,8 @@ def session(off: list[float]) -> tuple[Session, Operator]:
     person = replace(settings.person(), patience=3)
     left, right = (RayHand(origin, REFERENCE, person, 0.15, rng) for origin in ORIGINS)
     operator = Operator(person, (left, right), BENT, 0.03, 0.03, rng)
-    made = Session(Arc(off), config(), Sent(), (left, right), World("world"), lambda now: THING)  # type: ignore[arg-type]
+    previewer = GraspPreviewer(None, {}, settings.previewing())  # type: ignore[arg-type]
+    made = Session(Arc(off), config(), Sent(), (left, right), World("world"), lambda now: THING, previewer)  # type: ignore[arg-type]
     return made, operator
 
 
@@ -82,7 +95,7 @@ def test_the_robot_moves_only_after_a_preview_on_the_object_was_confirmed(off):
     assert sum(a != b == "preview" for a, b in zip(modes, modes[1:], strict=False)) == plans
     first = next(view.now for view in views if view.intent.motion != "hold")
     assert first == next(view.now for view in views if view.intent.mode == "execute")
-    np.testing.assert_allclose(made.robot.joints[0], made.plan.joints[-1], atol=1e-9)
+    np.testing.assert_allclose(made.robot.joints[0], made.controller.plan.joints[-1], atol=1e-9)
     assert np.linalg.norm(np.array(views[-1].intent.targets.tip.position) + [0.0, 0.0, beside] - THING) < 0.05
 
 
@@ -105,7 +118,7 @@ def test_following_moves_the_robot_until_the_path_is_over():
     assert ending.done
     assert views[-1].intent.mode == "follow"
     assert len(made.robot.sent) > 0
-    assert made.fault == ""
+    assert made.controller.fault == ""
     # a hand that trembles at the edge of this arm's reach is refused now and then, and the robot holds meanwhile
     assert {why.partition(":")[0] for _, why in made.refusals} <= {"out of reach"}
     assert len(made.refusals) < 0.1 * len(views)
@@ -123,16 +136,15 @@ def test_an_operator_who_does_not_judge_confirms_the_first_plan():
 
 @pytest.fixture(scope="module")
 def ran() -> tuple[Session, list, list]:
-    """A reach whose client takes another frame for the base, with a foresight that counts what it is asked."""
+    """A reach whose client takes another frame for the base, with previews that count what is rolled out."""
     made, operator = session([])
     made.robot.instruments = SimpleNamespace(
         turn=Rotation.from_rotvec([0.0, 0.05, 0.1]), shift=np.array([0.01, -0.02, 0.03])
     )
     made.robot.truth = lambda: SimpleNamespace(tip=np.array([0.5, 0.2, 0.4]))
-    asked, foreseen = [], SimpleNamespace(reach=lambda *arguments: asked.append(arguments) or "foreseen")
-    assert made.foresee() is None, "there is no foresight yet"
-    made.foresight = foreseen  # type: ignore[assignment]
-    assert made.foresee() is None, "there is no plan yet"
+    asked = []
+    made.planner._foreseen = lambda order, plan, *_: asked.append((plan, order)) or iter([PREDICTION])
+    assert made.predict() is None, "there is no plan yet"
     ending, _, views = rehearse(made, operator.reach())
     assert ending.done
     return made, views, asked
@@ -150,12 +162,14 @@ def test_tip_and_object_are_seen_with_the_whole_error_of_the_alignment(ran):
 
 
 def test_the_plan_that_was_run_is_foreseen_when_it_is_asked_for(ran):
-    """By the foresight of a page, in the client's world, with the plan's number as the seed."""
+    """By the planner of a page, in the client's world."""
     made, _, asked = ran
     assert asked == [], "nothing that the operator does waits for it"
-    assert made.foresee() == "foreseen"
-    ((plan, world, seed),) = asked
-    assert plan is made.plan
-    assert world is made.world
-    assert seed == made.report.serial
+    assert made.predict().digest == made.controller.plan.digest()
+    ((plan, order),) = asked
+    assert plan is made.controller.plan
+    assert order.world is made.controller.world
+    assert made.prediction is PREDICTION
     np.testing.assert_allclose(made.robot.joints[0], plan.joints[-1], atol=1e-9)
+    assert made.predict().digest == plan.digest()
+    assert len(asked) == 1, "once"

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from rehearsal import settings
 from tests.ar.hybrid.conftest import hybrid_settings, rubbing_arm
-from trunkline.ar.hybrid.preview import joined
+from trunkline.ar.hybrid.rollout_batch import joined
 from trunkline.ar.hybrid.rollouts import CommandTrajectory, rollouts
 from trunkline.ar.hybrid.uncertainty import GraspUncertainty, nominal_sample
 from trunkline.ar.preview.preview_twin import RobotModel, compose_twin

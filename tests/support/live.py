@@ -17,9 +17,18 @@ from tests.ar.teleop.test_plan import LIMITS, NETWORK, OFFSET, START, STRAIGHT
 from tests.support.operator import PACKAGE, Everywhere, config
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import binary as wire
-from trunkline.ar.session import messages, preview_process
+from trunkline.ar.session import messages
 from trunkline.ar.session.auth import Origins
 from trunkline.ar.session.controller import SessionController
+from trunkline.ar.session.previewer import (
+    FollowAnswer,
+    FollowRequest,
+    InlinePreviewer,
+    PlanAnswer,
+    PredictionAnswer,
+    PreviewBegun,
+    PreviewPiece,
+)
 from trunkline.ar.session.robot import RobotState
 from trunkline.ar.session.server import Composition, Server
 from trunkline.ar.session.settings import SessionConfig
@@ -71,42 +80,33 @@ class PlainRobot:
         return RobotState(now, 0.0, self.robot.joints, self.robot.commands, np.full(7, np.nan), bodies)
 
 
-class PlainPlanning:
+class PlainPlanning(InlinePreviewer):
     """Plans at once, and previews with two pieces."""
 
     def __init__(self):
+        super().__init__(self.answers)
         self.planner = Planner(RigidIK(OFFSET), NETWORK, STRAIGHT, LIMITS, OFFSET, step=0.005)
-        self.heard, self.left, self.plans = None, 0, []
+        self.plans = []
 
-    def order(self, order):
-        if isinstance(order, preview_process.FollowRequest):
-            self.heard(
-                preview_process.FollowAnswer(
-                    order.serial, *sought(self.planner, order.targets, order.joints, order.world)
-                )
-            )
+    def answers(self, order):
+        if isinstance(order, FollowRequest):
+            yield FollowAnswer(order.serial, *sought(self.planner, order.targets, order.joints, order.world))
             return
         serial = order.request.serial
         try:
             plan = self.planner.plan(order.request, order.world, order.joints, order.commands)
         except InputError as error:
-            self.heard(preview_process.PlanAnswer(PlanReport(serial, refused=str(error))))
+            yield PlanAnswer(PlanReport(serial, refused=str(error)))
             return
         digest = plan.digest()
         self.plans.append(plan)
         poses = np.zeros((15, BODIES, 7), dtype=np.float32)
-        preview = messages.PreviewMessage(digest, 0.02, PREVIEW, 0.02, (("approach", 0.0),))
+        yield PlanAnswer(PlanReport(serial, digest, "", plan.package, plan.world), plan)
+        yield PreviewBegun(serial, messages.PreviewMessage(digest, 0.02, PREVIEW, 0.02, (("approach", 0.0),)))
+        yield PreviewPiece(serial, 0, 0.02, poses, False)
+        yield PreviewPiece(serial, 15, 0.32, poses, True)
         prediction = messages.PredictionMessage(digest, None, None, None, (0.0,), ((0.0, 0.0, 0.0),), (0.0,), 0.9, 12)
-        for answer in (
-            preview_process.PlanAnswer(PlanReport(serial, digest, "", plan.package, plan.world), plan),
-            preview_process.PreviewBegun(serial, preview), preview_process.PreviewPiece(serial, 0, 0.02, poses, False),
-            preview_process.PreviewPiece(serial, 15, 0.32, poses, True),
-            preview_process.PredictionAnswer(serial, prediction),
-        ):  # fmt: skip
-            self.heard(answer)
-
-    def leave(self):
-        self.left += 1
+        yield PredictionAnswer(serial, prediction)
 
 
 def patient(**seconds):
@@ -129,7 +129,6 @@ class Laid:
             self.controller, TOKEN, origins, PACKAGE, scene, None, rate, page, self.log.append,
             live().alignment, anchors,
         ))  # fmt: skip
-        self.planning.heard = self.server.foreseen
         self.url, self.origin = f"http://127.0.0.1:{port}", f"http://127.0.0.1:{port}"
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from trunkline.ar.session.alignment import in_base, inverse, pose_of
+from trunkline.ar.session.registration import in_base, inverse, pose_of
 
 UP = Rotation.from_euler("x", 90, degrees=True)  # of a reference frame whose y is up
 TRUE = pose_of(np.array([0.4, -0.2, -0.9]), Rotation.from_euler("z", 35, degrees=True) * UP)  # reference in the base

@@ -21,7 +21,7 @@ from trunkline.ar.conformance.vectors import with_shared_vectors
 from trunkline.ar.hybrid.basket import Basket
 from trunkline.ar.preview.contents import network_of
 from trunkline.ar.preview.package import read_package
-from trunkline.ar.session.alignment import after, expected_error, fit, inverse, pose_of, residuals, tilt
+from trunkline.ar.session.registration import after, expected_error, fit, inverse, pose_of, residuals, tilt
 from trunkline.ar.teleop.alignment import Aligned, wrist_of
 from trunkline.ar.teleop.messages import Box, Thing, World
 from trunkline.ar.teleop.reach import MapReach

@@ -13,7 +13,8 @@ from tests.support.folders import package
 from tests.unity.test_twin import LABEL, PARAMETERS, ROBOT, sources  # noqa: F401
 from trunkline.ar.hybrid.compose import Placed, compose
 from trunkline.ar.hybrid.objects import GraspObject
-from trunkline.ar.hybrid.preview import Holding, joined, preview
+from trunkline.ar.hybrid.outcomes import Holding
+from trunkline.ar.hybrid.rollout_batch import joined, preview
 from trunkline.ar.hybrid.rollouts import CommandTrajectory, ComposedTwin, rollouts
 from trunkline.ar.hybrid.uncertainty import Contact, nominal_sample, uncertainty_of
 from trunkline.ar.hybrid.worlds import WorldGeometry

@@ -23,7 +23,7 @@ from tests.unity.mono import compiled
 from tests.unity.test_csharp import SHARED, bends, case, moved_a_little, said_by
 from trunkline.ar.conformance.answers import PACKAGE
 from trunkline.ar.conformance.vectors import with_shared_vectors
-from trunkline.ar.session.alignment import inverse
+from trunkline.ar.session.registration import inverse
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.messages import Controller, Input, Pose, to_json
 from trunkline.ar.teleop.reach import MapReach

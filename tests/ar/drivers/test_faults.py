@@ -9,7 +9,7 @@ import pytest
 from tests.support.motors import TICK, homed, motor_settings
 from trunkline.ar.drivers import robot as machines
 from trunkline.ar.drivers import ros_arm
-from trunkline.ar.drivers.driver import CONNECTING, SILENT, Watchdog
+from trunkline.ar.drivers.driver import CONNECTING
 from trunkline.ar.drivers.gm6020 import MOST_AMPERES, Feedback, command_frames, commanded
 from trunkline.ar.drivers.motors import PRESENT, MotorGroup
 from trunkline.ar.drivers.motors import SILENT as UNHEARD
@@ -17,6 +17,7 @@ from trunkline.ar.drivers.robot import LEAD, HardwareRobot
 from trunkline.ar.drivers.ros_arm import RosArm
 from trunkline.ar.drivers.setpoint_filter import ROUNDING
 from trunkline.ar.drivers.settings import ExecutionConfig
+from trunkline.ar.drivers.watchdog import SILENT, Watchdog
 from trunkline.ar.drivers.winch import Winch
 from trunkline.errors import InputError
 from trunkline.kinematics.panda.limits import VELOCITY

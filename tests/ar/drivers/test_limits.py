@@ -6,10 +6,10 @@ import re
 import numpy as np
 import pytest
 
-from trunkline.ar.drivers.driver import SILENT
 from trunkline.ar.drivers.driver_frames import Setpoint
 from trunkline.ar.drivers.setpoint_filter import LIMITS, NEAR, ROUNDING, SetpointFilter
 from trunkline.ar.drivers.time_scaling import TimeScaledRobot
+from trunkline.ar.drivers.watchdog import SILENT
 from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.plan import Plan
 from trunkline.ar.teleop.trajectory import MotionLimits

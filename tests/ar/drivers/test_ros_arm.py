@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from trunkline.ar.drivers import ros_arm
-from trunkline.ar.drivers.driver import SILENT, TICK
+from trunkline.ar.drivers.driver import TICK
 from trunkline.ar.drivers.ros_arm import PERIOD, RosArm
 from trunkline.ar.drivers.setpoint_filter import ROUNDING
 from trunkline.ar.drivers.settings import ExecutionConfig
+from trunkline.ar.drivers.watchdog import SILENT
 from trunkline.kinematics.panda.limits import VELOCITY
 from trunkline.pipeline.config import PROJECT, load_folder
 

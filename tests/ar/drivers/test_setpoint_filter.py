@@ -8,9 +8,9 @@ import socket
 import numpy as np
 import pytest
 
-from trunkline.ar.drivers.driver import SILENT
 from trunkline.ar.drivers.driver_frames import DriverState, FrameSocket, Setpoint
 from trunkline.ar.drivers.setpoint_filter import LIMITS, SetpointFilter
+from trunkline.ar.drivers.watchdog import SILENT
 
 READY = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])
 DT, LEAD, BEGINS, SECONDS = 0.001, 0.03, 0.1, 2.0

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from tests.support.motors import TICK, PlayedMotors, Workbench, homed
-from trunkline.ar.drivers.driver import SILENT
 from trunkline.ar.drivers.motors import HOMING
 from trunkline.ar.drivers.tendon_driver import TendonDriver
+from trunkline.ar.drivers.watchdog import SILENT
 
 LEAD = 0.03  # s
 

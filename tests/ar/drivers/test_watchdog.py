@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from trunkline.ar.drivers.driver import Watchdog
+from trunkline.ar.drivers.watchdog import Watchdog
 
 
 def test_before_the_first_setpoint_none_is_late():

@@ -10,8 +10,9 @@ from tests.ar.hybrid.conftest import hybrid_settings, rubbing_arm
 from trunkline.ar.hybrid.compose import Placed, compose
 from trunkline.ar.hybrid.friction import TPU_ON
 from trunkline.ar.hybrid.objects import GraspObject
-from trunkline.ar.hybrid.preview import Holding, joined, nominal, preview
+from trunkline.ar.hybrid.outcomes import Holding
 from trunkline.ar.hybrid.rates import wilson
+from trunkline.ar.hybrid.rollout_batch import joined, nominal, preview
 from trunkline.ar.hybrid.rollouts import CommandTrajectory, ComposedTwin, eased, rollouts, rows_of
 from trunkline.ar.hybrid.uncertainty import (
     Contact,

@@ -9,7 +9,7 @@ from tests.ar.hybrid.test_rollouts import SIZE, way_of
 from trunkline.ar.hybrid.assistant import best, try_places
 from trunkline.ar.hybrid.compose import Placed, compose
 from trunkline.ar.hybrid.objects import GraspObject
-from trunkline.ar.hybrid.preview import Holding
+from trunkline.ar.hybrid.outcomes import Holding
 from trunkline.ar.hybrid.rollouts import ComposedTwin
 from trunkline.ar.hybrid.string import hang
 from trunkline.ar.hybrid.uncertainty import Contact, GraspUncertainty

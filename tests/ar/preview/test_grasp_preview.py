@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.ar.teleop.test_plan import targets
-from trunkline.ar.hybrid.preview import Holding
+from trunkline.ar.hybrid.outcomes import Holding
 from trunkline.ar.hybrid.uncertainty import GraspUncertainty
 from trunkline.ar.preview import grasp_preview
 from trunkline.ar.preview.grasp_preview import GraspPreviewer

@@ -13,6 +13,7 @@ import asyncio
 import json
 import sys
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -28,12 +29,23 @@ from tests.ar.teleop.test_plan import LIMITS, NETWORK, OFFSET, RADIUS, STRAIGHT,
 from tests.support.operator import PACKAGE, READY_JOINTS, config
 from trunkline.ar.hybrid.compose import compose, panda_joints
 from trunkline.ar.preview.world_model import make_world
-from trunkline.ar.session import lease, messages, preview_process
+from trunkline.ar.session import lease, messages
 from trunkline.ar.session import scene as pictured
 from trunkline.ar.session.anchors import Anchors
 from trunkline.ar.session.auth import Origins, make_token
 from trunkline.ar.session.bodies import drawn_bodies
 from trunkline.ar.session.controller import SessionController
+from trunkline.ar.session.previewer import (
+    Answer,
+    FollowAnswer,
+    FollowRequest,
+    InlinePreviewer,
+    Order,
+    PlanAnswer,
+    PredictionAnswer,
+    PreviewBegun,
+    PreviewPiece,
+)
 from trunkline.ar.session.robot import RobotState
 from trunkline.ar.session.server import Composition, Server
 from trunkline.ar.session.settings import SessionConfig
@@ -153,45 +165,38 @@ class Planning:
     """Plans at once; its previews are the plan itself."""
 
     def __init__(self, figure: Figure) -> None:
-        self.figure, self.heard = figure, None
+        self.figure = figure
         self.planner = Planner(RigidIK(OFFSET), NETWORK, STRAIGHT, LIMITS, OFFSET, step=0.005)
 
-    def order(self, order: preview_process.Order | preview_process.FollowRequest) -> None:
-        if isinstance(order, preview_process.FollowRequest):
+    def answers(self, order: Order | FollowRequest) -> Iterator[Answer]:
+        if isinstance(order, FollowRequest):
             targets = order.targets and within(order.targets)
-            self.heard(
-                preview_process.FollowAnswer(order.serial, *sought(self.planner, targets, order.joints, order.world))
-            )
+            yield FollowAnswer(order.serial, *sought(self.planner, targets, order.joints, order.world))
             return
         serial = order.request.serial
         try:
             request = replace(order.request, targets=within(order.request.targets))
             plan = self.planner.plan(request, order.world, order.joints, order.commands)
         except InputError as error:
-            self.heard(preview_process.PlanAnswer(PlanReport(serial, refused=str(error))))
+            yield PlanAnswer(PlanReport(serial, refused=str(error)))
             return
         digest, step = plan.digest(), 1 / RATE
         times = np.arange(0.0, plan.duration, step)
         poses = np.array([self.figure.poses(*plan.at(time)) for time in times], dtype=np.float32)
         tips, shares = poses[::9, -1, :3].astype(float), np.linspace(0, 1, len(times[::9]))
-        self.heard(preview_process.PlanAnswer(PlanReport(serial, digest, "", plan.package, plan.world), plan))
+        yield PlanAnswer(PlanReport(serial, digest, "", plan.package, plan.world), plan)
         phases = tuple((name, plan.step * row) for name, row in plan.phases)
         preview = messages.PreviewMessage(digest, step, float(times[-1]), 0.0, phases)
-        self.heard(preview_process.PreviewBegun(serial, preview))
+        yield PreviewBegun(serial, preview)
         for first in range(0, len(times), 18):
             piece = poses[first : first + 18]
-            self.heard(
-                preview_process.PreviewPiece(serial, first, float(times[first]), piece, first + 18 >= len(times))
-            )
+            yield PreviewPiece(serial, first, float(times[first]), piece, first + 18 >= len(times))
         spread = tuple(float(share) for share in 0.004 + 0.018 * shares)
         path = tuple(tuple(map(float, tip)) for tip in tips)
         prediction = messages.PredictionMessage(
             digest, 0.84, 0.68, 0.93, tuple(map(float, times[::9])), path, spread, 0.9, 32
         )
-        self.heard(preview_process.PredictionAnswer(serial, prediction))
-
-    def leave(self) -> None:
-        pass
+        yield PredictionAnswer(serial, prediction)
 
 
 def drawing(figure: Figure) -> dict:
@@ -237,14 +242,14 @@ async def serve(port: int, folder: Path) -> None:
     safety = replace(core.safety, silence=PATIENCE, plan_wait=PATIENCE, start_wait=PATIENCE)
     settings = replace(core, delay=0.3, safety=safety)
     core = Teleoperation(settings, Balls(), PACKAGE, OFFSET)
-    controller = SessionController(core, robot, planning, make_world((TABLE,), (CUP,)), 0.1)
+    controller = SessionController(core, robot, InlinePreviewer(planning.answers), make_world((TABLE,), (CUP,)), 0.1)
     page, origins = PROJECT / "trunkline/ar/session/page", Origins.of(["127.0.0.1"], port, tls=False)
     alignment = load_folder(SessionConfig, PROJECT / "conf/live").alignment
     anchors = Anchors(folder / "anchors.json")
     server = Server(Composition(
         controller, token, origins, PACKAGE, drawing(figure), Bowl(), RATE, page, log.append, alignment, anchors
     ))  # fmt: skip
-    planning.heard, tick = server.foreseen, server.tick
+    tick = server.tick
 
     def watched(now: float, dt: float) -> None:
         before = controller.intent.mode if controller.intent else ""

@@ -23,8 +23,8 @@ from PIL import Image
 
 from qualification.browser import Page, browsing
 from trunkline.ar.preview.package import only_package
-from trunkline.ar.session import lease, preview_process, robot
-from trunkline.ar.session.controller import Planning
+from trunkline.ar.session import lease, robot
+from trunkline.ar.session.previewer import Answer, FollowRequest, Order, Previewer
 from trunkline.ar.session.session import Address, opened
 from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
@@ -77,19 +77,22 @@ AWAY = """(() => {
 class Kept:
     """What plans, but orders are kept back until it may go on."""
 
-    def __init__(self, planning: Planning) -> None:
-        self._planning, self._orders = planning, []
+    def __init__(self, previewer: Previewer) -> None:
+        self._previewer, self._orders = previewer, []
 
-    def order(self, order: preview_process.Order | preview_process.FollowRequest) -> None:
+    def submit(self, order: Order | FollowRequest) -> None:
         self._orders.append(order)
 
     def leave(self) -> None:
         self._orders.clear()
-        self._planning.leave()
+        self._previewer.leave()
+
+    def poll(self) -> list[Answer | None]:
+        return self._previewer.poll()
 
     def go_on(self) -> None:
         for order in self._orders:
-            self._planning.order(order)
+            self._previewer.submit(order)
         self._orders.clear()
 
 
@@ -149,7 +152,7 @@ async def aim(camera: Camera) -> None:
     await camera.move(AIMED)
 
 
-async def taken(camera: Camera, planning: Kept) -> None:
+async def taken(camera: Camera, previewer: Kept) -> None:
     """Every state's picture."""
     await arrive(camera)
     await camera.take("hold")
@@ -157,7 +160,7 @@ async def taken(camera: Camera, planning: Kept) -> None:
     await camera.take("aim", f"{SETTLED} && {CALM}")
     await camera.page.key("Enter")
     await camera.take("plan")
-    planning.go_on()
+    previewer.go_on()
     await camera.until("trunkline.playback?.whole && trunkline.drawn.ghost.visible", "the preview")
     await camera.until(f"trunkline.playback.played > {WATCHED} * trunkline.playback.duration", "half of the preview")
     place = await camera.page.place("#scrub", WATCHED - BACK)
@@ -194,10 +197,10 @@ async def session(package: Path) -> dict[Mode, bytes]:
     with tempfile.TemporaryDirectory() as logs:
         config = replace(config, journal=replace(config.journal, folder=logs))
         async with opened(package, ADDRESS, lambda line: None, config=config, teleop=teleop) as (server, made):
-            planning = made.controller.planning = Kept(made.controller.planning)
+            previewer = made.controller.previewer = Kept(made.controller.previewer)
             async with browsing(f"{ADDRESS.url}/#token={server.composition.token}", SIZE, YIELDS) as page:
                 camera = Camera(page)
-                await taken(camera, planning)
+                await taken(camera, previewer)
     return camera.pictures
 
 

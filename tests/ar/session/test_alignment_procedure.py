@@ -13,7 +13,10 @@ from tests.ar.teleop.test_plan import START
 from tests.ar.teleop.test_plan import TIP as TARGET
 from tests.support.live import Hands, controlling, hand, laid, live
 from tests.support.touches import PLACES, TRUE, UP, at_reach, directions, observed
-from trunkline.ar.session.alignment import (
+from trunkline.ar.session.alignment_procedure import UNTRACKED, AlignmentProcedure, ControllerPose
+from trunkline.ar.session.anchors import MOST, Anchor, Anchors
+from trunkline.ar.session.controller import HERE
+from trunkline.ar.session.registration import (
     DWELL,
     POSES,
     Dwell,
@@ -29,9 +32,6 @@ from trunkline.ar.session.alignment import (
     tilt,
     tip_of,
 )
-from trunkline.ar.session.alignment_procedure import UNTRACKED, AlignmentProcedure, ControllerPose
-from trunkline.ar.session.anchors import MOST, Anchor, Anchors
-from trunkline.ar.session.controller import HERE
 from trunkline.ar.teleop.messages import Pose
 from trunkline.errors import InputError
 from trunkline.frames import wxyz_from_rotation

@@ -1,4 +1,4 @@
-"""The desk, on a clock that a test turns: what it lets the robot do, each layer of safety by itself.
+"""The session controller, on a clock that a test turns: what it lets the robot do, each layer of safety by itself.
 
 Behind each of these layers another one acts as well: the core, the server, or the robot's process. None of them is
 asked here, so that what fails here fails by itself.
@@ -13,15 +13,17 @@ from tests.ar.teleop.test_plan import LIMITS, MOUNT, OFFSET, START, STRAIGHT, TI
 from tests.support.live import BODIES, PREVIEW, PlainPlanning, patient
 from tests.support.operator import PACKAGE, Everywhere
 from trunkline.ar.preview.world_model import make_world
-from trunkline.ar.session import messages, preview_process
+from trunkline.ar.session import messages
 from trunkline.ar.session.binary import HAND, Received
 from trunkline.ar.session.controller import MOST_INPUTS, SessionController
+from trunkline.ar.session.controller_input import controllers
 from trunkline.ar.session.follow import SILENT
 from trunkline.ar.session.log_writer import LogWriter
+from trunkline.ar.session.previewer import InlinePreviewer, PlanAnswer, PredictionAnswer, PreviewBegun, PreviewPiece
 from trunkline.ar.session.robot import RobotState
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.executor import FOLLOWS, SimulatedRobot
-from trunkline.ar.teleop.messages import Box, ExecutorReport, Intent, PlanReport, Pose
+from trunkline.ar.teleop.messages import Box, Controller, ExecutorReport, Intent, PlanReport, Pose
 from trunkline.ar.teleop.plan import Plan
 
 DT, IDENTITY = 1 / 72, (1.0, 0.0, 0.0, 0.0)
@@ -63,22 +65,10 @@ class ToldRobot:
         return RobotState(0.0, 0.0, START, STRAIGHT, NOTHING, np.zeros((BODIES, 7)))
 
 
-class Ordered:
-    """What plans is asked for."""
-
-    def __init__(self):
-        self.orders, self.left = [], 0
-
-    def order(self, order):
-        self.orders.append(order)
-
-    def leave(self):
-        self.left += 1
-
-
-def controller_of(robot, planning=None, log_writer=None, world=None) -> SessionController:
+def controller_of(robot, previewer=None, log_writer=None, world=None) -> SessionController:
     core = Teleoperation(patient(), Everywhere(), PACKAGE, OFFSET)
-    return SessionController(core, robot, planning or Ordered(), world or make_world(()), 0.1, log_writer)
+    previewer = previewer or InlinePreviewer(lambda order: iter(()))
+    return SessionController(core, robot, previewer, world or make_world(()), 0.1, log_writer)
 
 
 def some_plan(package=PACKAGE) -> Plan:
@@ -243,12 +233,12 @@ def test_as_it_follows_a_process_that_plans_has_to_answer(silent):
 def test_whoever_takes_over_finds_a_robot_that_was_told_to_stop_and_nothing_of_what_was_heard(alignment):
     robot = ToldRobot("running")
     controller = controller_of(robot)
-    controller.hear(received(1.0))
+    controller.hear(*received(1.0))
     controller.control(alignment, "not sure")
     assert robot.calls == ["stop"]
     assert not controller._heard
     assert (controller.alignment, controller.unfit) == (alignment, "not sure")
-    assert controller.hear(received(0.5)) == ""  # another clock
+    assert controller.hear(*received(0.5)) == ""  # another clock
 
 
 def test_a_stop_is_told_to_the_robot_at_once_and_to_the_core_at_its_next_step_whoever_controls():
@@ -262,29 +252,30 @@ def test_a_stop_is_told_to_the_robot_at_once_and_to_the_core_at_its_next_step_wh
 # --- what is heard
 
 
-def received(stamp, left=None, right=None, flags=TRACKED) -> Received:
+def received(stamp, left=None, right=None, flags=TRACKED) -> tuple[float, Controller, Controller]:
     """Hands over both targets with these buttons."""
 
     def row(place, buttons):
         at = dict(zip("xyz", np.array(place) + UP, strict=True)) | {"qw": 1.0} | (buttons or {})
         return [at.get(name, 0.0) for name in HAND]
 
-    return Received("input", frozenset(flags), 0, stamp, np.array([row(MOUNT, left), row(TIP, right)]))
+    rows = np.array([row(MOUNT, left), row(TIP, right)])
+    return stamp, *controllers(Received("input", frozenset(flags), 0, stamp, rows))
 
 
 @pytest.mark.parametrize(("stamp", "counts"), [(1.0, False), (0.9, False), (1.0 + 1e-9, True)])
 def test_an_input_that_was_heard_before_does_not_count(stamp, counts):
     controller = controller_of(ToldRobot())
-    assert controller.hear(received(1.0)) == ""
-    assert (controller.hear(received(stamp)) == "") == counts
+    assert controller.hear(*received(1.0)) == ""
+    assert (controller.hear(*received(stamp)) == "") == counts
     controller.tick(DT)
-    assert controller.hear(received(max(stamp, 1.0))) != ""  # nor a tick later
+    assert controller.hear(*received(max(stamp, 1.0))) != ""  # nor a tick later
 
 
 def test_of_more_inputs_than_a_tick_takes_the_oldest_are_left_out():
     controller = controller_of(ToldRobot())
     for number in range(MOST_INPUTS + 3):
-        controller.hear(received(1.0 + number))
+        controller.hear(*received(1.0 + number))
     assert [heard.stamp for heard in controller._heard] == [1.0 + number for number in range(3, MOST_INPUTS + 3)]
 
 
@@ -292,12 +283,12 @@ def test_of_more_inputs_than_a_tick_takes_the_oldest_are_left_out():
 
 
 def previewed(**changes) -> SessionController:
-    """A desk at whose preview a client looks since 10 s."""
+    """A controller at whose preview a client looks since 10 s."""
     controller = controller_of(ToldRobot())
     controller.intent = replace(intent("preview"), preview=DIGEST)
     controller.preview, controller._since = messages.PreviewMessage(DIGEST, 0.02, PREVIEW, 0.02, ()), 10.0
     controller.pieces = [
-        preview_process.PreviewPiece(1, 0, 0.0, np.zeros((1, BODIES, 7)), last) for last in (False, True)
+        PreviewPiece(1, 0, 0.0, np.zeros((1, BODIES, 7)), last) for last in (False, True)
     ]
     for name, value in changes.items():
         setattr(controller, name, value)
@@ -310,7 +301,7 @@ SHOWN = [
     ({}, "e" * 64, PREVIEW, f"shown: found digest 'eeeeeeeeeeee', expected {DIGEST[:12]}"),
     ({}, "", PREVIEW, f"shown: found digest '', expected {DIGEST[:12]}"),
     ({"pieces": []}, DIGEST, PREVIEW, "shown: its preview is not simulated to its end yet"),
-    ({"pieces": [preview_process.PreviewPiece(1, 0, 0.0, np.zeros((1, BODIES, 7)), False)]}, DIGEST, PREVIEW,
+    ({"pieces": [PreviewPiece(1, 0, 0.0, np.zeros((1, BODIES, 7)), False)]}, DIGEST, PREVIEW,
      "shown: its preview is not simulated to its end yet"),
     ({"intent": None}, DIGEST, PREVIEW, "shown: no plan is previewed"),
     ({"intent": intent("aim")}, "", PREVIEW, "shown: no plan is previewed"),
@@ -333,10 +324,10 @@ def test_only_an_answer_to_what_was_asked_for_last_counts(serial, counts):
     controller._asked = 3
     plan, prediction = some_plan(), messages.PredictionMessage(DIGEST, None, None, None, (), (), (), 0.9, 12)
     answers = [
-        preview_process.PlanAnswer(PlanReport(serial, plan.digest(), "", PACKAGE, "world"), plan),
-        preview_process.PreviewBegun(serial, messages.PreviewMessage(DIGEST, 0.02, PREVIEW, 0.02, ())),
-        preview_process.PreviewPiece(serial, 0, 0.0, np.zeros((1, BODIES, 7)), True),
-        preview_process.PredictionAnswer(serial, prediction),
+        PlanAnswer(PlanReport(serial, plan.digest(), "", PACKAGE, "world"), plan),
+        PreviewBegun(serial, messages.PreviewMessage(DIGEST, 0.02, PREVIEW, 0.02, ())),
+        PreviewPiece(serial, 0, 0.0, np.zeros((1, BODIES, 7)), True),
+        PredictionAnswer(serial, prediction),
     ]  # fmt: skip
     assert [controller.answered(answer, 0.0) for answer in answers] == [counts] * 4
     assert [
@@ -384,15 +375,15 @@ class Played:
     def __init__(self):
         self.now, self.robot, self.planning = 100.0, PlayedRobot(), PlainPlanning()
         self.controller = controller_of(self.robot, self.planning, LogWriter())
-        self.planning.heard = lambda answer: self.controller.answered(answer, self.now)
         self.controller.control(BASE)
         self.left, self.right, self.flags = {}, {}, TRACKED
 
     def tick(self, heard=True) -> Intent:
         self.now += DT
         if heard:
-            assert self.controller.hear(received(self.now, self.left, self.right, self.flags)) == ""
+            assert self.controller.hear(*received(self.now, self.left, self.right, self.flags)) == ""
         self.robot.advance(DT)
+        self.controller.poll(self.now)
         return self.controller.tick(DT)
 
     def wait(self, seconds, **how) -> Intent:
@@ -531,7 +522,7 @@ def test_as_it_follows_it_goes_after_the_targets_and_holds_as_soon_as_nobody_ans
     session.right = {"grip": 1.0}
     session.wait(1.0)
     assert session.robot.state() == ExecutorReport("running", FOLLOWS)
-    session.planning.heard = lambda answer: None
+    session.planning.poll = list
     session.wait(SILENT - 0.2)
     assert session.controller.intent.motion == "follow"
     intent = session.wait(0.5)

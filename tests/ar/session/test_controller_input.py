@@ -16,7 +16,7 @@ from trunkline.ar.session.controller_input import (
     controllers,
     stops,
 )
-from trunkline.ar.session.preview_process import Order, _held_object
+from trunkline.ar.session.previewer import Order, _held_object
 from trunkline.ar.teleop.messages import Thing
 
 NEAR = 1e-6

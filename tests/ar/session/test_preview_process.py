@@ -1,7 +1,6 @@
 """Plans and previews: what comes of an order, in which order, and how soon a newer one ends it."""
 
 import os
-import queue
 import time
 from dataclasses import replace
 from functools import cache
@@ -20,8 +19,17 @@ from trunkline.ar.hybrid.uncertainty import Contact, GraspUncertainty
 from trunkline.ar.preview.grasp_preview import GraspPreviewer
 from trunkline.ar.preview.preview_twin import RobotModel
 from trunkline.ar.preview.world_model import make_world
-from trunkline.ar.session import preview_process
-from trunkline.ar.session.preview_process import Order, Overtaken, PreviewPlanner
+from trunkline.ar.session import preview_process, previewer
+from trunkline.ar.session.preview_process import Overtaken
+from trunkline.ar.session.previewer import (
+    InlinePreviewer,
+    Order,
+    PlanAnswer,
+    PredictionAnswer,
+    PreviewBegun,
+    PreviewPiece,
+    PreviewPlanner,
+)
 from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.teleop.grasping import Grasping
 from trunkline.ar.teleop.messages import Box, Target, Thing
@@ -61,14 +69,12 @@ def test_a_plan_then_its_preview_in_pieces_then_the_batch():
     answers = list(made().answers(order(7)))
     planned, begun, *pieces, prediction = answers
     assert [type(answer) for answer in (planned, begun, prediction)] == [
-        preview_process.PlanAnswer,
-        preview_process.PreviewBegun,
-        preview_process.PredictionAnswer,
+        PlanAnswer,
+        PreviewBegun,
+        PredictionAnswer,
     ]
     assert planned.report.digest == planned.plan.digest() == begun.preview.digest == prediction.foreseen.digest
-    assert {
-        answer.report.serial if isinstance(answer, preview_process.PlanAnswer) else answer.serial for answer in answers
-    } == {7}
+    assert {answer.report.serial if isinstance(answer, PlanAnswer) else answer.serial for answer in answers} == {7}
     assert [piece.last for piece in pieces] == [False] * (len(pieces) - 1) + [True]
     frames = np.cumsum([0] + [len(piece.poses) for piece in pieces])
     assert [piece.first for piece in pieces] == list(frames[:-1])
@@ -86,10 +92,10 @@ def test_the_first_plan_in_a_world_that_was_prepared_for_composes_no_twin(monkey
     once = PreviewPlanner(made().planner, made().foresight, made().bodies)
     once.prepare(order())
     composed = []
-    monkeypatch.setattr(preview_process, "compose_twin", lambda *args: composed.append(args))
+    monkeypatch.setattr(previewer, "compose_twin", lambda *args: composed.append(args))
     assert isinstance(
-        next(answer for answer in once.answers(order(2)) if isinstance(answer, preview_process.PreviewPiece)),
-        preview_process.PreviewPiece,
+        next(answer for answer in once.answers(order(2)) if isinstance(answer, PreviewPiece)),
+        PreviewPiece,
     )
     assert not composed
 
@@ -132,7 +138,7 @@ def test_the_assistants_offer_comes_after_what_the_batch_tells():
     foresight, bodies = made().foresight, made().bodies
     helpful = replace(foresight, settings=replace(foresight.settings, futures=2, assistant=1, sure=1.0, lifted=0.9))
     answers = list(PreviewPlanner(made().planner, helpful, bodies).answers(order(8, "the cylinder")))
-    predictions = [answer for answer in answers if isinstance(answer, preview_process.PredictionAnswer)]
+    predictions = [answer for answer in answers if isinstance(answer, PredictionAnswer)]
     assert [answer.foreseen.probability for answer in predictions] == [
         0.0,
         0.0,
@@ -149,23 +155,29 @@ def answering(answers, orders, newest):
     os._exit(1)
 
 
+def answers_of(process, seconds=60.0) -> list:
+    """What is polled once there is anything."""
+    end = time.monotonic() + seconds
+    while not (answers := process.poll()) and time.monotonic() < end:
+        time.sleep(0.005)
+    return answers
+
+
 def test_another_process_plans_where_one_has_ended():
-    heard = queue.Queue()
-    process = preview_process.PreviewProcess(answering, (), heard.put)
+    process = preview_process.PreviewProcess(answering, ())
     try:
         first = process.pid
         for request, reply in [(5, 5), (0, None), (6, 6)]:
-            process.order(request)
-            assert heard.get(timeout=60) == reply
+            process.submit(request)
+            assert answers_of(process) == [reply]
         assert process.pid != first
     finally:
         process.close()
 
 
 def test_a_process_that_cannot_begin_is_not_begun_again():
-    heard = queue.Queue()
-    process = preview_process.PreviewProcess(os._exit, (), heard.put)
-    assert heard.get(timeout=60) is None
+    process = preview_process.PreviewProcess(os._exit, ())
+    assert answers_of(process) == [None]
     time.sleep(0.2)
     assert not process.alive
     process.close()
@@ -184,15 +196,15 @@ def test_a_newer_order_ends_the_one_before_within_a_piece():
     class Pipe:
         def send(self, answer):
             sent.append(answer)
-            if sum(isinstance(answer, preview_process.PreviewPiece) for answer in sent) == 2:
+            if sum(isinstance(answer, PreviewPiece) for answer in sent) == 2:
                 newest.value = 2
 
     waiting = [(1, order(1)), (2, order(2, tip=(0.5, 0.1, -0.6)))]
     orders = SimpleNamespace(get=lambda: waiting.pop(0))
     with pytest.raises(IndexError):  # there is no third
         preview_process.serve(Pipe(), orders, newest, made())
-    assert sum(isinstance(answer, preview_process.PreviewPiece) for answer in sent) == 2
-    assert isinstance(sent[-1], preview_process.PlanAnswer)
+    assert sum(isinstance(answer, PreviewPiece) for answer in sent) == 2
+    assert isinstance(sent[-1], PlanAnswer)
     assert sent[-1].report.serial == 2
 
 
@@ -213,7 +225,31 @@ def test_an_order_that_is_left_goes_no_further():
         raise Overtaken
 
     answers = made().answers(order(1), go_on)
-    assert isinstance(next(answers), preview_process.PlanAnswer)
-    assert isinstance(next(answers), preview_process.PreviewBegun)
+    assert isinstance(next(answers), PlanAnswer)
+    assert isinstance(next(answers), PreviewBegun)
     with pytest.raises(Overtaken):
         next(answers)
+
+
+@pytest.mark.parametrize("at_once", [True, False])
+def test_in_line_the_same_is_answered_and_the_batch_when_it_is_asked_for(at_once):
+    expected = list(made().answers(order(7)))
+    inline = InlinePreviewer(made().answers, lambda order: at_once)
+    inline.submit(order(7))
+    first = inline.poll()
+    inline.predict()
+    then = inline.poll()
+    assert [type(answer) for answer in first + then] == [type(answer) for answer in expected]
+    assert (first + then)[-1] == expected[-1]
+    assert [isinstance(answer, PredictionAnswer) for answer in then] == ([] if at_once else [True])
+    assert inline.poll() == []
+
+
+def test_where_no_body_is_shown_nothing_is_simulated_to_be_shown():
+    """What is planned and predicted is the same."""
+    *_, prediction = made().answers(order(7))
+    planned, begun, piece, unseen = PreviewPlanner(made().planner, made().foresight, ()).answers(order(7))
+    assert unseen == prediction
+    assert piece.last
+    assert len(piece.poses) == 0
+    assert begun.preview.duration == pytest.approx(planned.plan.duration + made().previewing.hold, abs=0.02)

@@ -12,7 +12,7 @@ import pytest
 
 from tests.support.operator import PACKAGE, config
 from tests.support.small_arm import small_spec
-from trunkline.ar.hybrid.preview import joined, nominal
+from trunkline.ar.hybrid.rollout_batch import joined, nominal
 from trunkline.ar.hybrid.rollouts import CommandTrajectory
 from trunkline.ar.hybrid.settings import HybridModelSettings
 from trunkline.ar.hybrid.uncertainty import GraspUncertainty

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from tests.support.links import clock_error
 from trunkline.ar.session.__main__ import parsed
 from trunkline.ar.session.auth import CODE_SECONDS, CODE_TRIES, PairingCode
-from trunkline.ar.session.certificate import fingerprint, make_certificate, tls_context
 from trunkline.ar.session.clock import FORWARD, JUMP, LATEST, PINGS, ClientClock
 from trunkline.ar.session.lease import SILENCE, Control
 from trunkline.ar.session.outbox import MOST_MESSAGES, WINDOW, Outbox
+from trunkline.ar.session.tls import fingerprint, make_certificate, tls_context
 from trunkline.errors import InputError
 
 NEAR = 1e-6  # s, to either side of a border

@@ -8,7 +8,8 @@ import pytest
 
 from tests.ar.session.test_controller import DIGEST, PACKAGE, STRAIGHT, ToldRobot, controller_of, intent, some_plan
 from tests.ar.session.test_permits import FOLLOWING, LIMITS, Played, plan_of
-from trunkline.ar.session import messages, preview_process
+from trunkline.ar.session import messages
+from trunkline.ar.session.previewer import FollowAnswer, PlanAnswer, PredictionAnswer, PreviewBegun, PreviewPiece
 from trunkline.ar.session.robot import DEAD_MAN, HOLD_TIME, MODE, MODES, READY, SERIAL, STOPS, Goal
 from trunkline.ar.teleop.executor import FOLLOWS
 from trunkline.ar.teleop.messages import ExecutorReport, PlanReport
@@ -36,7 +37,7 @@ def test_an_answer_of_who_seeks_is_of_no_plan():
     """Whatever number it has."""
     controller, handed = controller_of(ToldRobot()), []
     controller._follow = SimpleNamespace(answer=handed.append)
-    answer = preview_process.FollowAnswer(*[controller._asked] * len(fields(preview_process.FollowAnswer)))
+    answer = FollowAnswer(*[controller._asked] * len(fields(FollowAnswer)))
     assert controller.answered(answer, 0.0) is False
     assert handed == [answer]
 
@@ -46,10 +47,10 @@ def test_what_was_planned_previewed_and_foreseen_is_noted():
     log_writer = SimpleNamespace(event=lambda name, **_: noted.append(name), piece=lambda *_: noted.append("piece"))
     controller, plan = controller_of(ToldRobot(), log_writer=log_writer), some_plan()
     for answer in (
-        preview_process.PlanAnswer(PlanReport(controller._asked, plan.digest(), "", PACKAGE, "world"), plan),
-        preview_process.PreviewBegun(controller._asked, messages.PreviewMessage(DIGEST, 0.02, 0.3, 0.02, ())),
-        preview_process.PreviewPiece(controller._asked, 0, 0.0, np.zeros((1, 1, 7)), True),
-        preview_process.PredictionAnswer(
+        PlanAnswer(PlanReport(controller._asked, plan.digest(), "", PACKAGE, "world"), plan),
+        PreviewBegun(controller._asked, messages.PreviewMessage(DIGEST, 0.02, 0.3, 0.02, ())),
+        PreviewPiece(controller._asked, 0, 0.0, np.zeros((1, 1, 7)), True),
+        PredictionAnswer(
             controller._asked, messages.PredictionMessage(DIGEST, None, None, None, (), (), (), 0.9, 12)
         ),
     ):

@@ -34,7 +34,7 @@ def follow(y, seconds: float, delay: float = DELAY, period: float = PERIOD) -> t
 
 def hear(follower: Follower, now: float, wanted, world: World = WORLD) -> str:
     """Why the targets at `now` are not followed."""
-    if not follower.due(now):
+    if follower._times and now < follower._times[-1] + KNOT - 1e-6:
         return ""
     goal, refused = sought(PLANNER, wanted, follower.goal[:7], world)
     follower.hear(now, goal)

@@ -101,7 +101,7 @@ def test_a_simulation_that_diverges_leaves_the_limits_of_others_as_they_are():
     for bend, speed in ((0.1, 1.0), (1e5, 1.0), (1e5, -1.0)):
         batch = batch_of(model, 2)
         batch.bind("qpos")[:, 1::2], batch.bind("qvel")[:, 1::2] = [[0.1], [bend]], [[1.0], [speed]]
-        hold(batch, model, np.tile(model.tendon_length0[cables(model)] - 0.01, (2, 1)))
+        hold(batch, model, np.tile(model.tendon_length0[ArmModel(model).cables] - 0.01, (2, 1)))
         friction = capstan_friction_of(batch)
         friction.begin(np.arange(2))
         friction.refresh(np.arange(2))

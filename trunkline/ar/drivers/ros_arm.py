@@ -11,9 +11,10 @@ from typing import Protocol
 
 import numpy as np
 
-from trunkline.ar.drivers.driver import CONNECTING, TICK, Watchdog
+from trunkline.ar.drivers.driver import CONNECTING, TICK
 from trunkline.ar.drivers.ros_settings import JointReading, RosSettings
 from trunkline.ar.drivers.setpoint_filter import LIMITS, ROUNDING
+from trunkline.ar.drivers.watchdog import Watchdog
 from trunkline.errors import InputError
 
 PERIOD = 0.01  # s between points

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trunkline.ar.drivers.driver import Watchdog
 from trunkline.ar.drivers.driver_frames import Setpoint
+from trunkline.ar.drivers.watchdog import Watchdog
 from trunkline.ar.teleop.minimum_jerk import minimum_jerk
 from trunkline.kinematics.panda.kinematics import Q_MAX, Q_MIN
 from trunkline.kinematics.panda.limits import ACCELERATION, JERK, VELOCITY

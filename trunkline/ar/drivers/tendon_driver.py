@@ -5,9 +5,9 @@ from collections import deque
 
 import numpy as np
 
-from trunkline.ar.drivers.driver import Watchdog
 from trunkline.ar.drivers.motors import HOMING
 from trunkline.ar.drivers.on_bus import BusMotors
+from trunkline.ar.drivers.watchdog import Watchdog
 
 
 class TendonDriver:

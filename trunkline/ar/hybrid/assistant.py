@@ -8,7 +8,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from trunkline.ar.hybrid.preview import Holding, interruptible, joined
+from trunkline.ar.hybrid.outcomes import Holding
+from trunkline.ar.hybrid.rollout_batch import interruptible, joined
 from trunkline.ar.hybrid.rollouts import CommandTrajectory, ComposedTwin, rollouts
 from trunkline.ar.hybrid.uncertainty import GraspUncertainty, PosteriorSamples, sample
 

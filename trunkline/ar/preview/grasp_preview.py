@@ -11,8 +11,8 @@ import numpy as np
 
 from trunkline.ar.hybrid.assistant import best, try_places
 from trunkline.ar.hybrid.grasp_poses import Grip
-from trunkline.ar.hybrid.preview import Holding, PlanPreview, preview
-from trunkline.ar.hybrid.released import RestCriterion
+from trunkline.ar.hybrid.outcomes import Holding, RestCriterion
+from trunkline.ar.hybrid.rollout_batch import PlanPreview, preview
 from trunkline.ar.hybrid.rollouts import CommandTrajectory, ComposedTwin
 from trunkline.ar.hybrid.uncertainty import Contact
 from trunkline.ar.preview.preview_twin import RobotModel, compose_twin
@@ -106,12 +106,6 @@ class GraspPreviewer:
         opens = plan.step * dict(plan.phases)["release"]
         resting = RestCriterion(opens, np.array(board.low), np.array(board.high), twin.model)
         return PlanPrediction(preview(twin, trajectory, uncertainty, resting, s.futures, seed, go_on=go_on), begins)
-
-    def reach(self, plan: Plan, world: World, seed: int) -> PlanPrediction:
-        """Futures of a plan that grasps nothing, beside nothing that may be touched."""
-        trajectory = self.whole(plan)
-        twin = compose_twin(self.robot_model, world, None, trajectory.joints[0], trajectory.commands[0], self.settings)
-        return self.free(twin, trajectory, seed)
 
     def free(
         self, twin: ComposedTwin, trajectory: CommandTrajectory, seed: int, go_on: Callable[[], None] = lambda: None

@@ -16,8 +16,8 @@ from pathlib import Path
 
 from trunkline.ar.drivers.simulated_motors import SIMULATED
 from trunkline.ar.session.auth import is_local, names_of
-from trunkline.ar.session.certificate import fingerprint, make_certificate, tls_context
 from trunkline.ar.session.hardware import MOTORS, ROBOTS
+from trunkline.ar.session.tls import fingerprint, make_certificate, tls_context
 from trunkline.errors import InputError, in_one_line
 from trunkline.program import program_name
 

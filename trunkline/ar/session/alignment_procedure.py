@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from trunkline.ar.session import messages
-from trunkline.ar.session.alignment import (
+from trunkline.ar.session.anchors import Anchor
+from trunkline.ar.session.registration import (
     POSES,
     Dwell,
     after,
@@ -27,7 +28,6 @@ from trunkline.ar.session.alignment import (
     tilt,
     tip_of,
 )
-from trunkline.ar.session.anchors import Anchor
 from trunkline.ar.session.settings import AlignmentSettings
 from trunkline.ar.teleop.messages import Pose, Vector
 from trunkline.ar.teleop.vectors import Quaternion, add, angle_between, distance, rotate

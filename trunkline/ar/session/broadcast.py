@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from trunkline.ar.session import binary, messages, preview_process
+from trunkline.ar.session import binary, messages
 from trunkline.ar.session.controller import SessionController
+from trunkline.ar.session.previewer import PreviewPiece
 from trunkline.ar.session.robot import STALE
 from trunkline.ar.session.scene import Shells
 from trunkline.ar.teleop.alignment import base_quaternion
@@ -69,7 +70,7 @@ class Broadcast:
         return state
 
 
-def piece(shown: preview_process.PreviewPiece) -> bytes:
+def piece(shown: PreviewPiece) -> bytes:
     """Of a preview."""
     flags = {"last"} if shown.last else set()
     return binary.frame("preview", flags, shown.poses.shape[1], shown.first, shown.time, shown.poses)

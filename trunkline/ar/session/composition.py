@@ -1,6 +1,5 @@
 """A session made of a package: core, processes, scene. Everything comes out of the package's file."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,6 +28,7 @@ from trunkline.ar.teleop.vectors import DOWN
 from trunkline.kinematics.panda.shipped import JOINTS
 from trunkline.model.arm_model import ArmModel
 from trunkline.unity import unpacked
+from trunkline.version import __version__
 
 SEARCH = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])  # rad, where the search for the ready pose begins
 BELOW, AROUND = 1.0, 3.0  # m, of the floor as a solid
@@ -43,12 +43,12 @@ class SessionParts:
     scene: dict
     shells: Shells | None
     robot: RobotProcess
-    planning: PreviewProcess
+    previewer: PreviewProcess
     log_writer: LogWriterProcess
 
     def close(self) -> None:
         self.robot.close()  # first: it may be moving
-        self.planning.close()
+        self.previewer.close()
         self.log_writer.close()
 
 
@@ -56,13 +56,9 @@ def make(
     path: Path,
     teleop: Teleop,
     config: SessionConfig,
-    heard: Callable[[preview_process.Answer | None], None],
     hardware: Hardware | None = None,
 ) -> SessionParts:
     """Of the package at `path`, the robot simulated, or as `hardware` has it.
-
-    Args:
-        heard: called with every answer of the process that plans, by a thread of its own.
 
     Raises:
         InputError: there is no package, or it cannot be previewed with.
@@ -72,16 +68,16 @@ def make(
     simulation, maps = simulation_of(package, teleop, config, joints), unpacked.maps_of(package.files)
     world = make_world(solids(config), () if config.thing is None else (config.thing,))
     setup = path.resolve(), teleop, config.preview, simulation.bodies, world
-    planning = PreviewProcess(preview_process.run, setup, heard)  # first: it takes longest until it is ready
+    previewer = PreviewProcess(preview_process.run, setup)  # first: it takes longest until it is ready
     drawing = scene(simulation.twin.model, simulation.bodies, maps, package.geometry.length)
     subject = subject_of(simulation, hardware)
     log_writer = LogWriterProcess(new_path(Path(config.journal.folder)), subject, config.journal.period)
     robot = robot_of(simulation, hardware)
     core = Teleoperation(teleop.core, package.reach, package.digest, teleop.mount_offset)
-    controller = SessionController(core, robot, planning, world, teleop.handling.lift, log_writer, package.period)
-    controller.begin(config.rate)
+    controller = SessionController(core, robot, previewer, world, teleop.handling.lift, log_writer, package.period)
+    controller.begin(config.rate, __version__)
     log_writer.await_begun()
-    return SessionParts(controller, package.digest, drawing, Shells.of(maps), robot, planning, log_writer)
+    return SessionParts(controller, package.digest, drawing, Shells.of(maps), robot, previewer, log_writer)
 
 
 def subject_of(simulation: Simulation, hardware: Hardware | None = None) -> Subject:

@@ -1,7 +1,7 @@
 """What stands around the core: inputs in, and plans, previews and the robot's motion as it wants them.
 
-It has no sockets and no clock: the server calls it, with the time. Every decision that can move the robot is here or in
-the core. It holds wherever it does not know.
+It has no sockets and no clock: whoever drives it, a live server or a rehearsal, calls it with the time. Every decision
+that can move the robot is here or in the core. It holds wherever it does not know.
 """
 
 import re
@@ -12,11 +12,20 @@ from typing import Protocol
 import numpy as np
 
 from trunkline.ar.preview.world_model import update_world
-from trunkline.ar.session import messages, preview_process
-from trunkline.ar.session.binary import MARKERS, Received
-from trunkline.ar.session.controller_input import NOWHERE, controllers
+from trunkline.ar.session import messages
+from trunkline.ar.session.binary import MARKERS
+from trunkline.ar.session.controller_input import NOWHERE
 from trunkline.ar.session.follow import FollowControl
 from trunkline.ar.session.log_writer import LogWriter
+from trunkline.ar.session.previewer import (
+    Answer,
+    FollowAnswer,
+    Order,
+    PlanAnswer,
+    PreviewBegun,
+    Previewer,
+    PreviewPiece,
+)
 from trunkline.ar.session.robot import RobotState
 from trunkline.ar.session.ui_text import next_action, next_key
 from trunkline.ar.teleop.alignment import base_quaternion
@@ -37,7 +46,6 @@ from trunkline.ar.teleop.messages import (
     World,
 )
 from trunkline.ar.teleop.plan import Plan
-from trunkline.version import __version__
 
 HERE = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))  # of poses that are in the base frame already
 NUMBER = re.compile(r"[\d.]+")
@@ -57,13 +65,6 @@ class Robot(Protocol):
     def robot_state(self) -> RobotState: ...
 
 
-class Planning(Protocol):
-    """What answers orders, some time later, by `SessionController.foreseen`."""
-
-    def order(self, order: preview_process.Order | preview_process.FollowRequest) -> None: ...
-    def leave(self) -> None: ...
-
-
 @dataclass(frozen=True)
 class HandInput:
     stamp: float
@@ -79,13 +80,13 @@ class SessionController:
         self,
         core: Teleoperation,
         robot: Robot,
-        planning: Planning,
+        previewer: Previewer,
         world: World,
         lift: float,
         log_writer: LogWriter | None = None,
         period: float = 0.0,
     ) -> None:
-        self.core, self.robot, self.planning, self.world = core, robot, planning, world
+        self.core, self.robot, self.previewer, self.world = core, robot, previewer, world
         self.lift, self.period = lift, period
         self.log_writer = log_writer or LogWriter()
         self.state = core.start()
@@ -95,33 +96,34 @@ class SessionController:
         self.preview: messages.PreviewMessage | None = None
         self.foreseen: messages.PredictionMessage | None = None
         self.report: PlanReport | None = None
-        self.pieces: list[preview_process.PreviewPiece] = []
+        self.pieces: list[PreviewPiece] = []
         self.intent: Intent | None = None
         self._heard: deque[HandInput] = deque(maxlen=MOST_INPUTS)
         self._last, self._fresh = self._nobody, True
         self._stop, self._fault, self._shown, self._since, self._believed = False, "", "", 0.0, ""
         self._asked, self._ordered, self._started, self._ran = 0, False, "", False
         self._logged: tuple = ()
-        self._follow = FollowControl(planning.order, robot.hear)
+        self._follow = FollowControl(previewer.submit, robot.hear)
 
-    def begin(self, rate: float) -> None:
-        """The log's first line: all that a replay needs besides the package. rate: of ticks, Hz."""
+    def begin(self, rate: float, version: str = "") -> None:
+        """The log's first line: all that a replay needs besides the package. rate: of ticks, Hz. version: of
+        Trunkline."""
         core, subject = self.core, self.log_writer.subject
         self.log_writer.event(
-            "begin", version=__version__, package=core.package, rate=rate, settings=core.settings,
+            "begin", version=version, package=core.package, rate=rate, settings=core.settings,
             mount_offset=core.mount_offset, tip={"body": subject.tip[0], "place": subject.tip[1]},
             hardware=subject.hardware,
         )  # fmt: skip
 
     # --- what is heard
 
-    def hear(self, received: Received) -> str:
-        """An input of whom controls; why it does not count, "" where it does."""
+    def hear(self, stamp: float, left: Controller, right: Controller) -> str:
+        """An input of whom controls, `stamp` s by its own clock; why it does not count, "" where it does."""
         last = self._heard[-1] if self._heard else self._last
-        if received.stamp <= last.stamp and not self._fresh:
-            return f"input: stamp {received.stamp:.6g} s is not after {last.stamp:.6g} s: heard before"
+        if stamp <= last.stamp and not self._fresh:
+            return f"input: stamp {stamp:.6g} s is not after {last.stamp:.6g} s: heard before"
         self._fresh = False
-        self._heard.append(HandInput(received.stamp, *controllers(received)))
+        self._heard.append(HandInput(stamp, left, right))
         return ""
 
     def stop(self) -> None:
@@ -159,24 +161,29 @@ class SessionController:
         self.log_writer.event("shown", digest=digest)
         return ""
 
-    def answered(self, answer: preview_process.Answer | None, now: float) -> bool:
-        """An answer of `planning`, None if it has ended; whether it is of the plan that is wanted."""
+    def poll(self, now: float) -> list[Answer]:
+        """What the previewer has answered since, of the plan that is wanted."""
+        answers = self.previewer.poll()
+        return [answer for answer in answers if self.answered(answer, now) and answer is not None]
+
+    def answered(self, answer: Answer | None, now: float) -> bool:
+        """An answer of the previewer, None if it has ended; whether it is of the plan that is wanted."""
         if answer is None:
             self.report = PlanReport(self._asked, refused="the process that plans has ended")
             return False
-        if isinstance(answer, preview_process.FollowAnswer):
+        if isinstance(answer, FollowAnswer):
             self._follow.answer(answer)
             return False
-        serial = answer.report.serial if isinstance(answer, preview_process.PlanAnswer) else answer.serial
+        serial = answer.report.serial if isinstance(answer, PlanAnswer) else answer.serial
         if serial != self._asked:
             return False
-        if isinstance(answer, preview_process.PlanAnswer):
+        if isinstance(answer, PlanAnswer):
             self.report, self.plan = answer.report, answer.plan
             self.log_writer.event("planned", report=answer.report)
-        elif isinstance(answer, preview_process.PreviewBegun):
+        elif isinstance(answer, PreviewBegun):
             self.preview, self._since = answer.preview, now
             self.log_writer.event("preview", preview=answer.preview)
-        elif isinstance(answer, preview_process.PreviewPiece):
+        elif isinstance(answer, PreviewPiece):
             self.pieces.append(answer)
             self.log_writer.piece(answer.first, answer.time, answer.poses)
         else:
@@ -261,10 +268,11 @@ class SessionController:
             self.foreseen, self.pieces, self._shown = None, [], ""
             self._ordered = True
             self.log_writer.event("request", request=request)
-            self.planning.order(preview_process.Order(request, self.world, robot_state.joints, robot_state.commands))
+            here = robot_state.joints, robot_state.commands, robot_state.hangs
+            self.previewer.submit(Order(request, self.world, *here))
         elif self._ordered and intent.mode in ("hold", "stopped", "aim", "execute"):
             self._ordered = False
-            self.planning.leave()
+            self.previewer.leave()
 
     def _drive(self, intent: Intent) -> None:
         running = self.robot.state()
@@ -311,6 +319,16 @@ class SessionController:
 
     # --- what is told
 
+    @property
+    def fault(self) -> str:
+        """Why the robot must not go on, "" where it may."""
+        return self._fault
+
+    @property
+    def refused(self) -> str:
+        """Why the newest targets are not followed, "" where they are."""
+        return self._follow.refused
+
     def markers(self) -> np.ndarray:
         """Poses of MARKERS, (4, 7); NaN where there are none."""
         poses = np.full((len(MARKERS), 7), np.nan)
@@ -338,7 +356,7 @@ class SessionController:
         touched = hands[self._rigid].target is not None, hands[1 - self._rigid].target is not None
         words = next_action(intent.mode, intent.targets, holder, self.alignment is not None, touched)
         keys = next_key(intent.mode, intent.targets, holder, touched)
-        notice = intent.notice or self._follow.refused if holder else ""
+        notice = intent.notice or self.refused if holder else ""
         return messages.StateMessage(
             intent.mode, intent.motion, _joined(notice, self.blocked), words, keys,
             round(intent.countdown, 2), intent.preview, intent.execute, _rounded(intent.targets),

@@ -4,13 +4,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from trunkline.ar.session.preview_process import FollowAnswer, FollowRequest
+from trunkline.ar.session.previewer import FollowAnswer, FollowRequest
 from trunkline.ar.teleop.following import KNOT
 from trunkline.ar.teleop.messages import Targets, World
 from trunkline.ar.teleop.targets import why_not
 from trunkline.ar.teleop.trajectory import JOINTS
 
 SILENT = 1.0  # s; a busy machine answers within 0.5
+ROUNDING = 1e-6  # s, of a sum of ticks
 
 
 class FollowControl:
@@ -44,7 +45,7 @@ class FollowControl:
 
     def seek(self, targets: Targets | None, joints: np.ndarray, world: World) -> None:
         """Every KNOT s, what `targets` ask for, near what was found last, at first near `joints` (7,), rad."""
-        if self._now < self._last + KNOT:
+        if self._now < self._last + KNOT - ROUNDING:
             return
         self._serial, self._last = self._serial + 1, self._now
         self._times[self._serial] = self._now

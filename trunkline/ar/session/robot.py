@@ -86,7 +86,8 @@ class RobotState:
 
     `joints` (7,), rad, and `commands` (K,), m, as they are sent, and poses of the `thing` (7,), NaN where there is
     none, and of the `bodies` (N, 7). hold_time: s at which it was last commanded to hold. As measured: `measured`
-    (7,), rad, of the joints, and `lengths` (K,), m, of the cables; NaN or None where nothing measures them.
+    (7,), rad, of the joints, and `lengths` (K,), m, of the cables, and `hangs` (3,), m, where the straight arm's tip
+    was in its base frame; NaN or None where nothing measures them.
     """
 
     time: float
@@ -97,6 +98,7 @@ class RobotState:
     bodies: np.ndarray
     measured: np.ndarray | None = None
     lengths: np.ndarray | None = None
+    hangs: np.ndarray | None = None
 
 
 class RobotProcess:

@@ -14,8 +14,7 @@ from pathlib import Path
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from trunkline.ar.session import binary, controller_input, messages, preview_process
-from trunkline.ar.session.alignment import mark_at
+from trunkline.ar.session import binary, controller_input, messages
 from trunkline.ar.session.alignment_procedure import AlignmentProcedure
 from trunkline.ar.session.anchors import Anchor, Anchors
 from trunkline.ar.session.auth import HEADERS, Origins, PairingCode, same
@@ -25,6 +24,8 @@ from trunkline.ar.session.controller import SessionController
 from trunkline.ar.session.controller_input import controller_pose
 from trunkline.ar.session.gc_policy import GCPolicy
 from trunkline.ar.session.lease import Control
+from trunkline.ar.session.previewer import PredictionAnswer, PreviewBegun, PreviewPiece
+from trunkline.ar.session.registration import mark_at
 from trunkline.ar.session.robot import next_report_time
 from trunkline.ar.session.routes import Routes
 from trunkline.ar.session.scene import Shells
@@ -233,7 +234,8 @@ class Server:
         if client.id != self.control.holder:
             self._refuse(client, "input: you do not control; ask for it")
             return
-        reason = client.clock.fault(received.stamp, now) or self.controller.hear(received)
+        reason = client.clock.fault(received.stamp, now)
+        reason = reason or self.controller.hear(received.stamp, *controller_input.controllers(received))
         if reason:
             self._refuse(client, reason)
         else:
@@ -417,6 +419,7 @@ class Server:
             self.composition.log(f"{before} was silent")
             self._passed(before)
             self._tell_lease()
+        self._show_answers(now)
         self._gc_policy.tell(moving=self.controller.tick(dt).motion != "hold")
         if self.controller.log_writer.fault != self._unwritten:
             self._unwritten = self.controller.log_writer.fault
@@ -426,20 +429,19 @@ class Server:
             self._world = self.controller.world
             self._tell(messages.WorldMessage(self.controller.world))
 
-    def foreseen(self, answer: preview_process.Answer | None) -> None:
-        """An answer of the process that plans; called in the event loop."""
-        if not self.controller.answered(answer, self.now()):
-            return
-        if isinstance(answer, preview_process.PreviewBegun):
-            for client in self.clients.values():
-                client.outbox.forget_pieces()
-            self._tell(answer.preview)
-        elif isinstance(answer, preview_process.PreviewPiece):
-            message = piece(answer)
-            for client in self.clients.values():
-                client.outbox.piece(message)
-        elif isinstance(answer, preview_process.PredictionAnswer):
-            self._tell(answer.foreseen)
+    def _show_answers(self, now: float) -> None:
+        """What the previewer has answered, to all."""
+        for answer in self.controller.poll(now):
+            if isinstance(answer, PreviewBegun):
+                for client in self.clients.values():
+                    client.outbox.forget_pieces()
+                self._tell(answer.preview)
+            elif isinstance(answer, PreviewPiece):
+                message = piece(answer)
+                for client in self.clients.values():
+                    client.outbox.piece(message)
+            elif isinstance(answer, PredictionAnswer):
+                self._tell(answer.foreseen)
 
     def _show(self, now: float) -> None:
         """The robot, its reach and the state to all."""

@@ -20,7 +20,6 @@ from trunkline.ar.session.anchors import Anchors
 from trunkline.ar.session.auth import CODE_SECONDS, Origins, make_token
 from trunkline.ar.session.composition import SessionParts, make
 from trunkline.ar.session.hardware import Hardware, hardware_of
-from trunkline.ar.session.preview_process import Answer
 from trunkline.ar.session.server import PARTING, Composition, Server
 from trunkline.ar.session.settings import AlignmentSettings, SessionConfig
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
@@ -104,31 +103,25 @@ async def opened(
     Raises:
         InputError: no package, a process that ends, a log that cannot be written, an address that cannot be had.
     """
-    loop, servers = asyncio.get_running_loop(), []
-
-    def heard(answer: Answer | None) -> None:
-        loop.call_soon_threadsafe(lambda: [server.foreseen(answer) for server in servers])
-
     config = config or load_folder(SessionConfig, PROJECT / "conf/live")
     teleop = teleop or load_folder(Teleop, PROJECT / "conf/teleop")
     if hardware is not None:
         teleop = hardware.slow_enough(teleop)
     alignment = alignment_for(hardware, config.alignment)
     anchors = Anchors(Path(alignment.anchors))
-    made = await asyncio.to_thread(make, package, teleop, config, heard, hardware)
+    made = await asyncio.to_thread(make, package, teleop, config, hardware)
     try:
         composition = Composition(
             made.controller, make_token(), address.origins, made.package, made.scene, made.shells, config.rate, PAGE,
             log, alignment, anchors,
         )  # fmt: skip
-        while not (made.robot.ready and made.planning.ready.is_set()):
-            if not (made.robot.alive and made.planning.alive):
+        while not (made.robot.ready and made.previewer.ready.is_set()):
+            if not (made.robot.alive and made.previewer.alive):
                 raise InputError("a process of the session has ended before it began")
             if made.log_writer.fault:
                 raise InputError(made.log_writer.fault)
             await asyncio.sleep(0.05)
         server = Server(composition)
-        servers.append(server)
         gc.collect()
         gc.freeze()  # a collection of all that is loaded takes longer than a robot goes on without a permit
         async with listening(server, address):

@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 
 from trunkline.ar.teleop.alignment import Aligned, wrist_of
 from trunkline.ar.teleop.events import Ends, happened, looked_back, stopped_by
-from trunkline.ar.teleop.input_validation import clock_fault, fault_of, setting_fault, silence_fault, swapped
+from trunkline.ar.teleop.headset_loss import silence_fault
+from trunkline.ar.teleop.input_validation import clock_fault, fault_of, setting_fault, swapped
 from trunkline.ar.teleop.messages import Input, Intent, Motion, Pose, Request, Targets
 from trunkline.ar.teleop.reach import Reach
 from trunkline.ar.teleop.settings import Teleop

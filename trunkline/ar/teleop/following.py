@@ -85,10 +85,6 @@ class Follower:
         """The newest, (7 + K,), rad and m."""
         return self._goals[-1]
 
-    def due(self, now: float) -> bool:
-        """Whether targets are to be looked at, at `now`, s."""
-        return not self._times or now >= self._times[-1] + KNOT - 1e-6
-
     def hear(self, now: float, goal: np.ndarray | None) -> None:
         """Axes that the targets at `now`, s, ask for, (7 + K,); None: the last ones still."""
         self._goals.append(self.goal if goal is None else goal)

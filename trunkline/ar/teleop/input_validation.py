@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterable
 
 from trunkline.ar.teleop.messages import Controller, Input, Pose
-from trunkline.ar.teleop.settings import Safety
 from trunkline.ar.teleop.tracked_controller import Hand
 from trunkline.ar.teleop.vectors import distance
 
@@ -31,12 +30,6 @@ def clock_fault(last: float | None, message: Input, dt: float) -> str:
     return (
         f"clock went back by {last - message.stamp:.3g} s; holding" if last is not None and message.stamp < last else ""
     )
-
-
-def silence_fault(last: float | None, stamp: float, silent: float, safety: Safety) -> str:
-    """Why the client counts as silent, "" where it does not; `silent` s is how long no new stamp has come."""
-    gap = silent if last is None else max(silent, stamp - last)
-    return f"client silent for {gap:.2f} s; holding" if gap > safety.silence else ""
 
 
 def setting_fault(message: Input, package: str) -> str:

@@ -5,7 +5,7 @@ using static Trunkline.Vectors;
 namespace Trunkline {
 
 /// <summary>From touches to where the headset's frame stands in the robot's base: the fit of
-/// trunkline/ar/session/alignment.py. What is touched is a mark on the flange, whose place the robot itself knows. Both frames
+/// trunkline/ar/session/registration.py. What is touched is a mark on the flange, whose place the robot itself knows. Both frames
 /// are right-handed, m; `Frames` converts from Unity's.</summary>
 public static class Aligning {
   private const int _fewest = 4;  // touches, of which one may be left out
@@ -63,7 +63,7 @@ public static class Aligning {
   }
 
   /// <summary>Of the fit at <paramref name="point"/> of the base, m, root mean square (Fitzpatrick, West, Maurer,
-  /// 1998); the equation is in trunkline/ar/session/alignment.py.</summary>
+  /// 1998); the equation is in trunkline/ar/session/registration.py.</summary>
   public static double ExpectedError(Pose pose, IReadOnlyList<Vector> reference, IReadOnlyList<Vector> robotBase,
                                      Vector point) {
     int count = robotBase.Count;

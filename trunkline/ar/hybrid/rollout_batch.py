@@ -8,54 +8,16 @@ the model is.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Annotated, Protocol
 
 import numpy as np
-from pydantic import Field
 
+from trunkline.ar.hybrid.outcomes import Criterion
 from trunkline.ar.hybrid.rates import wilson
 from trunkline.ar.hybrid.rollouts import FRAME, CommandTrajectory, ComposedTwin, Piece, rollouts
 from trunkline.ar.hybrid.uncertainty import GraspUncertainty, PosteriorSamples, nominal_sample, sample
 
-Metres = Annotated[float, Field(gt=0, le=1)]
 WITHIN = 0.9  # share of futures whose tips are within the spread
 EVERY = 0.1  # s between the times at which a spread is stated
-
-
-class Criterion(Protocol):
-    """What is asked of a plan: `Holding`, or `trunkline.ar.hybrid.released.Resting`."""
-
-    def holds(self, motion: Piece) -> np.ndarray:
-        """In which futures it comes true. Shape (B,)."""
-        ...
-
-
-@dataclass(frozen=True)
-class Holding:
-    """What counts as held, from the time `since`, s, when the object loses its support or is lifted, to the end.
-
-    Attributes:
-        sag: m, by which what the arm wraps of the object may move against the mount, which the arm bears: it gives way
-            and swings. What is lifted must be lifted by more.
-        slip: m, by which it may move away from the nearest unit.
-        lifted: m, by which it must be higher then than at first.
-    """
-
-    since: float
-    sag: Metres = 0.08
-    slip: Metres = 0.02
-    lifted: Annotated[float, Field(ge=-1, le=1)] | None = None
-
-    def holds(self, motion: Piece) -> np.ndarray:
-        """Which futures hold the object. Shape (B,)."""
-        first = int(np.argmin(np.abs(motion.time - self.since)))
-        beside = motion.grip - motion.mount
-        with np.errstate(invalid="ignore"):
-            stays = np.linalg.norm(beside[:, -1] - beside[:, first], axis=1) < self.sag
-            stays &= motion.away[:, -1] < motion.away[:, first] + self.slip
-            if self.lifted is not None:
-                stays &= motion.grip[:, first, 2] - motion.grip[:, 0, 2] > self.lifted
-        return stays & motion.sound
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from trunkline.ar.hybrid.released import LAST, STILL, RestCriterion
+from trunkline.ar.hybrid.outcomes import LAST, STILL, RestCriterion
 from trunkline.ar.hybrid.rollouts import Piece
 
 TIME = np.linspace(0.0, 4.0, 81)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from trunkline.ar.hybrid.assistant import best
-from trunkline.ar.hybrid.preview import Holding, PlanPreview, interruptible, joined
+from trunkline.ar.hybrid.outcomes import Holding
 from trunkline.ar.hybrid.rates import wilson
+from trunkline.ar.hybrid.rollout_batch import PlanPreview, interruptible, joined
 from trunkline.ar.hybrid.rollouts import Piece
 from trunkline.ar.hybrid.uncertainty import nominal_sample
 

@@ -1,0 +1,300 @@
+"""Plans and their previews: what is asked of whoever makes them, and what is answered.
+
+The answers to an order are a `PlanAnswer`; then, if there is a plan, a `PreviewBegun`, each `PreviewPiece` of the
+nominal twin's motion as soon as it is simulated, and a `PredictionAnswer`, the result of the batch of rollouts, again
+where the assistant has an offer.
+
+A live session has them made by a process (`preview_process.py`), a rehearsal by the same `PreviewPlanner` in line.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import Protocol
+
+import numpy as np
+
+from trunkline.ar.hybrid.rollout_batch import WITHIN, nominal
+from trunkline.ar.hybrid.rollouts import FRAME, CommandTrajectory, ComposedTwin
+from trunkline.ar.preview.grasp_preview import GraspPreviewer, PlanPrediction
+from trunkline.ar.preview.package import Package
+from trunkline.ar.preview.preview_twin import at_rest, compose_twin, robot_model_of
+from trunkline.ar.preview.settings import Previewing
+from trunkline.ar.session import messages
+from trunkline.ar.session.bodies import BodyPoses
+from trunkline.ar.teleop.config import TeleoperationConfig
+from trunkline.ar.teleop.following import sought
+from trunkline.ar.teleop.messages import PlanReport, Request, Targets, Thing, World
+from trunkline.ar.teleop.plan import Plan
+from trunkline.ar.teleop.planner import Planner
+from trunkline.errors import InputError
+
+
+@dataclass(frozen=True)
+class Order:
+    """A plan that is asked for, from the robot at rest at `joints` (7,), rad, and `commands` (K,), m. hangs: where the
+    straight arm's tip is seen in its base frame, (3,), m; None where nobody sees it."""
+
+    request: Request
+    world: World
+    joints: np.ndarray
+    commands: np.ndarray
+    hangs: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class FollowRequest:
+    """What `targets` ask of a robot that follows is asked for, the nearest to `joints` (7,), rad; targets None: nothing
+    that it may follow."""
+
+    serial: int
+    targets: Targets | None
+    joints: np.ndarray
+    world: World
+
+
+@dataclass(frozen=True)
+class FollowAnswer:
+    """Axes (7 + K,), rad and m; None for the last ones still, `refused` says why, "" where there are no targets."""
+
+    serial: int
+    axes: np.ndarray | None
+    refused: str
+
+
+@dataclass(frozen=True)
+class PlanAnswer:
+    """What became of it; `plan` is None where it was refused."""
+
+    report: PlanReport
+    plan: Plan | None = None
+
+
+@dataclass(frozen=True)
+class PreviewBegun:
+    """The preview of plan request `serial` begins."""
+
+    serial: int
+    preview: messages.PreviewMessage
+
+
+@dataclass(frozen=True)
+class PreviewPiece:
+    """Frames of the preview from the one numbered `first`, at `time` s of the plan: poses (F, N, 7), float32."""
+
+    serial: int
+    first: int
+    time: float
+    poses: np.ndarray
+    last: bool
+
+
+@dataclass(frozen=True)
+class PredictionAnswer:
+    """What the batch says."""
+
+    serial: int
+    foreseen: messages.PredictionMessage
+
+
+Answer = PlanAnswer | PreviewBegun | PreviewPiece | PredictionAnswer | FollowAnswer
+
+
+class Previewer(Protocol):
+    """One order at a time, the newest."""
+
+    def submit(self, order: Order | FollowRequest) -> None:
+        """It does not wait; the order before is left."""
+        ...
+
+    def leave(self) -> None:
+        """What was ordered is not wanted any more."""
+        ...
+
+    def poll(self) -> list[Answer | None]:
+        """What has been answered since the last poll; None of one that has ended."""
+        ...
+
+
+class PreviewPlanner:
+    """Plans and previews. `bodies`: names of those whose poses are told; without any, no motion is simulated to be
+    shown. `prediction`: the newest, of the plan that was ordered last."""
+
+    def __init__(self, planner: Planner, foresight: GraspPreviewer, bodies: tuple[str, ...]) -> None:
+        self.planner, self.foresight, self.bodies = planner, foresight, bodies
+        self.robot_model, self.previewing = foresight.robot_model, foresight.settings
+        self.prediction: PlanPrediction | None = None
+        self._composed: tuple[tuple, ComposedTwin | None] = ((), None)
+        self._grasped: PlanPrediction | None = None  # the last grasp: of a thing that is held, the one that was run
+
+    @classmethod
+    def of(
+        cls, package: Package, config: TeleoperationConfig, previewing: Previewing, bodies: tuple[str, ...]
+    ) -> "PreviewPlanner":
+        """By a package alone.
+
+        Raises:
+            InputError: it has nothing to preview with.
+        """
+        foresight = GraspPreviewer(robot_model_of(previewing, package.files), package.grips(config), previewing)
+        return cls(package.planner(config), foresight, bodies)
+
+    def answers(self, order: Order | FollowRequest, go_on: Callable[[], None] = lambda: None) -> Iterator[Answer]:
+        """All that comes of an order, each as soon as it is known. `go_on` raises where it need not be. A plan whose
+        preview breaks off is refused, as it could never be confirmed."""
+        try:
+            if isinstance(order, FollowRequest):
+                yield FollowAnswer(order.serial, *sought(self.planner, order.targets, order.joints, order.world))
+            else:
+                yield from self._answers(order, go_on)
+        except (InputError, ArithmeticError, ValueError) as error:
+            refused = f"preview: {type(error).__name__}: {error}".splitlines()[0]
+            if isinstance(order, FollowRequest):
+                yield FollowAnswer(order.serial, None, refused)
+            else:
+                yield PlanAnswer(PlanReport(order.request.serial, refused=refused))
+
+    def _answers(self, order: Order, go_on: Callable[[], None]) -> Iterator[Answer]:
+        request, serial, beside = order.request, order.request.serial, 0.0
+        self.prediction = None
+        if order.hangs is not None:
+            beside = float(order.hangs[1])
+        try:
+            plan = self.planner.plan(request, order.world, order.joints, order.commands, beside)
+        except InputError as error:
+            yield PlanAnswer(PlanReport(serial, refused=str(error)))
+            return
+        digest = plan.digest()
+        yield PlanAnswer(PlanReport(serial, digest, "", plan.package, plan.world), plan)
+        way = self.foresight.whole(plan)
+        twin = cache(partial(self._twin_of, order, way))
+        if self.bodies:
+            twin()  # a preview's time begins once it is composed
+        phases = tuple((name, plan.step * row) for name, row in plan.phases)
+        step = self.previewing.step * max(round(FRAME / self.previewing.step), 1)
+        yield PreviewBegun(serial, messages.PreviewMessage(digest, step, way.duration, step, phases))
+        go_on()
+        if self.bodies:
+            yield from self._shown(serial, twin(), way, go_on)
+        else:
+            yield PreviewPiece(serial, 0, 0.0, np.empty((0, 0, 7), dtype=np.float32), True)
+        for prediction in self._foreseen(order, plan, twin, way, go_on):
+            self.prediction = prediction
+            yield PredictionAnswer(serial, prediction_message(digest, prediction))
+
+    def prepare(self, order: Order) -> None:
+        """Compose its twin, which the next order takes, where nothing has changed."""
+        self._twin(order.world, _beside(order), order.joints, order.commands)
+
+    def _twin_of(self, order: Order, way: CommandTrajectory) -> ComposedTwin:
+        held_object = _held_object(order)
+        if held_object is not None and self._grasped is not None:
+            return self.foresight.carrying(held_object, order.world, way, order.hangs, self._grasped)
+        return self._twin(order.world, _beside(order), way.joints[0], way.commands[0])
+
+    def _twin(self, world: World, thing: Thing | None, joints: np.ndarray, commands: np.ndarray) -> ComposedTwin:
+        """The last one where nothing has changed: to compile another takes longer than a piece of a preview."""
+        composed, twin = self._composed
+        if twin is not None and composed == (world.boxes, thing):
+            twin = at_rest(twin, joints, commands, self.robot_model.robot.mount_offset)
+        else:
+            twin = compose_twin(self.robot_model, world, thing, joints, commands, self.previewing)
+        self._composed = (world.boxes, thing), twin
+        return twin
+
+    def _shown(
+        self, serial: int, twin: ComposedTwin, way: CommandTrajectory, go_on: Callable[[], None]
+    ) -> Iterator[Answer]:
+        poses, first, piece_answer = BodyPoses(twin.model, self.bodies), 0, None
+        for piece in nominal(twin, way):
+            if piece_answer is not None:
+                yield piece_answer
+            frames = poses.of_piece(piece)
+            piece_answer = PreviewPiece(serial, first, float(piece.time[0]), frames, False)
+            first += len(frames)
+            if piece.time[-1] + 2 * FRAME < way.duration:  # not the last: it need not wait for the next
+                yield piece_answer
+                piece_answer = None
+            go_on()
+        if piece_answer is not None:
+            yield PreviewPiece(serial, piece_answer.first, piece_answer.time, piece_answer.poses, True)
+
+    def _foreseen(
+        self,
+        order: Order,
+        plan: Plan,
+        twin: Callable[[], ComposedTwin],
+        way: CommandTrajectory,
+        go_on: Callable[[], None],
+    ) -> Iterator[PlanPrediction]:
+        targets, serial = order.request.targets, order.request.serial
+        thing, held_object = order.world.thing(targets.thing) if targets.thing else None, _held_object(order)
+        if thing is not None and held_object is None:
+            for prediction in self.foresight.grasp(plan, targets, thing, order.world, order.hangs, serial, go_on):
+                self._grasped = prediction
+                yield prediction
+        elif held_object is not None and self._grasped is not None:
+            yield self.foresight.bring(
+                plan, targets, held_object, order.world, order.hangs, self._grasped, serial, go_on
+            )
+        else:
+            yield self.foresight.free(twin(), way, serial, go_on)
+
+
+class InlinePreviewer:
+    """A `Previewer` in the caller's process: the same `answers`, all there at the next poll. Where an order is not
+    `predicted`, its batch is rolled out once `predict` asks for it."""
+
+    def __init__(
+        self,
+        answers: Callable[[Order | FollowRequest], Iterator[Answer]],
+        predicted: Callable[[Order], bool] = lambda order: True,
+    ) -> None:
+        self._answers, self._predicted = answers, predicted
+        self._ready: list[Answer | None] = []
+        self._later: Iterator[Answer] = iter(())
+
+    def submit(self, order: Order | FollowRequest) -> None:
+        answers = self._answers(order)
+        waits = isinstance(order, FollowRequest) or self._predicted(order)
+        for answer in answers:
+            self._ready.append(answer)
+            if not waits and isinstance(answer, PreviewPiece) and answer.last:
+                self._later = answers
+                return
+
+    def leave(self) -> None:
+        """Nothing goes on by itself here."""
+
+    def poll(self) -> list[Answer | None]:
+        answers, self._ready = self._ready, []
+        return answers
+
+    def predict(self) -> None:
+        """What was not rolled out of the plan that was ordered last is answered at the next poll."""
+        self._ready += self._later
+
+
+def prediction_message(digest: str, prediction: PlanPrediction) -> messages.PredictionMessage:
+    """As clients hear it: times from the plan's beginning on."""
+    preview, stated = prediction.preview, prediction.preview.stated
+    low_high = preview.interval or (None, None)
+    tips = tuple((float(x), float(y), float(z)) for x, y, z in stated.tips)
+    return messages.PredictionMessage(
+        digest, preview.probability, *low_high, tuple(map(float, prediction.begins + stated.times)), tips,
+        tuple(map(float, stated.radii)), WITHIN, len(preview.samples), prediction.offer,
+    )  # fmt: skip
+
+
+def _beside(order: Order) -> Thing | None:
+    """What the twin may touch: one thing, the one that is meant, else any; none that the arm holds."""
+    things = [thing for thing in order.world.things if thing.support != "held"]
+    meant = [thing for thing in things if thing.name == order.request.targets.thing]
+    return (meant or things or [None])[0]
+
+
+def _held_object(order: Order) -> Thing | None:
+    """The thing that is brought elsewhere, None where none is."""
+    name = order.request.targets.thing
+    thing = order.world.thing(name) if name else None
+    return thing if thing is not None and thing.support == "held" else None

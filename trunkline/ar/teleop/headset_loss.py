@@ -1,0 +1,13 @@
+"""Where the robot holds because the headset is lost: no new stamp of its clock has come for `Safety.silence` s.
+
+Behind it, each with a timeout of its own: control passes from a client that is silent (`ar/session/lease.py`), the
+robot's process brakes without a permit (`ar/session/robot.py`), a driver without setpoints (`ar/drivers/watchdog.py`).
+"""
+
+from trunkline.ar.teleop.settings import Safety
+
+
+def silence_fault(last: float | None, stamp: float, silent: float, safety: Safety) -> str:
+    """Why the client counts as silent, "" where it does not; `silent` s is how long no new stamp has come."""
+    gap = silent if last is None else max(silent, stamp - last)
+    return f"client silent for {gap:.2f} s; holding" if gap > safety.silence else ""
