@@ -49,7 +49,8 @@ def test_what_was_planned_previewed_and_foreseen_is_noted():
     for answer in (
         PlanAnswer(PlanReport(controller._asked, plan.digest(), "", PACKAGE, "world"), plan),
         PreviewBegun(controller._asked, messages.PreviewMessage(DIGEST, 0.02, 0.3, 0.02, ())),
-        PreviewPiece(controller._asked, 0, 0.0, np.zeros((1, 1, 7)), True),
+        PreviewPiece(controller._asked, 0, 0.0, np.zeros((1, 1, 7)), False),
+        PreviewPiece(controller._asked, 0, 0.0, np.zeros((0, 0, 7)), True),  # without frames
         PredictionAnswer(
             controller._asked, messages.PredictionMessage(DIGEST, None, None, None, (), (), (), 0.9, 12)
         ),

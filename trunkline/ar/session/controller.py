@@ -185,7 +185,8 @@ class SessionController:
             self.log_writer.event("preview", preview=answer.preview)
         elif isinstance(answer, PreviewPiece):
             self.pieces.append(answer)
-            self.log_writer.piece(answer.first, answer.time, answer.poses)
+            if len(answer.poses):  # none where no body is shown
+                self.log_writer.piece(answer.first, answer.time, answer.poses)
         else:
             self.foreseen = answer.foreseen
             self.log_writer.event("foreseen", foreseen=answer.foreseen)
