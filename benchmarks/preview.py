@@ -22,7 +22,7 @@ from trunkline.ar.hybrid.outcomes import Holding
 from trunkline.ar.hybrid.rollout_batch import nominal, preview
 from trunkline.ar.hybrid.rollouts import CommandTrajectory, ComposedTwin
 from trunkline.ar.hybrid.settings import HybridModelSettings
-from trunkline.ar.hybrid.uncertainty import uncertainty_of
+from trunkline.ar.hybrid.uncertainty import GraspUncertainty
 from trunkline.ar.hybrid.worlds import WorldGeometry
 from trunkline.ar.teleop.minimum_jerk import minimum_jerk
 from trunkline.compute.threads import thread_count
@@ -56,7 +56,7 @@ class Placing:
 @recorded("preview")
 def main(path: Path, count: int) -> None:
     twin, way = grasp(path)
-    doubts = uncertainty_of(list(Twin.load(path).provenance.tables.values()))
+    doubts = GraspUncertainty(posterior=Twin.load(path).posterior)
     holding = Holding(LET_GO, sag=0.25)
     list(nominal(twin, CommandTrajectory(way.step, way.joints[:100], way.commands[:100])))  # names are looked up once
     print(f"{path}: {twin.model.nv} degrees of freedom, {count} futures of {LENGTH:g} s, {thread_count()} threads")

@@ -19,14 +19,13 @@ from trunkline.tools.randomize.file import read_randomization
 
 path, table = Path(sys.argv[1]), Path(sys.argv[2])
 count, seconds = int(sys.argv[3]) if len(sys.argv) > 3 else 64, float(sys.argv[4]) if len(sys.argv) > 4 else 2.0
-drawn, which = read_randomization(table)
+posterior, which = read_randomization(table)
 assert hashlib.sha256(path.read_bytes()).hexdigest() == which["sha256"], f"{table} is of another model than {path}"
 model = mujoco.MjModel.from_xml_path(str(path))
-x = np.insert(drawn.draw(count - 1, np.random.default_rng(0)), 0, 0, axis=0)  # the first: the centre
-fields = drawn_fields(model, drawn.values(x))
+fields = drawn_fields(model, posterior.sample(count - 1, 0))
 batch = batch_of(model, count)  # MuJoCo's own Batch: expand gives every simulation its own fields
 for name, values in fields.items():
-    batch.expand(name)[:] = values
+    batch.expand(name)[1:] = values  # the first arm stays the calibrated one
 straight = np.tile(model.tendon_length0[model.actuator_trnid[:, 0]], (count, 1))
 hold(batch, model, straight)
 steps = round(seconds / model.opt.timestep)

@@ -189,7 +189,8 @@ def scored(project):
         folder = root / "artifacts" / stage
         folder.mkdir()
         (folder / "arm.xml").write_text(save_model(spec, model))
-        table = {"compared": {"experiments": compared[stage], "frames": 40, "command_delay": 0.0}}
+        settings = {"experiments": compared[stage], "frames": 40, "command_delay": 0.0}
+        table = {"parameters": {}, "compared": settings}
         (folder / "parameters.json").write_text(json.dumps(table))
     config = score_stage.Config(stages=list(compared), floor_poses=3)
     score_stage.main(config)

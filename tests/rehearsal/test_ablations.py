@@ -13,6 +13,7 @@ from tests.rehearsal.arm import settings as stand_in
 from tests.rehearsal.arm import stranger
 from tests.support.bent_chain import hardening_stump, stump_spec
 from tests.support.operator import config
+from tests.support.twins import posterior_about
 from trunkline.ar.hybrid.friction import TPU_ON
 from trunkline.ar.hybrid.uncertainty import Contact, GraspUncertainty, sample
 from trunkline.ar.preview.package import Package
@@ -34,7 +35,8 @@ MODELS = ("statics", "cad")  # that need a package, and a drawing of the arm
 @pytest.fixture(scope="module")
 def bench() -> Bench:
     robot = PandaRobot("panda", 0.05, 0.8, 0.0, list(READY))
-    uncertainty = GraspUncertainty(("kp",), np.ones(1), np.eye(1), Contact(FRICTION, PLACE, 0.1))
+    posterior = posterior_about(stump_spec().compile(), {"kp": 1.0})
+    uncertainty = GraspUncertainty(Contact(FRICTION, PLACE, 0.1), posterior)
     world_model = RobotModel(stump_spec(), uncertainty, robot)
     return Bench(None, config(), stranger(), stand_in(), settings.person(), settings.free(), world_model=world_model)  # type: ignore[arg-type]
 

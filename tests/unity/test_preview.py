@@ -16,7 +16,7 @@ from trunkline.ar.hybrid.objects import GraspObject
 from trunkline.ar.hybrid.outcomes import Holding
 from trunkline.ar.hybrid.rollout_batch import joined, preview
 from trunkline.ar.hybrid.rollouts import CommandTrajectory, ComposedTwin, rollouts
-from trunkline.ar.hybrid.uncertainty import Contact, nominal_sample, uncertainty_of
+from trunkline.ar.hybrid.uncertainty import GraspUncertainty, nominal_sample
 from trunkline.ar.hybrid.worlds import WorldGeometry
 from trunkline.errors import InputError
 from trunkline.kinematics.panda.mounts import FixedMount
@@ -24,6 +24,7 @@ from trunkline.model.arm.contact_geometry import read_geometry
 from trunkline.model.arm.spiral import spiral_chain
 from trunkline.model.arm_model import ArmModel
 from trunkline.twin.package import MANIFEST, arm_of, package_digest, read_package, robot_of
+from trunkline.twin.posterior import Posterior
 from trunkline.twin.twin import Twin
 from trunkline.unity.package import CALIBRATED, MODEL, write_tarball
 from trunkline.unity.twin import Trajectory, assemble
@@ -88,32 +89,25 @@ def test_the_grasped_object_is_touched(mjcf):
     assert np.abs(touched[:, :, : alone.shape[2]] - alone).max() > 1e-2
 
 
-def tables_in(files: dict[str, bytes]) -> list[dict]:
-    return list(Twin.of_package(files).provenance.tables.values())
-
-
 def test_a_preview_needs_the_package_alone(files):
     assert package_digest(files)
     arm, robot = arm_of(files), robot_of(files)
     assert ArmModel(arm.compile()).capstan_friction > 0
     assert robot == ROBOT
     twin = ComposedTwin(compose(arm, robot).compile(), arm.compile())
-    result = preview(twin, way_of(twin.arm, robot.ready, 0.3), uncertainty_of(tables_in(files)), Holding(0.1), count=3)
+    uncertainty = GraspUncertainty(posterior=Twin.of_package(files).posterior)
+    result = preview(twin, way_of(twin.arm, robot.ready, 0.3), uncertainty, Holding(0.1), count=3)
     assert result.motion.sound.all()
     assert result.spread[-1] > 1e-4
     assert len(set(result.samples.values["kp"])) == 3
 
 
-def test_doubts_of_the_package_are_those_of_the_stages(files):
-    contact = Contact(friction=0.1)
-    expected = uncertainty_of(list(PARAMETERS.values()), contact)
-    uncertainty = uncertainty_of(tables_in(files), contact)
-    assert (uncertainty.names, uncertainty.contact) == (expected.names, contact)
-    np.testing.assert_array_equal(uncertainty.deviation, expected.deviation)
-    np.testing.assert_array_equal(uncertainty.correlation, expected.correlation)
-    assert uncertainty.names == ("stiffness", "kp", "damping")
-    width = np.log(2200 / 1800) / 3.92  # the latest stage's
-    assert uncertainty.deviation[1] == pytest.approx(width, rel=1e-3)
+def test_the_posterior_of_the_package_is_that_of_the_stages(files):
+    expected, posterior = Posterior.from_tables(PARAMETERS), Twin.of_package(files).posterior
+    assert posterior.names == expected.names == ["stiffness", "kp", "damping"]
+    np.testing.assert_array_equal(posterior.deviation, expected.deviation)
+    np.testing.assert_array_equal(posterior.correlation, expected.correlation)
+    assert posterior.interval("kp")[0] == pytest.approx(1800.0), "the latest stage's"
 
 
 def test_a_package_without_them_is_one_line(files):
@@ -142,6 +136,7 @@ def test_the_arm_of_the_package_that_was_built_moves_as_the_identified_one(built
 def test_a_preview_needs_the_package_that_was_built_alone(built):
     arm, robot = arm_of(built), robot_of(built)
     twin = ComposedTwin(compose(arm, robot).compile(), arm.compile()).stepped(1 / 240)
-    result = preview(twin, way_of(twin.arm, robot.ready, 0.4), uncertainty_of(tables_in(built)), count=3)
+    uncertainty = GraspUncertainty(posterior=Twin.of_package(built).posterior)
+    result = preview(twin, way_of(twin.arm, robot.ready, 0.4), uncertainty, count=3)
     assert result.motion.sound.all()
     assert result.spread[-1] > 1e-4

@@ -10,8 +10,8 @@ Stages are independent, as intervals are given what earlier ones found. A table 
 u = U / t_ν(0.975): what JCGM 101, 6.4.9.7, assigns to an estimate whose expanded uncertainty is stated.
 
 An interval is symmetric on that axis until the range that was searched cuts it (`parameter_table`), so U is the longer
-of its sides. The distribution is cut alike: z beyond the range counts as at its end. So the 95 % interval of what is
-drawn is the stated one.
+of its sides. The distribution is cut alike: what is drawn beyond the range counts as at its end. So the 95 % interval
+of what is drawn is the stated one.
 """
 
 from dataclasses import dataclass
@@ -31,8 +31,8 @@ class Posterior:
     """P parameters z on the axes on which they are searched.
 
     names, stages: of each. estimate: (P,). deviation: standard uncertainty. Shape (P,). degrees: of freedom. Shape
-    (P,). correlation: of the estimates, 0 between stages. Shape (P, P). low, high: ends of the range that was searched.
-    Each (P,).
+    (P,). correlation: of the estimates, 0 between stages. Shape (P, P). low, high: ends of the range that was searched,
+    in the parameters' units. Each (P,).
     """
 
     names: list[str]
@@ -69,10 +69,26 @@ class Posterior:
         estimate, half, degrees, low, high = rows.T
         return cls(names, stages, estimate, half / stdtrit(degrees, 0.975), degrees, correlation, low, high)
 
+    @property
+    def covariance(self) -> np.ndarray:
+        """Scale matrix of the t distributions. Shape (P, P)."""
+        return self.correlation * np.outer(self.deviation, self.deviation)
+
+    @property
+    def half_width(self) -> np.ndarray:
+        """Of the 95 % intervals before the range cuts them, on the axes. Shape (P,)."""
+        return stdtrit(self.degrees, 0.975) * self.deviation
+
+    def value(self, name: str) -> float:
+        """What was identified, in the parameter's unit."""
+        return float(parameter_named(name).value(self.estimate[self.names.index(name)]))
+
     def values(self, z: np.ndarray) -> dict[str, np.ndarray]:
         """By name, in the parameters' units, from z of shape (D, P), no further out than the range."""
-        clipped = np.clip(z, self.low, self.high)
-        return {name: parameter_named(name).value(clipped[:, i]) for i, name in enumerate(self.names)}
+        return {
+            name: np.clip(parameter_named(name).value(z[:, i]), self.low[i], self.high[i])
+            for i, name in enumerate(self.names)
+        }
 
     def sample(self, count: int, rng: Seed) -> dict[str, np.ndarray]:
         """Values of `count` arms that may be the identified one, by parameter. Each (count,)."""
@@ -89,8 +105,8 @@ class Posterior:
         """Ends of what holds a share `level` of the draws, as much on both sides, in the parameter's unit."""
         i = self.names.index(name)
         half = stdtrit(self.degrees[i], 0.5 + level / 2) * self.deviation[i]
-        ends = np.clip(self.estimate[i] + half * np.array([-1, 1]), self.low[i], self.high[i])
-        low, high = parameter_named(name).value(ends).tolist()
+        ends = parameter_named(name).value(self.estimate[i] + half * np.array([-1, 1]))
+        low, high = np.clip(ends, self.low[i], self.high[i]).tolist()
         return low, high
 
 
@@ -102,6 +118,6 @@ def _row(table: dict, name: str) -> tuple[float, ...]:
     low, high = row[INTERVAL]
     if low is None or high is None or not low <= high or (low <= 0 and not parameter.signed):
         raise InputError(f"parameters.{name}.{INTERVAL}: found {row[INTERVAL]}, expected two numbers that rise")
-    z, ends = float(parameter.coordinate(row["value"])), parameter.coordinate(row["range"])
+    z, (least, most) = float(parameter.coordinate(row["value"])), row["range"]
     half = float(np.max(np.abs(parameter.coordinate([low, high]) - z)))
-    return z, half, max(len(table["fitted_to"]) - 1, 1), float(ends[0]), float(ends[1])
+    return z, half, max(len(table["fitted_to"]) - 1, 1), least, most

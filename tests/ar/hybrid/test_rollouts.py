@@ -1,12 +1,14 @@
 """Futures of a plan: what each has, and what comes of it, on a short arm of few units."""
 
 import copy
+from dataclasses import replace
 
 import mujoco
 import numpy as np
 import pytest
 
 from tests.ar.hybrid.conftest import hybrid_settings, rubbing_arm
+from tests.support.twins import posterior_about
 from trunkline.ar.hybrid.compose import Placed, compose
 from trunkline.ar.hybrid.friction import TPU_ON
 from trunkline.ar.hybrid.objects import GraspObject
@@ -20,7 +22,6 @@ from trunkline.ar.hybrid.uncertainty import (
     PosteriorSamples,
     nominal_sample,
     sample,
-    uncertainty_of,
 )
 from trunkline.ar.hybrid.worlds import SupportSurface, WorldGeometry
 from trunkline.errors import InputError
@@ -54,8 +55,8 @@ def free(small) -> ComposedTwin:
     return ComposedTwin(compose(small, FixedMount("fixed")).compile(), small.compile())
 
 
-def doubts(name="kp", deviation=0.2, contact=None) -> GraspUncertainty:
-    return GraspUncertainty((name,), np.array([deviation]), np.eye(1), contact or Contact(0.0, (0.0, 0.0, 0.0)))
+def doubts(arm, deviation=0.2) -> GraspUncertainty:
+    return GraspUncertainty(Contact(0.0, (0.0, 0.0, 0.0)), posterior_about(arm, {"kp": deviation}))
 
 
 def run(twin, way, draws):
@@ -63,7 +64,7 @@ def run(twin, way, draws):
 
 
 def test_no_doubt_no_spread(free):
-    result = preview(free, way_of(free.arm), doubts(deviation=0.0), count=2)
+    result = preview(free, way_of(free.arm), doubts(free.arm, 0.0), count=2)
     assert np.ptp(result.nominal.tip[0], axis=0).max() > 0.01
     assert result.spread.max() < 1e-9
     np.testing.assert_allclose(result.median, result.nominal.tip[0], atol=1e-6)
@@ -72,12 +73,12 @@ def test_no_doubt_no_spread(free):
 
 
 def test_more_doubt_more_spread(free):
-    spreads = [preview(free, way_of(free.arm), doubts(deviation=d), count=8).spread[-1] for d in (0.1, 0.3)]
+    spreads = [preview(free, way_of(free.arm), doubts(free.arm, d), count=8).spread[-1] for d in (0.1, 0.3)]
     assert spreads[1] > 2 * spreads[0] > 0
 
 
 def test_the_same_seed_the_same_futures(free):
-    first, same, other = (preview(free, way_of(free.arm), doubts(), count=3, seed=seed) for seed in (1, 1, 2))
+    first, same, other = (preview(free, way_of(free.arm), doubts(free.arm), count=3, seed=seed) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first.motion.qpos, same.motion.qpos)
     assert np.abs(first.motion.tip - other.motion.tip).max() > 1e-5
 
@@ -256,41 +257,26 @@ def test_pieces_come_one_by_one_and_are_the_whole(free):
     times = np.concatenate([piece.time for piece in pieces])
     np.testing.assert_allclose(np.diff(times), times[1] - times[0])
     shown = []
-    result = preview(free, way_of(free.arm), doubts(), count=1, show=shown.append)
+    result = preview(free, way_of(free.arm), doubts(free.arm), count=1, show=shown.append)
     np.testing.assert_array_equal(joined(shown).qpos, result.nominal.qpos)
 
 
-def test_intervals_are_read_as_they_are_meant():
-    """Log-normal where positive: 95 % of the draws in the interval; normal where signed; correlated as said."""
-    stage = {
-        "parameters": {"kp": {"interval_95_given_model": [1000.0, 4000.0]},
-                       "rest_bend_x": {"interval_95_given_model": [-0.01, 0.03]},
-                       "mount_tilt_x": {"interval_95_given_model": [0.0, 0.1]}},
-        "correlation": {"kp": {"rest_bend_x": 0.8}, "rest_bend_x": {"kp": 0.8}},
-    }  # fmt: skip
-    uncertainty = uncertainty_of([stage])
-    assert uncertainty.names == ("kp", "rest_bend_x")
-    np.testing.assert_allclose(uncertainty.deviation, [np.log(4) / 3.919928, 0.04 / 3.919928], rtol=1e-6)
-    assert uncertainty.correlation[0, 1] == 0.8
-
-
 def test_draws_have_the_doubts_spread(small):
-    names, arm = ("kp", "damping"), small.compile()
-    contact, correlation = Contact(0.2, (0.01, 0.0, 0.0)), np.array([[1, -0.7], [-0.7, 1]])
-    uncertainty = GraspUncertainty(names, np.array([0.3, 0.1]), correlation, contact)
-    drawn = sample(uncertainty, arm, 20_000, 0)
-    logs = np.log([drawn.values[name] / parameter_named(name).read(arm) for name in names])
+    arm = small.compile()
+    posterior = posterior_about(arm, {"kp": 0.3, "damping": 0.1, "mount_tilt_x": 0.1}, -0.4)
+    drawn = sample(GraspUncertainty(Contact(0.2, (0.01, 0.0, 0.0)), posterior), arm, 20_000, 0)
+    assert list(drawn.values) == ["kp", "damping"], "the marker's tilt turns nothing here"
+    logs = np.log([column / parameter_named(name).read(arm) for name, column in drawn.values.items()])
     np.testing.assert_allclose(logs.std(axis=1), [0.3, 0.1], rtol=0.03)
-    assert np.corrcoef(logs)[0, 1] == pytest.approx(-0.7, abs=0.02)
+    assert np.corrcoef(logs)[0, 1] == pytest.approx(-0.4, abs=0.02)
     assert np.log(drawn.friction).std() == pytest.approx(0.2, rel=0.03)
     np.testing.assert_allclose(drawn.offsets.std(axis=0), [0.01, 0, 0], rtol=0.03)
 
 
 def test_what_does_not_fit_is_refused(small, free):
-    with pytest.raises(InputError, match="interval_95_given_model"):
-        uncertainty_of([{"parameters": {"kp": {"interval_95_given_model": [None, None]}}, "correlation": {}}])
+    foreign = replace(posterior_about(free.arm, {"kp": 0.1}), names=["hysteresis"])
     with pytest.raises(InputError, match="hysteresis"):
-        sample(doubts("hysteresis"), free.arm, 2, 0)
+        sample(GraspUncertainty(posterior=foreign), free.arm, 2, 0)
     way = way_of(free.arm)
     with pytest.raises(InputError, match="expected 0 and 3"):
         next(iter(nominal(free, CommandTrajectory(way.step, np.zeros((len(way.commands), 7)), way.commands))))

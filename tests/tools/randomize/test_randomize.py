@@ -11,14 +11,21 @@ import numpy as np
 import pytest
 
 from tests.support.small_arm import small_mjcf
+from trunkline.ar.hybrid.uncertainty import GraspUncertainty, sample
 from trunkline.errors import InputError
+from trunkline.frames import STANDARD_GRAVITY
 from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.simulate.experiment import SLACK
 from trunkline.model.simulation.motion import batch_of, hold, move
+from trunkline.report.certificate.arms import StaticArm, arm_of, arms_with
+from trunkline.report.certificate.budget import parameter_shifts
+from trunkline.report.certificate.poses import StaticPoses
 from trunkline.tools.randomize.__main__ import main
 from trunkline.tools.randomize.fields import drawn_fields
 from trunkline.tools.randomize.file import read_randomization
-from trunkline.tools.randomize.randomization import Randomization, of_arm, of_population
+from trunkline.tools.randomize.population import of_population
 from trunkline.twin.posterior import Posterior
+from trunkline.twin.twin import Twin
 
 ROOT = Path(__file__).parents[3]
 TOLD = {"identify_stiffness": ("stiffness", "mount_tilt_x"), "identify_control": ("kp", "damping", "force_range")}
@@ -63,20 +70,20 @@ def model(written) -> mujoco.MjModel:
     return mujoco.MjModel.from_xml_path(str(written.parent / "artifacts/identify_control/arm.xml"))
 
 
-def test_draws_have_the_covariance_that_the_file_states(written):
-    drawn, _ = read_randomization(written)
+def test_draws_have_the_distribution_that_the_file_states(written):
+    posterior, _ = read_randomization(written)
     stated = json.loads(written.read_text())
-    values = drawn.values(drawn.draw(40_000, np.random.default_rng(1)))
+    values = posterior.sample(40_000, 1)
     for group in stated["groups"].values():
-        normal = [stated["parameters"][name]["distribution"] == "normal" for name in group["parameters"]]
-        x = [
-            values[n] if as_it_is else np.log(values[n])
-            for n, as_it_is in zip(group["parameters"], normal, strict=True)
-        ]
-        covariance = np.array(group["covariance"])
-        scale = np.sqrt(np.outer(np.diag(covariance), np.diag(covariance)))
-        np.testing.assert_allclose(np.cov(x) / scale, covariance / scale, atol=0.03)
-        assert covariance[0, 1] / scale[0, 1] == pytest.approx(0.6)
+        rows = {name: stated["parameters"][name] for name in group["parameters"]}
+        z = [values[n] - r["centre"] if r["distribution"] == "t" else np.log(values[n] / r["centre"])
+             for n, r in rows.items()]  # fmt: skip
+        matrix, degrees = np.array(group["scale_matrix"]), group["degrees_of_freedom"]
+        assert degrees == len(TRIALS) - 1
+        scale = np.sqrt(np.outer(np.diag(matrix), np.diag(matrix)))
+        assert np.sqrt(np.diag(matrix)).tolist() == pytest.approx([row["scale"] for row in rows.values()])
+        np.testing.assert_allclose(np.cov(z) / scale, matrix / scale * degrees / (degrees - 2), atol=0.05)
+        assert matrix[0, 1] / scale[0, 1] == pytest.approx(0.6)
     between = np.corrcoef(np.log(values["stiffness"]), np.log(values["kp"]))[0, 1]
     assert abs(between) < 0.03
     for name, row in stated["parameters"].items():
@@ -86,15 +93,30 @@ def test_draws_have_the_covariance_that_the_file_states(written):
         assert PARAMETERS[name].unit == row["unit"]
 
 
-def test_its_intervals_are_narrower_than_student_s_by_the_degrees_of_freedom(written):
-    """2.262 standard uncertainties for 10 trials, 1.960 for a normal distribution."""
+def test_its_intervals_are_those_of_the_stages(written):
     row = json.loads(written.read_text())["parameters"]["stiffness"]
-    assert np.log(row["interval_95"][1] / row["centre"]) == pytest.approx(np.log(1.2) * 1.960 / 2.262, rel=1e-3)
+    assert row["interval_95"] == pytest.approx([row["centre"] / 1.2, row["centre"] * 1.2], rel=1e-4)
+
+
+def test_previews_and_the_certificate_draw_the_same_numbers_from_the_same_seed(written, model):
+    twin = Twin.load(written.parent / "artifacts")
+    drawn = twin.posterior.sample(5, 0)  # as the certificate does
+    previewed = sample(GraspUncertainty(posterior=twin.posterior), model, 5, 0).values
+    assert set(drawn) - set(previewed) == {"mount_tilt_x"}, "of the marker, which previews have none of"
+    for name, column in previewed.items():
+        np.testing.assert_array_equal(column, drawn[name])
+    expected = drawn_fields(model, drawn)
+    with np.load(written.with_suffix(".npz")) as packed:
+        for name, values in expected.items():
+            np.testing.assert_array_equal(packed[name], values)
+    certified = parameter_shifts(twin.arm, twin.posterior, *poses_of(model), 5, np.random.default_rng(0))
+    stated = [arm.tips(poses_of(model)[1]) for arm in arms_with(model, drawn)]
+    np.testing.assert_allclose(certified + arm_of(model).tips(poses_of(model)[1]), stated, atol=1e-9)
 
 
 def test_the_centre_is_the_calibrated_arm_to_the_last_bit(written, model):
-    drawn, _ = read_randomization(written)
-    fields = drawn_fields(model, drawn.values(np.zeros((2, len(drawn.names)))))
+    posterior, _ = read_randomization(written)
+    fields = drawn_fields(model, {name: np.full(2, PARAMETERS[name].read(model)) for name in posterior.names})
     assert {"jnt_stiffness", "body_quat", "actuator_gainprm", "dof_damping"} <= set(fields)
     for name, values in fields.items():
         np.testing.assert_array_equal(values, np.stack([getattr(model, name)] * 2))
@@ -103,7 +125,7 @@ def test_the_centre_is_the_calibrated_arm_to_the_last_bit(written, model):
 def test_what_is_written_is_read_again(written, model):
     """So the difference that is added to the model is the parameter's whole effect."""
     drawn, _ = read_randomization(written)
-    values = drawn.values(drawn.draw(3, np.random.default_rng(4)))
+    values = drawn.sample(3, 4)
     fields = drawn_fields(model, values)
     for number in range(3):
         other = model.__copy__()
@@ -124,7 +146,7 @@ def test_the_file_names_the_fields_that_a_parameter_writes_and_no_others(written
 
 def test_every_drawn_arm_compiles_steps_and_is_another(written, model):
     drawn, _ = read_randomization(written)
-    fields = drawn_fields(model, drawn.values(drawn.draw(16, np.random.default_rng(2))))
+    fields = drawn_fields(model, drawn.sample(16, 2))
     batch = batch_of(model, 16)
     for name, values in fields.items():
         batch.expand(name)[:] = values
@@ -138,7 +160,7 @@ def test_every_drawn_arm_compiles_steps_and_is_another(written, model):
 
 def test_packed_draws_are_those_fields(written, model):
     drawn, _ = read_randomization(written)
-    expected = drawn_fields(model, drawn.values(drawn.draw(5, np.random.default_rng(0))))
+    expected = drawn_fields(model, drawn.sample(5, 0))
     with np.load(written.with_suffix(".npz")) as packed:
         assert set(packed) == set(expected)
         for name, values in expected.items():
@@ -160,19 +182,26 @@ def test_the_example_s_first_arm_is_the_calibrated_one_and_the_others_spread_abo
     assert float(re.search(r"median ([\d.]+),", lines[2])[1]) > 0.1
 
 
+def poses_of(model: mujoco.MjModel) -> tuple[StaticArm, StaticPoses]:
+    arm = arm_of(model)
+    return arm, StaticPoses(np.array([[0.0, 0.0, -STANDARD_GRAVITY]]), arm.chain.straight_lengths[None] + SLACK)
+
+
 # --- populations
 
 
-def arm(centre: float, deviation: float) -> Randomization:
-    """Of one parameter whose logarithm is `centre`."""
-    low, high = np.array([1e-9]), np.array([1e9])
-    return Randomization(["stiffness"], ["a"], np.exp([centre]), np.array([[deviation**2]]), low, high)
+def arm(centre: float, deviation: float) -> Posterior:
+    """Of one parameter whose logarithm is `centre`, from ten trials."""
+    far = np.array([np.inf])
+    return Posterior(["stiffness"], ["a"], np.array([centre]), np.array([deviation]), np.array([9.0]), np.eye(1),
+                     -far, far)  # fmt: skip
 
 
 def test_arms_that_differ_by_no_more_than_they_are_uncertain_are_one_kind_of_arm():
     population = of_population([arm(1.0, 0.5), arm(1.1, 0.5), arm(0.9, 0.5)])
-    assert population.centre[0] == pytest.approx(np.e)
+    assert population.value("stiffness") == pytest.approx(np.e)
     assert population.deviation[0] == pytest.approx(0.5 * np.sqrt(4 / 3))
+    assert population.degrees[0] == 27
 
 
 def test_arms_that_differ_spread_as_far_as_they_do():
@@ -180,7 +209,6 @@ def test_arms_that_differ_spread_as_far_as_they_do():
     truths = 1.0 + 0.3 * rng.standard_normal(400)
     population = of_population([arm(truth + 0.2 * rng.standard_normal(), 0.2) for truth in truths])
     assert population.deviation[0] == pytest.approx(np.hypot(0.3, 0.2), rel=0.1)
-    assert population.arms == 400
 
 
 def test_two_folders_are_a_population_about_their_mean(tmp_path, written):
@@ -192,7 +220,7 @@ def test_two_folders_are_a_population_about_their_mean(tmp_path, written):
     assert both["parameters"]["stiffness"]["centre"] == pytest.approx(
         np.sqrt(2) * single["parameters"]["stiffness"]["centre"]
     )
-    assert both["parameters"]["stiffness"]["sd"] > 3 * single["parameters"]["stiffness"]["sd"]
+    assert both["parameters"]["stiffness"]["scale"] > 3 * single["parameters"]["stiffness"]["scale"]
 
 
 # --- the command
@@ -201,8 +229,7 @@ def test_two_folders_are_a_population_about_their_mean(tmp_path, written):
 def test_of_the_committed_stages_it_takes_what_the_last_one_found():
     tables = {s: json.loads((ROOT / f"artifacts/identify_{s}/parameters.json").read_text())
               for s in ("stiffness", "damping", "control")}  # fmt: skip
-    drawn = of_arm(Posterior.from_tables(tables))
-    values = drawn.values(drawn.draw(500, np.random.default_rng(0)))
+    values = Posterior.from_tables({f"identify_{stage}": table for stage, table in tables.items()}).sample(500, 0)
     assert values["kp"].std() > 0
     assert np.median(values["kp"]) == pytest.approx(tables["control"]["parameters"]["kp"]["value"], rel=0.1)
     for name, drawn_values in values.items():
@@ -215,7 +242,7 @@ def test_widened_it_spreads_as_much_more(tmp_path, written):
     out = tmp_path / "wide.json"
     assert main([str(written.parent / "artifacts"), "--out", str(out), "--widen", "3"]) == 0
     wide, narrow = (json.loads(path.read_text())["parameters"]["kp"] for path in (out, written))
-    assert wide["sd"] == pytest.approx(3 * narrow["sd"])
+    assert wide["scale"] == pytest.approx(3 * narrow["scale"])
     assert wide["centre"] == pytest.approx(narrow["centre"])
 
 

@@ -10,7 +10,7 @@ from trunkline.ar.hybrid.compose import Placed, compose, panda_joints
 from trunkline.ar.hybrid.objects import GraspObject as Shaped
 from trunkline.ar.hybrid.rollouts import ComposedTwin
 from trunkline.ar.hybrid.string import hang
-from trunkline.ar.hybrid.uncertainty import Contact, GraspUncertainty, uncertainty_of
+from trunkline.ar.hybrid.uncertainty import Contact, GraspUncertainty
 from trunkline.ar.hybrid.worlds import SupportSurface
 from trunkline.ar.hybrid.worlds import WorldGeometry as Room
 from trunkline.ar.preview.settings import Previewing
@@ -63,7 +63,7 @@ def robot_model_of(settings: Previewing, files: dict[str, bytes]) -> RobotModel:
     if not isinstance(robot, PandaRobot):
         raise InputError(f"package: found a robot of kind {robot.kind}, expected panda: plans move that")
     twin = Twin.of_package(files)
-    return RobotModel(twin.spec, uncertainty_of(list(twin.provenance.tables.values()), contact), robot)
+    return RobotModel(twin.spec, GraspUncertainty(contact, twin.posterior), robot)
 
 
 def compose_twin(

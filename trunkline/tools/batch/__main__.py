@@ -33,7 +33,7 @@ def main(arguments: list[str] | None = None) -> int:
     fleet = [
         read_results(arm.name, Path(arm.folder) if arm.folder else args.out / arm.name) for arm in listing.arms
     ]
-    identified = [results for results in fleet if results.parameters or results.errors]
+    identified = [results for results in fleet if results.posterior.names or results.errors]
     if args.only_table and not identified:
         raise InputError(f"{args.list}: found no results of any arm, expected those of at least one")
     if identified:

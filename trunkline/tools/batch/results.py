@@ -11,25 +11,16 @@ from trunkline.identification.evaluation.error_tables import TABLED
 from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.identification.stages import STAGES, read_tables
 from trunkline.recordings.trials.splits import TEST, VALIDATE
-
-
-@dataclass(frozen=True)
-class ParameterEstimate:
-    """A parameter. low, high: of its 95 % interval, given the model."""
-
-    value: float
-    low: float
-    high: float
-    unit: str
+from trunkline.twin.posterior import Posterior
 
 
 @dataclass(frozen=True)
 class Results:
-    """parameters: by name, as the last stage that identified each has it. split: whose errors these are. trials: of
-    it. errors: (position, tip) in mm, by what they are of. All empty where no stage has run."""
+    """posterior: of the parameters. split: whose errors these are. trials: of it. errors: (position, tip) in mm, by
+    what they are of. All empty where no stage has run."""
 
     name: str
-    parameters: dict[str, ParameterEstimate]
+    posterior: Posterior
     split: str
     trials: int
     errors: dict[str, tuple[float, float]]
@@ -56,11 +47,7 @@ def read_results(name: str, folder: Path) -> Results:
     Raises:
         InputError: a file there is not what a stage writes.
     """
-    parameters, split, trials, errors = {}, "", 0, {}
-    for table in read_tables(folder / "artifacts").values():
-        for key, row in table["parameters"].items():
-            low, high = row["interval_95_given_model"]
-            parameters[key] = ParameterEstimate(row["value"], low, high, row["unit"])
+    posterior, split, trials, errors = Posterior.from_tables(read_tables(folder / "artifacts")), "", 0, {}
     scored = _read(folder / "artifacts/score/metrics.json")
     for stage in STAGES:
         scores, which = scored.get(stage, {}), TEST
@@ -70,19 +57,18 @@ def read_results(name: str, folder: Path) -> Results:
         if "identified" in compared and (which == TEST or split != TEST):
             split, trials = which, compared["identified"]["trials"]
             errors = {model: (row["e_position_mm"], row["e_tip_mm"]) for model, row in compared.items()}
-    return Results(name, parameters, split, trials, errors)
+    return Results(name, posterior, split, trials, errors)
 
 
 def drift(now: Results, before: Results) -> dict[str, Drift]:
     """Of the parameters that both have."""
-    drifts = {}
-    for name in now.parameters.keys() & before.parameters.keys():
-        parameter, new, old = parameter_named(name), now.parameters[name], before.parameters[name]
-        scale = parameter.scale if parameter.signed else 1.0
-        change = float(parameter.coordinate(new.value) - parameter.coordinate(old.value)) * scale
-        mine, theirs = (float(np.ptp(parameter.coordinate([row.low, row.high]))) / 2 * scale for row in (new, old))
-        drifts[name] = Drift(change, float(np.hypot(mine, theirs)))
-    return {name: drifts[name] for name in now.parameters if name in drifts}
+    drifts, new, old = {}, now.posterior, before.posterior
+    for i, name in enumerate(new.names):
+        if name in old.names:
+            j, scale = old.names.index(name), parameter_named(name).scale
+            change = float(new.estimate[i] - old.estimate[j]) * scale
+            drifts[name] = Drift(change, float(np.hypot(new.half_width[i], old.half_width[j])) * scale)
+    return drifts
 
 
 def _read(file: Path) -> dict:

@@ -23,16 +23,15 @@ def parameter_table(fleet: list[Results], drifts: dict[str, dict[str, Drift]]) -
     """A row a parameter, a column an arm: the value, its interval, and by how much it drifted."""
     lines = [f"| parameter | {' | '.join(arm.name for arm in fleet)} |", "|---|" + "---:|" * len(fleet)]
     for name in parameters_of(fleet):
-        unit = next(arm.parameters[name].unit for arm in fleet if name in arm.parameters)
-        cells = []
+        unit, cells = parameter_named(name).unit, []
         for arm in fleet:
-            estimate = arm.parameters.get(name)
-            if estimate is None:
+            if name not in arm.posterior.names:
                 cells.append("–")
                 continue
             change = drifts.get(arm.name, {}).get(name)
             suffix = "" if change is None else f", {drift_words(name, change)}"
-            cells.append(f"{_number(estimate.value)} ({_number(estimate.low)} to {_number(estimate.high)}){suffix}")
+            low, high = arm.posterior.interval(name)
+            cells.append(f"{_number(arm.posterior.value(name))} ({_number(low)} to {_number(high)}){suffix}")
         lines.append(f"| `{name}`{f', {unit}' if unit else ''} | {' | '.join(cells)} |")
     return lines
 
@@ -49,20 +48,21 @@ def drift_words(name: str, change: Drift) -> str:
 
 def parameters_of(fleet: list[Results]) -> list[str]:
     """Names of all that any arm has, in the order of the stages."""
-    return list(dict.fromkeys(name for arm in fleet for name in arm.parameters))
+    return list(dict.fromkeys(name for arm in fleet for name in arm.posterior.names))
 
 
 def long_table(fleet: list[Results], drifts: dict[str, dict[str, Drift]], since: dict[str, str]) -> pd.DataFrame:
     """A row an arm and number: parameters with intervals and drift (of ln(value), or in the unit), errors in mm."""
     rows = []
     for arm in fleet:
-        for name, estimate in arm.parameters.items():
+        for name in arm.posterior.names:
+            low, high = arm.posterior.interval(name)
             change = drifts.get(arm.name, {}).get(name)
             drifted = {} if change is None else {
                 "drift": change.change, "drift_half_width": change.half_width, "since": since[arm.name]
             }  # fmt: skip
-            row = {"arm": arm.name, "kind": "parameter", "name": name, "value": estimate.value, "low": estimate.low}
-            rows.append(row | {"high": estimate.high, "unit": estimate.unit} | drifted)
+            row = {"arm": arm.name, "kind": "parameter", "name": name, "value": arm.posterior.value(name), "low": low}
+            rows.append(row | {"high": high, "unit": parameter_named(name).unit} | drifted)
         for model, millimetres in arm.errors.items():
             for error, value in zip(("position", "tip"), millimetres, strict=True):
                 name = f"{model}_{error}_{arm.split}"

@@ -5,9 +5,11 @@ from pathlib import Path
 
 import mujoco
 
+from trunkline.errors import InputError
 from trunkline.identification.parameters.parameters import NAMES, SESSION_MARK
 from trunkline.identification.parameters.per_session import names_in
 from trunkline.identification.results.scoring import fingerprint
+from trunkline.identification.stages import TABLE
 from trunkline.pipeline.config import settings_of
 from trunkline.recordings.trials.trial import Trial, sessions_of
 from trunkline.twin.twin import Twin
@@ -52,5 +54,9 @@ def written_beside(twin: Twin, root: Path) -> Written:
     if not tables:
         settings = settings_of("identify_damping", root)
         return Written(settings.frames, settings.command_delay, {})
-    compared = list(tables.values())[-1]["compared"]
-    return Written(compared["frames"], compared["command_delay"], twin.provenance.fitted_to)
+    try:
+        compared = list(tables.values())[-1]["compared"]
+        return Written(compared["frames"], compared["command_delay"], twin.provenance.fitted_to)
+    except (KeyError, TypeError) as error:
+        where = f"{twin.provenance.model.parent}/{TABLE}"
+        raise InputError(f"{where}: {error!r}, expected what a stage of identification writes") from error

@@ -10,6 +10,7 @@ import argparse
 import io
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +21,9 @@ from trunkline.errors import InputError, in_one_line
 from trunkline.files import written_whole
 from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.program import program_name
-from trunkline.tools.randomize.fields import changed_fields, drawn_fields, of_model
+from trunkline.tools.randomize.fields import changed_fields, check_model, drawn_fields
 from trunkline.tools.randomize.file import to_table
-from trunkline.tools.randomize.randomization import of_arm, of_population
+from trunkline.tools.randomize.population import of_population
 from trunkline.twin.twin import Twin
 
 
@@ -36,22 +37,22 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("artifacts", type=Path, nargs="*", metavar="ARTIFACTS", default=[Path("artifacts")])
     parser.add_argument("--out", type=Path, metavar="JSON", default=Path("randomisation.json"))
     parser.add_argument("--widen", type=float, metavar="FACTOR", default=1.0,
-                        help="times all standard deviations, for more than what is known to be open")  # fmt: skip
+                        help="times all standard uncertainties, for more than what is known to be open")  # fmt: skip
     parser.add_argument("--draws", type=int, metavar="N", default=0, help="drawn models, into a .npz beside --out")
     parser.add_argument("--seed", type=int, default=0, help="of the draws")
     args = parser.parse_args(arguments)
     if args.widen < 0 or args.draws < 0:
         raise InputError("--widen, --draws: found a number below 0, expected 0 or more")
     twins = [Twin.load(folder) for folder in args.artifacts]
-    arms, model, provenance = [of_arm(twin.posterior) for twin in twins], twins[0].arm, twins[0].provenance
-    arms[0] = of_model(model, arms[0], str(provenance.model))
-    drawn = (of_population(arms) if len(arms) > 1 else arms[0]).widened(args.widen)
+    model, provenance = twins[0].arm, twins[0].provenance
+    check_model(twins[0])
+    posterior = of_population([twin.posterior for twin in twins]) if len(twins) > 1 else twins[0].posterior
+    posterior = replace(posterior, deviation=args.widen * posterior.deviation)
     which = {"file": provenance.model.name, "sha256": provenance.digest, "mujoco": mujoco.__version__}
-    table = to_table(drawn, changed_fields(model, drawn), which)
+    table = to_table(posterior, len(twins), changed_fields(model, posterior), which)
     if args.draws:
-        x = drawn.draw(args.draws, np.random.default_rng(args.seed))
         packed = io.BytesIO()
-        fields: dict[str, Any] = drawn_fields(model, drawn.values(x))
+        fields: dict[str, Any] = drawn_fields(model, posterior.sample(args.draws, args.seed))
         np.savez_compressed(packed, **fields)
         _write(args.out.with_suffix(".npz"), packed.getvalue())
     _write(args.out, (json.dumps(table, indent=1) + "\n").encode())

@@ -1,17 +1,15 @@
 """Drawn parameters as fields of a MuJoCo model, for simulations that each have their own."""
 
-from dataclasses import replace
-
 import mujoco
 import numpy as np
 
 from trunkline.errors import InputError
-from trunkline.identification.parameters.parameter import Fields
-from trunkline.identification.parameters.parameters import candidate_fields, parameter_named
-from trunkline.tools.randomize.randomization import Randomization
+from trunkline.identification.parameters.parameters import Fields, candidate_fields, parameter_named
+from trunkline.twin.posterior import Posterior
+from trunkline.twin.twin import Twin
 
 OWN = "numeric_data"  # numbers that MuJoCo only keeps: Trunkline's stepper reads them, others would not
-STEP = 1e-3  # of x
+STEP = 1e-3  # of z
 NEAR = 1e-4  # of a value; an MJCF keeps fewer digits than parameters.json
 
 
@@ -31,30 +29,34 @@ def drawn_fields(model: mujoco.MjModel, values: dict[str, np.ndarray]) -> Fields
     return {name: getattr(model, name) + (written[1:] - written[0]) for name, written in fields.items()}
 
 
-def changed_fields(model: mujoco.MjModel, drawn: Randomization) -> dict[str, dict[str, int]]:
+def changed_fields(model: mujoco.MjModel, posterior: Posterior) -> dict[str, dict[str, int]]:
     """By parameter, the fields of `model` that a step of it changes, and how many numbers of each."""
     by_parameter = {}
-    for i, name in enumerate(drawn.names):
-        x = STEP * np.eye(len(drawn.names))[[i, i]] * [[0], [1]]
-        fields = drawn_fields(model, drawn.values(x))
+    middle = {name: parameter_named(name).coordinate(parameter_named(name).read(model)) for name in posterior.names}
+    for stepped in posterior.names:
+        z = {name: place + (name == stepped) * np.array([0.0, STEP]) for name, place in middle.items()}
+        fields = drawn_fields(model, {name: parameter_named(name).value(places) for name, places in z.items()})
         changed = {field: int(np.sum(values[0] != values[1])) for field, values in fields.items()}
-        by_parameter[name] = {field: count for field, count in changed.items() if count}
+        by_parameter[stepped] = {field: count for field, count in changed.items() if count}
     return by_parameter
 
 
-def of_model(model: mujoco.MjModel, drawn: Randomization, where: str) -> Randomization:
-    """The same about what the model has, which is the centre but for the digits that its file lacks.
+def check_model(twin: Twin) -> None:
+    """Refuse a twin whose model has other values than its tables, but for the digits that a file lacks.
 
     Raises:
-        InputError: the model at `where` has other values, or lacks a part.
+        InputError: naming the first such parameter, or one that the model has not.
     """
-    centre = []
-    for name, stated in zip(drawn.names, drawn.centre, strict=True):
+    where, tables = twin.provenance.model, twin.provenance.tables.values()
+    if not twin.posterior.names:
+        raise InputError(f"{where}: found no parameters.json beside it, expected the artifacts of identification")
+    stated = {name: row["value"] for table in tables for name, row in table["parameters"].items()}
+    for name, expected in stated.items():
         parameter = parameter_named(name)
-        if not parameter.belongs_to(model):
-            raise InputError(f"{where}: {name}: found an arm without its part, expected the model that was identified")
-        centre.append(value := parameter.read(model))
-        if abs(value - stated) > NEAR * abs(stated) + NEAR**2:
+        if not parameter.belongs_to(twin.arm):
+            raise InputError(f"{where}: {name}: found no {parameter.part}, expected the model that was identified")
+        value = parameter.read(twin.arm)
+        if abs(value - expected) > NEAR * abs(expected) + NEAR**2:
             unit = f" {parameter.unit}" if parameter.unit else ""
-            raise InputError(f"{where}: {name}: found {value:.6g}, expected the {stated:.6g}{unit} of parameters.json")
-    return replace(drawn, centre=np.array(centre))
+            stated_value = f"{expected:.6g}{unit} of parameters.json"
+            raise InputError(f"{where}: {name}: found {value:.6g}, expected the {stated_value}")
