@@ -53,7 +53,7 @@ def main() -> int:
     parser.add_argument("--poses", type=int, default=COUNT, help=f"stop after so many of {COUNT}")
     arguments = parser.parse_args()
     twin, trials = Twin.load(ARTIFACTS), read_trials(TRIALS, DECIDING)
-    chain, conditions = read_chain(twin.arm), conditions_of(trials)
+    chain, conditions = read_chain(twin.arm.model), conditions_of(trials)
     rng = np.random.default_rng(SEED)
     poses = draw_poses(chain, conditions, COUNT, rng)
     pulls, back = pulls_of(chain, poses), rng.random(COUNT) < 0.5

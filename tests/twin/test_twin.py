@@ -29,7 +29,7 @@ def test_a_folder_of_artifacts_and_its_last_model_are_one_twin(artifacts):
     assert twin.provenance == alone.provenance
     assert list(twin.provenance.tables) == ["identify_stiffness", "identify_damping", "identify_control"]
     assert list(twin.provenance.files)[0] == (artifacts / "identify_control/arm.xml").as_posix()
-    assert twin.arm.nu > 0
+    assert twin.arm.model.nu > 0
     assert "kp" in twin.posterior.names
     assert same(twin.posterior, alone.posterior)
 

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from trunkline.errors import InputError
 from trunkline.files import file_digest
 from trunkline.identification.stages import MODEL, STAGES, TABLE, final_model, read_tables
+from trunkline.model.arm_model import ArmModel
 from trunkline.model_files import read_spec
 from trunkline.twin.package import MANIFEST, arm_of, manifest_of, package_digest, read_package, tables_of
 from trunkline.twin.posterior import Posterior
@@ -52,7 +53,7 @@ class Twin:
     and cables that rub. posterior: of its parameters."""
 
     spec: mujoco.MjSpec
-    arm: mujoco.MjModel
+    arm: ArmModel
     posterior: Posterior
     provenance: Provenance
 
@@ -84,7 +85,7 @@ class Twin:
         tables = read_tables(folder.parent, stages) if (folder / TABLE).is_file() else {}
         files = [path, *(folder.parent / stage / TABLE for stage in tables)]
         digests = {file.as_posix(): file_digest(file) for file in files}
-        return cls(spec, arm, Posterior.from_tables(tables), Provenance(path, digests, tables))
+        return cls(spec, ArmModel(arm), Posterior.from_tables(tables), Provenance(path, digests, tables))
 
     @classmethod
     def of_package(cls, files: dict[str, bytes]) -> "Twin":
@@ -92,7 +93,7 @@ class Twin:
         spec, tables, manifest = arm_of(files), tables_of(files), manifest_of(files)
         model = Path(manifest["hybrid"]["arm"])
         provenance = Provenance(model, manifest["sha256"], tables, package_digest(files), manifest["versions"])
-        return cls(spec, spec.compile(), Posterior.from_tables(tables), provenance)
+        return cls(spec, ArmModel(spec.compile()), Posterior.from_tables(tables), provenance)
 
 
 def _check_chain(model: mujoco.MjModel, path: Path) -> None:

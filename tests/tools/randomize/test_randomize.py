@@ -109,7 +109,7 @@ def test_previews_and_the_certificate_draw_the_same_numbers_from_the_same_seed(w
     with np.load(written.with_suffix(".npz")) as packed:
         for name, values in expected.items():
             np.testing.assert_array_equal(packed[name], values)
-    certified = parameter_shifts(twin.arm, twin.posterior, *poses_of(model), 5, np.random.default_rng(0))
+    certified = parameter_shifts(twin.arm.model, twin.posterior, *poses_of(model), 5, np.random.default_rng(0))
     stated = [arm.tips(poses_of(model)[1]) for arm in arms_with(model, drawn)]
     np.testing.assert_allclose(certified + arm_of(model).tips(poses_of(model)[1]), stated, atol=1e-9)
 
