@@ -14,7 +14,8 @@ from trunkline.twin.twin import Provenance, Twin
 def twin_of(model: mujoco.MjModel, tables: dict[str, dict] | None = None) -> Twin:
     """Of a model, as if stages had written `tables` of it."""
     tables = tables or {}
-    return Twin(mujoco.MjSpec(), ArmModel(model), Posterior.from_tables(tables), Provenance(Path("arm.xml"), {}, tables))
+    provenance = Provenance(Path("arm.xml"), {}, tables)
+    return Twin(mujoco.MjSpec(), ArmModel(model), Posterior.from_tables(tables), provenance)
 
 
 def posterior_about(
