@@ -63,8 +63,11 @@ class Posterior:
                 for j, other in enumerate(stages):
                     if i != j and stage == other:
                         correlation[i, j] = tables[stage]["correlation"][name][names[j]]
-            except (KeyError, TypeError, ValueError) as error:
-                complaint = f"{error!r}, expected what a stage of identification writes"
+            except KeyError as error:
+                way_out = "expected it: make artifacts and packages of an earlier release anew"
+                raise InputError(f"{stage}/parameters.json: {name}: found no {error}, {way_out}") from error
+            except (TypeError, ValueError) as error:
+                complaint = f"found {error}, expected what a stage of identification writes"
                 raise InputError(f"{stage}/parameters.json: {name}: {complaint}") from error
         estimate, half, degrees, low, high = rows.T
         return cls(names, stages, estimate, half / stdtrit(degrees, 0.975), degrees, correlation, low, high)

@@ -258,7 +258,7 @@ def test_what_is_no_identified_arm_is_one_line_and_writes_nothing(spoil, tmp_pat
         expected = "arm.xml: stiffness: found "
     if spoil == "json":
         (folder / "identify_control/parameters.json").write_text('{"parameters": {"kp": {}}}')
-        expected = "expected what a stage of identification writes"
+        expected = "identify_control/parameters.json: kp: found no 'interval_95_given_model', expected it: make"
     if spoil == "parameter":
         path = folder / "identify_control/parameters.json"
         path.write_text(path.read_text().replace("force_range", "kp_ratio"))
