@@ -54,7 +54,7 @@ def test_the_interval_of_the_draws_is_the_stated_one_where_the_range_cuts_it():
     [
         ({"parameters": {"kp_ratio": {}}}, "parameters: found 'kp_ratio', expected one of"),
         ({"parameters": {"kp": {"interval_95_given_model": [None, None]}}}, "expected two numbers that rise"),
-        ({"parameters": {"kp": {}}}, "identify_control/parameters.json: kp: KeyError"),
+        ({"parameters": {"kp": {}}}, "identify_control/parameters.json: kp: found no 'interval_95_given_model'"),
     ],
 )
 def test_what_is_no_table_is_one_line(broken, message):
