@@ -12,7 +12,7 @@ from rehearsal import settings
 from rehearsal.experiments.bench import ORIGINS, rehearse
 from rehearsal.operator.hands import RayHand
 from rehearsal.operator.scripts import Operator
-from rehearsal.session import RATE, REFERENCE, RehearsedRobot, Session
+from rehearsal.session import RATE, REFERENCE, TICKS, RehearsedRobot, Session
 from tests.ar.teleop.test_plan import BENT, LIMITS, NETWORK, OFFSET, START, STRAIGHT
 from tests.support.operator import PACKAGE, Everywhere, config
 from trunkline.ar.hybrid.rollout_batch import Stated
@@ -77,7 +77,7 @@ class Sent:
         self.sent.append(np.append(joints, pulls))
 
     def advance(self, dt):
-        pass
+        self.time += dt
 
 
 def session(off: list[float]) -> tuple[Session, Operator]:
@@ -222,6 +222,17 @@ def test_a_rehearsed_robot_does_not_begin_without_a_permit():
     frames(robot, 60, permits=False)
     np.testing.assert_array_equal(robot.axes.joints, START)
     assert not robot.moved
+
+
+def test_a_rehearsed_robot_is_sent_where_its_axes_are_and_outlasts_a_few_frames_without_a_permit():
+    robot, plan = rehearsed(stand_in := Sent())
+    assert robot.start(plan, plan.digest()) == ""
+    while robot.state().mode == "running":
+        frames(robot, 1, permits=True)
+        frames(robot, int(DEAD_MAN * RATE) - 1, permits=False)
+        np.testing.assert_array_equal(stand_in.sent[-1], [*robot.axes.joints, *(STRAIGHT - robot.axes.commands)])
+    assert robot.state() == ExecutorReport("done", plan.digest())
+    assert stand_in.time == pytest.approx(len(stand_in.sent) / RATE / TICKS)
 
 
 @pytest.mark.parametrize(("follows", "count"), [(False, 40), (True, 15)])  # frames until it is under way
