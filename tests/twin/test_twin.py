@@ -54,6 +54,15 @@ def test_a_package_has_the_same_posterior_packed_and_unpacked(artifacts, tmp_pat
     assert packed.provenance.fitted_to == made_of.provenance.fitted_to
 
 
+@pytest.mark.parametrize("damaged", ["Runtime/Model/parameters.json", "Runtime/Model/calibrated.xml"])
+def test_a_damaged_package_is_one_line(damaged):
+    with pytest.raises(InputError, match=f"{damaged}: found sha256"):
+        Twin.of_package(read_tarball(package()) | {damaged: b"{"})
+    files = {path: data for path, data in read_tarball(package()).items() if path != damaged}
+    with pytest.raises(InputError, match=f"{damaged}: found sha256 none"):
+        Twin.of_package(files)
+
+
 def test_a_model_that_no_stage_identified_leaves_nothing_open(artifacts, tmp_path):
     shutil.copy(artifacts / "identify_control/arm.xml", tmp_path / "arm.xml")
     twin = Twin.load(tmp_path / "arm.xml")

@@ -89,10 +89,15 @@ class Twin:
 
     @classmethod
     def of_package(cls, files: dict[str, bytes]) -> "Twin":
-        """From a package's files by path."""
-        spec, tables, manifest = arm_of(files), tables_of(files), manifest_of(files)
+        """From a package's files by path.
+
+        Raises:
+            InputError: a file is not the one that the manifest means, or the package has no arm to preview with.
+        """
+        manifest, digest = manifest_of(files), package_digest(files)
+        spec, tables = arm_of(files), tables_of(files)
         model = Path(manifest["hybrid"]["arm"])
-        provenance = Provenance(model, manifest["sha256"], tables, package_digest(files), manifest["versions"])
+        provenance = Provenance(model, manifest["sha256"], tables, digest, manifest["versions"])
         return cls(spec, ArmModel(spec.compile()), Posterior.from_tables(tables), provenance)
 
 
