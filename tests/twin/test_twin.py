@@ -40,6 +40,16 @@ def test_an_earlier_model_knows_no_later_table(artifacts):
     ]  # fmt: skip
 
 
+def test_in_a_stage_s_own_folder_its_model_knows_the_tables_before_it(artifacts, monkeypatch):
+    there = Twin.load(artifacts / "identify_control/arm.xml")
+    monkeypatch.chdir(artifacts / "identify_control")
+    here = Twin.load("arm.xml")
+    assert list(here.provenance.tables) == list(there.provenance.tables)
+    assert here.provenance.fitted_to == there.provenance.fitted_to
+    assert here.provenance.digest == there.provenance.digest
+    assert same(here.posterior, there.posterior)
+
+
 def test_a_package_has_the_same_posterior_packed_and_unpacked(artifacts, tmp_path):
     files = read_tarball(package())
     for path, data in files.items():

@@ -78,7 +78,7 @@ class Twin:
         """From the MJCF at `path`: a chain of hinges that hangs from the world's origin."""
         if not path.is_file():
             raise InputError(f"{path}: no such file, expected the MJCF of an arm")
-        spec, folder = read_spec(path), path.parent
+        spec, folder = read_spec(path), path.parent if path.parent.name else path.parent.resolve()
         arm = spec.compile()
         _check_chain(arm, path)
         stages = STAGES[: STAGES.index(folder.name) + 1] if folder.name in STAGES else (folder.name,)
