@@ -40,6 +40,16 @@ def test_an_earlier_model_knows_no_later_table(artifacts):
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize("stage", ["identify_damping", "identify_control"])
+def test_a_stage_that_ran_without_a_table_is_refused(stage, artifacts, tmp_path):
+    """Else what it identified would count as known to the last digit."""
+    for name in ("identify_stiffness", "identify_damping", "identify_control"):
+        shutil.copytree(artifacts / name, tmp_path / name)
+    (tmp_path / stage / "parameters.json").unlink()
+    with pytest.raises(InputError, match=f"{stage}/parameters.json"):
+        Twin.load(tmp_path)
+
+
 def test_in_a_stage_s_own_folder_its_model_knows_the_tables_before_it(artifacts, monkeypatch):
     there = Twin.load(artifacts / "identify_control/arm.xml")
     monkeypatch.chdir(artifacts / "identify_control")

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from trunkline.errors import InputError
 from trunkline.files import file_digest
-from trunkline.identification.stages import MODEL, STAGES, TABLE, final_model, read_tables
+from trunkline.identification.stages import MODEL, STAGES, TABLE, final_model, read_table, read_tables
 from trunkline.model.arm_model import ArmModel
 from trunkline.model_files import read_spec
 from trunkline.twin.package import MANIFEST, arm_of, manifest_of, package_digest, read_package, tables_of
@@ -81,8 +81,12 @@ class Twin:
         spec, folder = read_spec(path), path.parent if path.parent.name else path.parent.resolve()
         arm = spec.compile()
         _check_chain(arm, path)
-        stages = STAGES[: STAGES.index(folder.name) + 1] if folder.name in STAGES else (folder.name,)
-        tables = read_tables(folder.parent, stages) if (folder / TABLE).is_file() else {}
+        if folder.name in STAGES:
+            stages = STAGES[: STAGES.index(folder.name) + 1]
+            ran = [s for s in stages if any((folder.parent / s / name).is_file() for name in (MODEL, TABLE))]
+            tables = {stage: read_table(folder.parent / stage / TABLE) for stage in ran}
+        else:
+            tables = read_tables(folder.parent, (folder.name,))
         files = [path, *(folder.parent / stage / TABLE for stage in tables)]
         digests = {file.as_posix(): file_digest(file) for file in files}
         return cls(spec, ArmModel(arm), Posterior.from_tables(tables), Provenance(path, digests, tables))
