@@ -86,6 +86,7 @@ class Posterior:
         """What was identified, in the parameter's unit."""
         return float(parameter_named(name).value(self.estimate[self.names.index(name)]))
 
+    @np.errstate(over="ignore")  # far draws of a few degrees of freedom, which the range cuts
     def values(self, z: np.ndarray) -> dict[str, np.ndarray]:
         """By name, in the parameters' units, from z of shape (D, P), no further out than the range."""
         return {

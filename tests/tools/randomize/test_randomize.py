@@ -246,7 +246,7 @@ def test_widened_it_spreads_as_much_more(tmp_path, written):
     assert wide["centre"] == pytest.approx(narrow["centre"])
 
 
-@pytest.mark.parametrize("spoil", ["nothing", "model", "json", "parameter"])
+@pytest.mark.parametrize("spoil", ["nothing", "model", "json", "parameter", "part"])
 def test_what_is_no_identified_arm_is_one_line_and_writes_nothing(spoil, tmp_path, capsys):
     folder, out = tmp_path / "artifacts", tmp_path / "out.json"
     expected = "found no identify_stiffness/arm.xml"
@@ -263,6 +263,10 @@ def test_what_is_no_identified_arm_is_one_line_and_writes_nothing(spoil, tmp_pat
         path = folder / "identify_control/parameters.json"
         path.write_text(path.read_text().replace("force_range", "kp_ratio"))
         expected = "'kp_ratio'"
+    if spoil == "part":
+        path = folder / "identify_control/parameters.json"
+        path.write_text(path.read_text().replace("force_range", "tendon_angle_9"))
+        expected = "arm.xml: tendon_angle_9: found an arm without its part, expected the model that was identified"
     assert main([str(folder), "--out", str(out)]) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert expected in line

@@ -54,7 +54,8 @@ def check_model(twin: Twin) -> None:
     for name, expected in stated.items():
         parameter = parameter_named(name)
         if not parameter.belongs_to(twin.arm.model):
-            raise InputError(f"{where}: {name}: found no {parameter.part}, expected the model that was identified")
+            problem = "found an arm without its part, expected the model that was identified"
+            raise InputError(f"{where}: {name}: {problem}")
         value = parameter.read(twin.arm.model)
         if abs(value - expected) > NEAR * abs(expected) + NEAR**2:
             unit = f" {parameter.unit}" if parameter.unit else ""
