@@ -7,6 +7,7 @@ done; stopped, it goes on from there. Rows of other code, other settings or anot
 """
 
 import argparse
+import contextlib
 import sys
 import time
 from dataclasses import asdict, astuple, fields
@@ -25,7 +26,6 @@ from trunkline.model_files import read_spec
 from trunkline.pipeline.config import validated
 from trunkline.report.figures.style import save_figure
 from trunkline.settings import read_yaml
-from upkeep.results import recorded
 
 MODEL = Path("artifacts/identify_control/arm.xml")
 SETTINGS = Path("studies/payload/payload.yaml")
@@ -75,10 +75,8 @@ def main() -> int:
         is_whole = rows is not None and len(table) == len(cells(chart))
         if is_whole:
             save_figure(payload_figure(table), FIGURE)
-        with recorded("payload", keep=is_whole, origin=rows and rows.origin):
+        with contextlib.nullcontext() if rows is None else rows.recorded(is_whole):
             print(table[[*KEYS, *FOUND]].to_string(index=False))
-            if rows is not None and (line := rows.attempts()):
-                print(line)
     if grasps:
         print(f"{grasps} grasps, {(time.process_time() - begun) / grasps:.2f} s of processor each")
     return 0

@@ -143,8 +143,8 @@ def try_masses(arm: mujoco.MjSpec, chart: PayloadSettings, cell: Cell, wrap: flo
             if middle[2] + thing.half_height > 0:
                 raise InputError(f"height: found {chart.height} m, expected an object below the mount")
         surfaces = {TABLE: SupportSurface([0.0, 0.0, top], list(TABLE_SIZE), "wood")}
-    mount, world = FixedMount("fixed"), WorldGeometry(None, surfaces, hook)
-    model = compose(arm, mount, world, Placed(thing, middle, quaternion, hanging)).compile()
+    world = WorldGeometry(None, surfaces, hook)
+    model = compose(arm, FixedMount("fixed"), world, Placed(thing, middle, quaternion, hanging)).compile()
     model.opt.timestep = chart.timestep
     draws = np.random.default_rng(chart.seed).normal(size=(chart.placements, 2)) * chart.spread
     poses = np.tile([*middle, *quaternion], (chart.placements, 1))
@@ -156,7 +156,7 @@ def try_masses(arm: mujoco.MjSpec, chart: PayloadSettings, cell: Cell, wrap: flo
     tries = Tries(
         np.tile(poses, (len(masses), 1)), np.repeat(masses, chart.placements), pulls, np.full(count, cell.friction)
     )
-    return try_grasps(model, compose(arm, mount).compile(), tries, chart.schedule, tuple(surfaces))
+    return try_grasps(model, tries, chart.schedule, tuple(surfaces))
 
 
 def heaviest(arm: mujoco.MjSpec, chart: PayloadSettings, cell: Cell) -> HeaviestMass:
