@@ -4,9 +4,11 @@ A row says what it was made of, and of which code (upkeep/origin.py). Rows of an
 other code stay in the table, and count for nothing. What is done once more is a further row: the first one counts.
 """
 
+import contextlib
 import csv
 import hashlib
 import io
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +16,7 @@ import pandas as pd
 
 from trunkline.files import written_whole
 from upkeep.origin import Origin, origin_of
-from upkeep.results import FOLDER, command_line, modules_of
+from upkeep.results import FOLDER, command_line, modules_of, recorded
 
 TEXTS = ("made_of", "commit", "code")  # columns
 
@@ -70,6 +72,15 @@ class Rows:
         self.folder.mkdir(parents=True, exist_ok=True)
         with written_whole(self.path) as part:
             part.write_text(_text([*rows, {self.key: key, **cells, **last}]), encoding="utf-8")
+
+    @contextlib.contextmanager
+    def recorded(self, keep: bool) -> Iterator[None]:
+        """What is printed meanwhile goes to docs/results/<name>.json, of the rows' origin; a last line says what is in
+        the table beside the rows that count."""
+        with recorded(self.name, keep, origin=self.origin):
+            yield
+            if line := self.attempts():
+                print(line)
 
     def attempts(self) -> str:
         """A line that says what is in the table beside the rows that count; "" where there is nothing."""

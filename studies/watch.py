@@ -31,8 +31,8 @@ from demo.record import Config
 from demo.recorder import write_log, write_session
 from demo.rig import ROOT
 from demo.truth import Truth
-from studies.demo_session import require_demo
 from studies.rows import Rows, digest
+from studies.stage_chain import require_demo
 from trunkline.compute.progress import progress
 from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.config import load_config
@@ -45,7 +45,6 @@ from trunkline.tools.monitor.history import read_score, score_row
 from trunkline.tools.monitor.loading import load_logs
 from trunkline.tools.monitor.monitor import LEARN, scorer_of
 from trunkline.tools.monitor.scores import Score, Scorer
-from upkeep.results import recorded
 
 MODEL, TRIALS = Path("artifacts/identify_control/arm.xml"), Path("data/processed/filter")
 SOFTER = 0.95  # of the stiffness
@@ -289,11 +288,8 @@ def main() -> int:
         reference = referred(rows, scorer)
         trials = wanted(arguments.seeds, arguments.unchanged)
         collect(rows, trials, scorer)
-        known, whole = rows.read(), (arguments.seeds, arguments.unchanged) == (SEEDS, sum(EACH.values()))
-        with recorded("watch", keep=whole, origin=rows.origin):
-            report(reference, trials, known, arguments.seeds, scorer)
-            if line := rows.attempts():
-                print(line)
+        with rows.recorded((arguments.seeds, arguments.unchanged) == (SEEDS, sum(EACH.values()))):
+            report(reference, trials, rows.read(), arguments.seeds, scorer)
     return 0
 
 
