@@ -94,10 +94,10 @@ FAULTS = (
     Fault("server killed -9", lambda s: s.signal(signal.SIGKILL)),
     Fault("log's process killed", _kill("journal")),
     Fault("robot's process killed", _kill("robot")),
-    Fault(f"a motor silent for {1e3 * HUSH:g} ms", lambda s: s.witness.hush(), motors=True),
+    Fault(f"a motor silent for {1e3 * HUSH:g} ms", lambda s: s.witness.signal_motors(signal.SIGUSR1), motors=True),
     Fault("machine's process killed, with motors", _kill("robot"), motors=True),
-    Fault("motors' process hangs", lambda s: os.kill(s.witness.motors, signal.SIGSTOP), motors=True),
-    Fault("motors' process killed", lambda s: os.kill(s.witness.motors, signal.SIGKILL), motors=True),
+    Fault("motors' process hangs", lambda s: s.witness.signal_motors(signal.SIGSTOP), motors=True),
+    Fault("motors' process killed", lambda s: s.witness.signal_motors(signal.SIGKILL), motors=True),
 )
 
 

@@ -91,7 +91,7 @@ def running(package: Path, motors: bool = False) -> Iterator[Session]:
         InputError: it ends before it begins.
     """
     context = multiprocessing.get_context("spawn")
-    witness, (pipe, theirs) = Witness(context), context.Pipe()
+    witness, (pipe, theirs) = context.RawValue(Witness), context.Pipe()
     server = context.Process(target=serve, args=(theirs, witness, package, motors), name="server")
     server.start()
     theirs.close()

@@ -11,7 +11,6 @@ import argparse
 import json
 import sys
 import tempfile
-from collections.abc import Callable
 from contextlib import redirect_stdout
 from copy import deepcopy
 from dataclasses import replace
@@ -49,9 +48,16 @@ from trunkline.tools.monitor.scores import Score, Scorer
 MODEL, TRIALS = Path("artifacts/identify_control/arm.xml"), Path("data/processed/filter")
 SOFTER = 0.95  # of the stiffness
 SEED, SEEDS = 8, 20
-KINDS = ("static_tilt", "release", "curl", "static_pull", "motion")  # a number of its own for the draws of each
 EACH = {"static_tilt": 160, "release": 130, "static_pull": 60, "curl": 40, "motion": 10}  # of the unchanged arm
 AFTER = {"static_tilt": 3, "release": 3, "curl": 3, "static_pull": 3}  # of the softer one, a seed
+PERFORMED = {  # the laboratory's method of a kind, and whether it draws
+    "static_tilt": (Laboratory.tilts, True),
+    "release": (Laboratory.releases, False),
+    "curl": (Laboratory.curls, False),
+    "static_pull": (Laboratory.pulls, False),
+    "motion": (Laboratory.motions, True),
+}
+KINDS = tuple(PERFORMED)  # a number of its own for the draws of each
 TELLING = ("static_tilt", "release")  # kinds that tell stiffness well
 BEFORE = 8  # trials of the unchanged arm with which a chart begins
 LATEST = 3  # trials within which a change should be found
@@ -81,14 +87,8 @@ def planned(kind: str, base: Experiments, rng: np.random.Generator) -> Experimen
 
 def done(lab: Laboratory, kind: str, plan: Experiments, rng: np.random.Generator) -> Truth:
     """The trial of a kind."""
-    ways: dict[str, Callable[[], list[Truth]]] = {
-        "static_tilt": lambda: lab.tilts(plan, rng),
-        "release": lambda: lab.releases(plan),
-        "curl": lambda: lab.curls(plan),
-        "static_pull": lambda: lab.pulls(plan),
-        "motion": lambda: lab.motions(plan, rng),
-    }
-    return ways[kind]()[0]
+    perform, draws = PERFORMED[kind]
+    return perform(lab, plan, *([rng] if draws else []))[0]
 
 
 def softened(plant: Plant) -> Plant:
