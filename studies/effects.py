@@ -1,6 +1,6 @@
 """Which physics an arm needs: a Markdown table, the simplest model first.
 
-    python -m studies.effects [--folds N] [--only NAME ...]
+    python -m studies.effects [--only NAME ...]
 
 Needs the filtered trials of a session. The simplest model has springs, dampers and prompt motors alone. Effects are
 tried one after the other, each in the stage that identifies it: the stage is fitted with and without it, trials of the
@@ -93,7 +93,7 @@ EFFECTS: dict[str, ModelEffect] = {
     "dead_time": ModelEffect("dead time", "identify_control", ranges(0.001, 0.2, "dead_time"), dead_time=0.02),
     "lag": ModelEffect("lag of the motors", "identify_control", ranges(0.002, 0.3, "time_constant"), lag=0.02),
 }  # fmt: skip
-FOLDS = 3
+FOLDS = 3  # groups of trials that are left out in turn
 NO_LAG = 1e-6  # s; MuJoCo's filter wants some
 OPTIONAL = {name for effect in EFFECTS.values() for name in effect.parameters}
 
@@ -124,12 +124,12 @@ def settings_of(stage: str, effects: list[ModelEffect]) -> IdentificationSetting
     return replace(config, parameters=parameters, per_joint=[])
 
 
-def left_out(link: StageChain, stage: str, folds: int) -> np.ndarray:
+def left_out(link: StageChain, stage: str) -> np.ndarray:
     """Position error of every trial to identify from, not having been seen by the last stage's fit, mm."""
     kinds = settings_of(stage, []).experiments
     fitted = [e for e in link.experiments if e.kind in kinds]
     with contextlib.redirect_stdout(sys.stderr):
-        table = errors_left_out(stage, link.result, fitted, link.fit, folds)
+        table = errors_left_out(stage, link.result, fitted, link.fit, FOLDS)
     return table[table["model"] == "identified"]["e_position_mm"].to_numpy()
 
 
@@ -163,7 +163,7 @@ def validated(title: str, link: StageChain, trials: list[Trial], cad: mujoco.MjM
     return rows
 
 
-def tried(names: list[str], table: Rows, folds: int, chains: dict[str, StageChain]) -> list[ModelEffect]:
+def tried(names: list[str], table: Rows, chains: dict[str, StageChain]) -> list[ModelEffect]:
     """The effects that are kept of those to try. Rows that the table lacks are added."""
     done, kept, last = table.read(), [], ("", np.array([]))
     for name in names:
@@ -171,8 +171,8 @@ def tried(names: list[str], table: Rows, folds: int, chains: dict[str, StageChai
         if name not in done:
             begun, stage = time.perf_counter(), effect.stage
             if last[0] != stage:  # else what stood after the last effect of the stage is what stands before this one
-                last = stage, left_out(chain(kept, stage, chains), stage, folds)
-            errors = left_out(chain([*kept, effect], stage, chains), stage, folds)
+                last = stage, left_out(chain(kept, stage, chains), stage)
+            errors = left_out(chain([*kept, effect], stage, chains), stage)
             gain = last[1] - errors
             standard_error = gain.std(ddof=1) / np.sqrt(len(gain))
             pays = bool(gain.mean() > standard_error)
@@ -199,17 +199,16 @@ def effect_table(rows: dict[str, dict]) -> str:
 @in_one_line
 def main() -> int:
     parser = argparse.ArgumentParser(prog="studies.effects", description=__doc__)
-    parser.add_argument("--folds", type=int, default=FOLDS, help="groups of trials that are left out in turn")
     parser.add_argument("--only", nargs="+", choices=EFFECTS, default=list(EFFECTS), help="effects to try")
     arguments = parser.parse_args()
     require_demo(CAD_MODEL)
     chains: dict[str, StageChain] = {}
     every = [settings_of(stage, list(EFFECTS.values())) for stage in STAGES]
-    made_of = [load_config(CadConfig, "build_mjcf"), every, list(EFFECTS.values()), arguments.folds, arguments.only]
-    is_whole = arguments.only == list(EFFECTS) and arguments.folds == FOLDS
+    made_of = [load_config(CadConfig, "build_mjcf"), every, list(EFFECTS.values()), FOLDS, arguments.only]
+    is_whole = arguments.only == list(EFFECTS)
     table = Rows("effects" if is_whole else "effects_part", digest(made_of, TRIALS), "effect")
     with table.recorded(is_whole):
-        kept = tried(arguments.only, table, arguments.folds, chains)
+        kept = tried(arguments.only, table, chains)
         print(effect_table(table.read()))
         words = "the tip's also in % of length; null: the mean shape at rest; CAD: the model without data"
         print(f"\nErrors on `validate`, {words}.\n")

@@ -84,14 +84,12 @@ class Rows:
 
     def attempts(self) -> str:
         """A line that says what is in the table beside the rows that count; "" where there is nothing."""
-        counted, uncounted = len(self.read()), self.uncounted()
-        others = [row for row in uncounted if not self._counts(row)]
-        again = len(uncounted) - len(others)
+        others = [row for row in self._every() if not self._counts(row)]
+        counted, again = len(self.read()), len(self.uncounted()) - len(others)
         words = [f"{again} further attempts, which do not count"] if again else []
-        commits = ", ".join(dict.fromkeys(row.get("commit") or "none that is named" for row in others))
-        words += (
-            [f"{len(others)} rows of other code or settings, which do not count (commits {commits})"] if others else []
-        )
+        if others:
+            commits = ", ".join(dict.fromkeys(row.get("commit") or "none that is named" for row in others))
+            words.append(f"{len(others)} rows of other code or settings, which do not count (commits {commits})")
         return f"{counted} rows, and {' and '.join(words)}" if words else ""
 
     def uncounted(self) -> list[dict[str, str]]:

@@ -7,7 +7,6 @@ stands the demo session's, which were planned and not drawn. Trials that are sco
 as they take long; the charts are made anew from them.
 """
 
-import argparse
 import json
 import sys
 import tempfile
@@ -112,13 +111,11 @@ def scored(lab: Laboratory, config: Config, kind: str, rng: np.random.Generator,
     return scorer.score(taken.trials[truth.name])
 
 
-def wanted(seeds: int, unchanged: int) -> list[tuple[str, str, int]]:
-    """Arm, kind and number of every trial, in the order in which they are done."""
-    after = [("softer", kind, i) for kind, each in AFTER.items() for i in range(each * seeds)]
+def wanted() -> list[tuple[str, str, int]]:
+    """Arm, kind and number of every trial, in the order in which they are done; the unchanged arm's are mixed."""
+    after = [("softer", kind, i) for kind, each in AFTER.items() for i in range(each * SEEDS)]
     before = [("unchanged", kind, i) for kind, each in EACH.items() for i in range(each)]
-    order = np.random.default_rng(SEED).permutation(len(before))  # the mixture is the same, however many are done
-    first = len(TELLING) * AFTER[TELLING[0]] * seeds
-    return after[:first] + [before[i] for i in order[:unchanged]] + after[first:]
+    return after + [before[i] for i in np.random.default_rng(SEED).permutation(len(before))]
 
 
 def collect(rows: Rows, trials: list[tuple[str, str, int]], scorer: Scorer) -> None:
@@ -245,7 +242,7 @@ def outcome(empty: Chart, case: tuple[list[Score], list[Score]]) -> tuple[int, C
     return 0, chart
 
 
-def report(reference: list[Score], trials: list, rows: dict[str, dict], seeds: int, scorer: Scorer) -> None:
+def report(reference: list[Score], trials: list, rows: dict[str, dict], scorer: Scorer) -> None:
     """What the scores so far say."""
     names = scorer.parameters
     told = {key: str(rows[name]["told"]) for key in trials if (name := "_".join(map(str, key))) in rows}
@@ -253,11 +250,11 @@ def report(reference: list[Score], trials: list, rows: dict[str, dict], seeds: i
     scores = {key: unpacked(text) for key, text in told.items() if not text.startswith("refused")}
     unchanged = [score for (arm, _, _), score in scores.items() if arm == "unchanged"]
     softer = {kind: {i: s for (arm, k, i), s in scores.items() if (arm, k) == ("softer", kind)} for kind in AFTER}
-    orders = [np.random.default_rng([SEED, seed]).permutation(len(unchanged)) for seed in range(seeds)]
+    orders = [np.random.default_rng([SEED, seed]).permutation(len(unchanged)) for seed in range(SEEDS)]
     mixed = [[unchanged[i] for i in order] for order in orders]
     firsts = [[s for kind in KINDS for s in [s for s in own if s.kind == kind][:LEARN]] for own in mixed]
     seen, wolf = [], []
-    for words, references in (("as they come", firsts), ("as planned", [reference] * seeds)):
+    for words, references in (("as they come", firsts), ("as planned", [reference] * SEEDS)):
         known = [{id(score) for score in own} for own in references]
         rests = [[score for score in own if id(score) not in ids] for own, ids in zip(mixed, known, strict=True)]
         made = {id(own): chart_of(Baseline(own), len(names)) for own in references}
@@ -276,20 +273,16 @@ def report(reference: list[Score], trials: list, rows: dict[str, dict], seeds: i
 
 @in_one_line
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="studies.watch", description=__doc__)
-    parser.add_argument("--seeds", type=int, default=SEEDS, help="charts of the softer arm, of each kind of trial")
-    parser.add_argument("--unchanged", type=int, default=sum(EACH.values()), help="trials of the other, at most")
-    arguments = parser.parse_args()
     require_demo(MODEL)
     scorer = scorer_of(MODEL, Path("."))
     lab = [*sorted(Path("demo").rglob("*.py")), ROOT / "conf"]
     rows = Rows("watch", digest((SEED, SOFTER, scorer.parameters), MODEL, TRIALS, *lab), "trial")
     with threadpool_limits(1, user_api="blas"):
         reference = referred(rows, scorer)
-        trials = wanted(arguments.seeds, arguments.unchanged)
+        trials = wanted()
         collect(rows, trials, scorer)
-        with rows.recorded((arguments.seeds, arguments.unchanged) == (SEEDS, sum(EACH.values()))):
-            report(reference, trials, rows.read(), arguments.seeds, scorer)
+        with rows.recorded(keep=True):
+            report(reference, trials, rows.read(), scorer)
     return 0
 
 

@@ -50,7 +50,7 @@ WORTH = {"hardening": 1.0, "round": -0.5, "place": 0.25, "branch": 0.5}  # mm by
 def test_an_effect_is_kept_if_it_pays_and_is_not_tried_twice(monkeypatch, tmp_path):
     fits = []
 
-    def left_out(kept, stage, folds):
+    def left_out(kept, stage):
         fits.append((stage, len(kept)))
         noise = 0.1 * np.array([-1, 1, 0]) * len(kept)
         return 5.0 - sum(WORTH[name] for name in WORTH if EFFECTS[name] in kept) + noise
@@ -58,7 +58,7 @@ def test_an_effect_is_kept_if_it_pays_and_is_not_tried_twice(monkeypatch, tmp_pa
     monkeypatch.setattr(effects, "left_out", left_out)
     monkeypatch.setattr(effects, "chain", lambda kept, stage, chains: kept)
     table = Rows("effects", "arm", "effect", tmp_path, Origin("aaaaaaa", "", {}))
-    kept = tried(["hardening", "round", "place"], table, 3, {})
+    kept = tried(["hardening", "round", "place"], table, {})
     assert kept == [EFFECTS["hardening"], EFFECTS["place"]]
     assert fits == [("identify_stiffness", number) for number in (0, 1, 2, 2)]
     rows = table.read()
@@ -68,6 +68,6 @@ def test_an_effect_is_kept_if_it_pays_and_is_not_tried_twice(monkeypatch, tmp_pa
         ("yes", pytest.approx(0.25), pytest.approx(4.0)),
     ]
     fits.clear()
-    assert tried(list(WORTH), table, 3, {}) == [*kept, EFFECTS["branch"]]
+    assert tried(list(WORTH), table, {}) == [*kept, EFFECTS["branch"]]
     assert fits == [("identify_damping", 2), ("identify_damping", 3)]
     assert list(table.read()) == list(WORTH)
