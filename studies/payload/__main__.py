@@ -16,7 +16,7 @@ from pathlib import Path
 import pandas as pd
 from omegaconf import OmegaConf
 
-from studies.payload.chart import Cell, HeaviestMass, PayloadSettings, cells, chart_rows
+from studies.payload.chart import Cell, HeaviestMass, PayloadSettings, cells, heaviest
 from studies.payload.figure import payload_figure
 from studies.rows import Rows, digest
 from trunkline.ar.hybrid.friction import IMPRATIO, SOLIMP, SOLREF
@@ -59,10 +59,11 @@ def main() -> int:
     made_of = digest((sorted(settings.items()), IMPRATIO, SOLREF, SOLIMP), MODEL)
     rows = None if options.quick else Rows("payload", made_of, "cell")
     outcomes = {} if rows is None else rows.read()
-    done = {cell for cell in cells(chart) if name_of(cell) in outcomes}
+    todo = [cell for cell in cells(chart) if name_of(cell) not in outcomes][: options.cells]
     begun, grasps = time.process_time(), 0
-    with progress(min(len(cells(chart)) - len(done), options.cells), "payload", "cells") as bar:
-        for _, (cell, outcome) in zip(range(options.cells), chart_rows(arm, chart, done), strict=False):
+    with progress(len(todo), "payload", "cells") as bar:
+        for cell in todo:
+            outcome = heaviest(arm, chart, cell)
             found = {name: float(f"{value:.6g}") if isinstance(value, float) else value
                      for name, value in (asdict(cell) | asdict(outcome)).items()}  # fmt: skip
             outcomes[name_of(cell)] = found

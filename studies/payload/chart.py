@@ -8,7 +8,6 @@ An object hangs from a hook above it, its axis level and across the bending plan
 its bar level, all others with their axis upright. The arm hangs straight down beside it and bends in a vertical plane.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 from typing import Annotated, Literal
@@ -180,10 +179,3 @@ def heaviest(arm: mujoco.MjSpec, chart: PayloadSettings, cell: Cell) -> Heaviest
         else:
             lost = rung
     return HeaviestMass(chart.masses[heaviest_held], best, wrap, grasps)
-
-
-def chart_rows(arm: mujoco.MjSpec, chart: PayloadSettings, done: set[Cell]) -> Iterator[tuple[Cell, HeaviestMass]]:
-    """Every cell that is not `done`, with what came of it."""
-    for cell in cells(chart):
-        if cell not in done:
-            yield cell, heaviest(arm, chart, cell)
