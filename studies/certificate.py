@@ -28,7 +28,6 @@ from trunkline.report.certificate.certificate import inputs_of
 from trunkline.report.certificate.coverage import is_inside, pulls_of
 from trunkline.report.certificate.poses import conditions_of, draw_poses
 from trunkline.twin.twin import Twin
-from upkeep.results import recorded
 
 COUNT, SEED, BATCH = 500, 20, 20
 
@@ -68,15 +67,13 @@ def main() -> int:
     asked = load_config(Report, "report")
     ingested = json.loads((ARTIFACTS / "ingest/metrics.json").read_text())
     kept = list(rows.read().values())
-    with recorded("certificate", keep=len(kept) == COUNT, origin=rows.origin):
+    with rows.recorded(len(kept) == COUNT):
         draws = np.random.default_rng(asked.seed)
         inputs = inputs_of(twin, trials, ingested, asked.arms, draws)
         found = budget(inputs, poses[: len(kept)], asked.arms, asked.each, draws)
         tips = np.array([[float(row[axis]) for axis in "xyz"] for row in kept])
         loose = np.max(pulls[: len(kept)], axis=1) <= 0
         print("\n".join(told_lines(tips, found, loose, back[: len(kept)])))
-        if line := rows.attempts():
-            print(line)
     return 0
 
 
