@@ -2,11 +2,10 @@
 
     python -m benchmarks.arm64                             # the one in MuJoCo's own wheel for Linux on Arm
     python -m benchmarks.arm64 --library libmujoco.so      # one that was built for Android
-    python -m benchmarks.arm64 --sources mujoco            # one that is built of MuJoCo's sources, for Linux
 
 What a file is, readelf of Debian's binutils-aarch64-linux-gnu says. A program of benchmarks/arm64.c then steps the
 package's `arm.xml` with the library, emulated by qemu-user; one for Android is not run, as its C library is not
-Linux's. Nothing is measured of an Arm processor's speed. To build takes Debian's cmake and g++-aarch64-linux-gnu.
+Linux's. Nothing is measured of an Arm processor's speed.
 """
 
 import argparse
@@ -34,18 +33,6 @@ SECONDS = 2.0  # of simulation, in the midst of the swing
 PLATFORM = "manylinux_2_28_aarch64"
 TARGET = "aarch64-linux-gnu"
 READELF, COMPILER, EMULATOR = f"{TARGET}-readelf", f"{TARGET}-gcc", "qemu-aarch64"
-CROSS = {  # as docs/headset.md builds it for Android, but for Linux
-    "CMAKE_SYSTEM_NAME": "Linux",
-    "CMAKE_SYSTEM_PROCESSOR": "aarch64",
-    "CMAKE_C_COMPILER": f"{TARGET}-gcc",
-    "CMAKE_CXX_COMPILER": f"{TARGET}-g++",
-    "CMAKE_FIND_ROOT_PATH": f"/usr/{TARGET}",
-    "CMAKE_BUILD_TYPE": "Release",
-    "MUJOCO_BUILD_EXAMPLES": "OFF",
-    "MUJOCO_BUILD_SIMULATE": "OFF",
-    "MUJOCO_BUILD_TESTS": "OFF",
-    "MUJOCO_TEST_PYTHON_UTIL": "OFF",
-}
 
 
 def run(*command: str | Path) -> str:
@@ -69,13 +56,6 @@ def of_the_wheel(folder: Path) -> Path:
     with zipfile.ZipFile(next(folder.glob("*.whl"))) as wheel:
         wheel.extractall(folder)
     return next(folder.rglob("libmujoco.so*"))
-
-
-def built(sources: Path, folder: Path) -> Path:
-    """The library of MuJoCo's sources, cross-compiled for Linux on Arm. CMake fetches what they need besides."""
-    run("cmake", "-S", sources, "-B", folder / "build", *(f"-D{name}={value}" for name, value in CROSS.items()))
-    run("cmake", "--build", folder / "build", "--target", "mujoco")
-    return folder / "build/lib/libmujoco.so"
 
 
 def what_it_is(library: Path) -> dict[str, str]:
@@ -133,19 +113,13 @@ def show(library: Path, include: Path, package: Path | None, folder: Path) -> No
 @in_one_line
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    one_of = parser.add_mutually_exclusive_group()
-    one_of.add_argument("--library", type=Path)
-    one_of.add_argument("--sources", type=Path)
-    given = parser.parse_args()
+    parser.add_argument("--library", type=Path)
+    library = parser.parse_args().library
     package = next(iter(sorted((PROJECT / "artifacts/package_unity").glob("*.tgz"))), None)
     with tempfile.TemporaryDirectory() as temporary:
         folder, include = Path(temporary), Path(mujoco.HEADERS_DIR).parent
-        if given.sources:
-            with recorded("arm64_built"):
-                show(built(given.sources, folder), given.sources / "include", package, folder)
-        else:
-            with recorded("arm64", keep=given.library is None):
-                show(given.library or of_the_wheel(folder), include, package, folder)
+        with recorded("arm64", keep=library is None):
+            show(library or of_the_wheel(folder), include, package, folder)
     return 0
 
 

@@ -3,7 +3,6 @@
 One log of `mocap4r2_msgs/msg/RigidBodies`, read from the disk each time; what the three make of it is compared.
 """
 
-import argparse
 import tempfile
 import time
 from collections.abc import Callable
@@ -22,40 +21,34 @@ from trunkline.recordings.logs.pose_stream import pose_stream
 from upkeep.results import recorded
 
 SCHEMA, BODIES, RATE = "mocap4r2_msgs/msg/RigidBodies", 19, 120
+FRAMES, HIDDEN = 6000, 0.005  # the latter a share of samples, which are occluded
+ROUNDS = 3  # the best of which counts
 START = 1_760_000_000_000_000_000  # ns
 
 
 @recorded("decode")
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--frames", type=int, default=6000)
-    parser.add_argument("--hidden", type=float, default=0.005, help="share of samples that are occluded")
-    parser.add_argument("--rounds", type=int, default=3, help="the best of which counts")
-    parser.add_argument("--fast-only", action="store_true", help="leave the slow readers out")
-    arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "log.mcap"
-        poses = write(path, arguments.frames, arguments.hidden)
-        print(f"{arguments.frames} frames of {BODIES} bodies, {poses} poses, {path.stat().st_size / 1e6:.1f} MB")
+        poses = write(path)
+        print(f"{FRAMES} frames of {BODIES} bodies, {poses} poses, {path.stat().st_size / 1e6:.1f} MB")
         readers = {"trunkline": fast, "mcap with mcap_ros2": plain_mcap, "rosbags": plain_rosbags}
         reference = None
         for name, reader in readers.items():
-            if arguments.fast_only and reference is not None:
-                break
-            seconds, found = timed(reader, path, arguments.rounds if reader is fast else 1)
+            seconds, found = timed(reader, path, ROUNDS if reader is fast else 1)
             reference = found if reference is None else reference
             np.testing.assert_array_equal(found, reference)
             print(f"{name:20} {seconds:7.3f} s  {poses / seconds:10.0f} poses/s")
 
 
-def write(path: Path, frames: int, hidden: float) -> int:
+def write(path: Path) -> int:
     """Write the log; the number of poses in it."""
     rng = np.random.default_rng(0)
-    positions, quaternions = rng.normal(size=(frames, BODIES, 3)), rng.normal(size=(frames, BODIES, 4))
-    seen = rng.random((frames, BODIES)) >= hidden
+    positions, quaternions = rng.normal(size=(FRAMES, BODIES, 3)), rng.normal(size=(FRAMES, BODIES, 4))
+    seen = rng.random((FRAMES, BODIES)) >= HIDDEN
     with open(path, "wb") as file, Writer(file, chunk_size=2**20) as writer:
         schema = writer.register_msgdef(SCHEMA, RIGID_BODIES)
-        for frame in range(frames):
+        for frame in range(FRAMES):
             stamp = START + frame * 1_000_000_000 // RATE
             content = {
                 "header": {

@@ -19,9 +19,10 @@ from typing import NamedTuple
 import yaml
 
 from trunkline.errors import InputError, in_one_line
+from trunkline.pipeline.config import PROJECT
 from upkeep.results import recorded
 
-ROOT = Path(__file__).parents[1]
+LOGS = "data/raw/demo"
 
 
 class Cost(NamedTuple):
@@ -33,21 +34,17 @@ class Cost(NamedTuple):
     memory: float
 
 
-def environment() -> dict[str, str]:
-    """As most have it: what Python compiles is kept, as `make` keeps it too."""
-    return {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
-
-
 def run_stage(module: str, folder: Path) -> Cost:
     """Run a stage's module in `folder`, the root of a checkout, with this Python.
 
     Raises:
         InputError: the stage failed; the message is its last line.
     """
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}  # as `make`
     begun, first, lines = time.monotonic(), 0.0, []
     process = subprocess.Popen(
         [sys.executable, "-m", module],
-        cwd=folder, env=environment() | {"PYTHONPATH": str(folder)},
+        cwd=folder, env=environment | {"PYTHONPATH": str(folder)},
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
     )  # fmt: skip
     assert process.stdout is not None
@@ -60,30 +57,29 @@ def run_stage(module: str, folder: Path) -> Cost:
     return Cost(time.monotonic() - begun, first, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024)
 
 
-def copies(other: str, session: str | None, folder: Path, results: bool) -> dict[str, Path]:
-    """This working tree and commit `other`, each in a folder of its own with the session's logs, if one is named.
+def copies(other: str, session: bool, folder: Path, results: bool) -> dict[str, Path]:
+    """This working tree and commit `other`, each in a folder of its own; with `session`, with the demo's logs.
 
     With `results`, also with what this checkout's stages wrote.
     """
-    logs = ROOT / "data" / "raw" / session if session else None
-    if logs and not logs.is_dir():
-        raise InputError(f"{logs}: no such folder, expected a session's logs (run `make demo`)")
+    if session and not (PROJECT / LOGS).is_dir():
+        raise InputError(f"{LOGS}: no such folder, expected a session's logs (run `make demo`)")
     made = {"here": folder / "here", other: folder / "other"}
     for path in made.values():
-        subprocess.run(["git", "clone", "-q", str(ROOT), str(path)], check=True)
-        if session and logs:
-            shutil.copytree(logs, path / "data" / "raw" / session)
+        subprocess.run(["git", "clone", "-q", str(PROJECT), str(path)], check=True)
+        if session:
+            shutil.copytree(PROJECT / LOGS, path / LOGS)
     subprocess.run(["git", "checkout", "-q", other], cwd=made[other], check=True)
     listing = ["git", "ls-files", "-z", "--modified", "--others", "--exclude-standard"]
-    for name in subprocess.run(listing, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split("\0"):
-        if name and (ROOT / name).is_file():
+    for name in subprocess.run(listing, cwd=PROJECT, capture_output=True, text=True, check=True).stdout.split("\0"):
+        if name and (PROJECT / name).is_file():
             (made["here"] / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(ROOT / name, made["here"] / name)
+            shutil.copy(PROJECT / name, made["here"] / name)
     # without the file, Python would take the `stages` that is installed
     (made[other] / "stages" / "__init__.py").touch()
     for path in made.values() if results else ():
         for name in ("data/processed", "artifacts"):
-            shutil.copytree(ROOT / name, path / name, dirs_exist_ok=True)
+            shutil.copytree(PROJECT / name, path / name, dirs_exist_ok=True)
     return made
 
 
@@ -99,13 +95,11 @@ def told(cost: Cost | None) -> str:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--against", default="HEAD~1", help="the other commit")
-    parser.add_argument("--session", default="demo")
     parser.add_argument("--record", action="store_true", help="each commit records its own lab's session")
     parser.add_argument("--stages", nargs="+", help="all by default")
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        session = None if chosen.record else chosen.session
-        made = copies(chosen.against, session, Path(folder), bool(chosen.stages))
+        made = copies(chosen.against, not chosen.record, Path(folder), bool(chosen.stages))
         known = {name: list(yaml.safe_load((path / "dvc.yaml").read_text())["stages"]) for name, path in made.items()}
         modules = ["demo.record"] if chosen.record else []
         modules += [f"stages.{stage}" for stage in chosen.stages or known["here"]]

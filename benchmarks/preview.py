@@ -9,7 +9,6 @@ counted. A machine's seconds are those of processor over its cores, as futures a
 
 import argparse
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
@@ -37,20 +36,10 @@ from upkeep.results import recorded
 STEPS = (1 / 480, 1 / 240, 1 / 200)  # s; joint limits and contacts, of 0.01 s, allow no longer one than 5 ms
 CLOSE, LET_GO, LENGTH, PULL, LIFT = 1.0, 1.75, 4.0, 0.2, 0.3  # s, s, s, m of cable, rad of the Panda's second joint
 PAID_OUT, PAY_TIME = 0.2, 0.3  # m and s, of cables that do not pull
+DIAMETER, MASS = 0.04, 0.1  # m and kg, of the cylinder
+GRASP = Grasp(wrap=0.6, gap=0.02)
 HOOK_ABOVE = 0.15  # m, of the cylinder's upper side: the length of what it hangs by
 LEVEL = (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0)  # turns an object's z to base y
-
-
-@dataclass(frozen=True)
-class Placing:
-    """Diameter, m, and mass, kg, of the cylinder; turns of the arm round it; m between them, and beside the bending
-    plane."""
-
-    diameter: float = 0.04
-    mass: float = 0.1
-    wrap: float = 0.6
-    gap: float = 0.02
-    beside: float = 0.0
 
 
 @recorded("preview")
@@ -84,21 +73,17 @@ def main(path: Path, count: int) -> None:
         )
 
 
-def grasp(path: Path, placing: Placing | None = None) -> tuple[ComposedTwin, CommandTrajectory]:
+def grasp(path: Path) -> tuple[ComposedTwin, CommandTrajectory]:
     """The Panda in its ready pose with the arm beside the cylinder, and the motion."""
-    p, spec, robot = (
-        placing or Placing(),
-        read_spec(path),
-        load_folder(HybridModelSettings, PROJECT / "conf/hybrid").robot,
-    )
-    middle = object_in_base(read_geometry(spec), p.diameter, Grasp(p.wrap, p.gap), "dorsal")
+    spec, robot = read_spec(path), load_folder(HybridModelSettings, PROJECT / "conf/hybrid").robot
+    middle = object_in_base(read_geometry(spec), DIAMETER, GRASP, "dorsal")
     assert isinstance(robot, PandaRobot)
     ready = np.array(robot.ready)
     mounts, turns = mount_pose(ready[None], robot.mount_offset)
     base = turns[0] @ np.diag([1.0, -1.0, -1.0])
-    center = mounts[0] + base @ (middle + [0, p.beside, 0])
-    hook = [float(value) for value in center + [0, 0, p.diameter / 2 + HOOK_ABOVE]]
-    thing = GraspObject("cylinder", p.diameter, 0.12, p.mass, "plastic")
+    center = mounts[0] + base @ middle
+    hook = [float(value) for value in center + [0, 0, DIAMETER / 2 + HOOK_ABOVE]]
+    thing = GraspObject("cylinder", DIAMETER, 0.12, MASS, "plastic")
     level = np.zeros(4)
     mujoco.mju_mat2Quat(level, base.ravel())
     mujoco.mju_mulQuat(level, level.copy(), np.array(LEVEL))

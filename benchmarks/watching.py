@@ -9,7 +9,7 @@ import multiprocessing
 import ssl
 import struct
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -44,7 +44,7 @@ class Door:
 
 
 @dataclass
-class Frames:
+class RobotFrames:
     """Of the robot, as they come to a client: of each the time that it tells and when it came, s."""
 
     rows: list[tuple[float, float]] = field(default_factory=list)
@@ -56,7 +56,7 @@ class Frames:
 
 @dataclass(frozen=True)
 class Span:
-    """From `began` to `ended`, s; frames (F, 2) of each client, as `Frames` has them."""
+    """From `began` to `ended`, s; frames (F, 2) of each client, as `RobotFrames` has them."""
 
     began: float
     ended: float
@@ -75,7 +75,7 @@ class Span:
 
 async def spent(guests: list[Guest], seconds: float = QUIET) -> Span:
     """What comes to `guests` from now on."""
-    seen = [Frames() for _ in guests]
+    seen = [RobotFrames() for _ in guests]
     began = time.monotonic()
     for guest, frames in zip(guests, seen, strict=True):
         guest.sees = frames
@@ -164,34 +164,36 @@ class Asker:
 
 async def crowd(session: ClientSession, door: Door, watchers: int) -> tuple[Span, Span, str]:
     """One that controls, and `watchers`: what comes to them, then to all but one that reads nothing, and its id."""
-    controls, *others = await came(session, door, watchers + 1)
-    await controls.say(type="lease", action="ask")
-    pointing = asyncio.create_task(point(controls))
-    await asyncio.sleep(SETTLED)
-    reading = await spent(others)
-    deaf = others.pop()
-    deaf.task.cancel()
-    await asyncio.sleep(SETTLED)
-    rest = await spent(others)
-    pointing.cancel()
-    return reading, rest, deaf.told["welcome"]["id"]
+    async with watched(session, door, watchers) as others:
+        reading = await spent(others)
+        deaf = others.pop()
+        deaf.task.cancel()
+        await asyncio.sleep(SETTLED)
+        return reading, await spent(others), deaf.told["welcome"]["id"]
 
 
 async def stopping(session: ClientSession, door: Door, watchers: int, stops: int) -> tuple[Span, np.ndarray]:
     """One that controls, and `watchers`, of whom one stops the robot: what comes to them before, and when each stop
     was sent, s."""
+    async with watched(session, door, watchers) as others:
+        span, sent, rng = await spent(others), [], np.random.default_rng(0)
+        for _ in range(stops):
+            await asyncio.sleep(rng.uniform(*BETWEEN))
+            sent.append(time.monotonic())
+            await others[0].send("stop")
+        await asyncio.sleep(0.5)
+    return span, np.array(sent)
+
+
+@contextlib.asynccontextmanager
+async def watched(session: ClientSession, door: Door, watchers: int) -> AsyncIterator[list[Guest]]:
+    """The `watchers` of one that controls and points."""
     controls, *others = await came(session, door, watchers + 1)
     await controls.say(type="lease", action="ask")
     pointing = asyncio.create_task(point(controls))
     await asyncio.sleep(SETTLED)
-    span, sent, rng = await spent(others), [], np.random.default_rng(0)
-    for _ in range(stops):
-        await asyncio.sleep(rng.uniform(*BETWEEN))
-        sent.append(time.monotonic())
-        await others[0].send("stop")
-    await asyncio.sleep(0.5)
+    yield others
     pointing.cancel()
-    return span, np.array(sent)
 
 
 async def point(guest: Guest) -> None:

@@ -24,7 +24,7 @@ import numpy as np
 from qualification.command import qualify
 from qualification.hushed import HUSH
 from qualification.operator import JUMP, PATIENCE
-from qualification.scene import Scene, staged
+from qualification.scene import OperatedSession, staged
 from trunkline.ar.session.log_reader import read_session_log
 from trunkline.ar.session.robot import DEAD_MAN
 from trunkline.errors import InputError
@@ -45,8 +45,8 @@ class Fault:
     motors: on a session that has some."""
 
     title: str
-    do: Callable[[Scene], None]
-    mend: Callable[[Scene], None] | None = None
+    do: Callable[[OperatedSession], None]
+    mend: Callable[[OperatedSession], None] | None = None
     motors: bool = False
 
 
@@ -63,45 +63,45 @@ class Suffered:
     said: str = ""
 
 
-def _tell(word: str) -> Callable[[Scene], None]:
+def _tell(word: str) -> Callable[[OperatedSession], None]:
     return lambda scene: scene.operator.tell(word)
 
 
-def _kill(which: str) -> Callable[[Scene], None]:
+def _kill(which: str) -> Callable[[OperatedSession], None]:
     return lambda scene: os.kill(getattr(scene.told, which), signal.SIGKILL)
 
 
-def _hang(scene: Scene) -> None:
+def _hang(scene: OperatedSession) -> None:
     scene.signal(signal.SIGSTOP)
     time.sleep(HANG)
     scene.signal(signal.SIGCONT)
 
 
-def _go_on(scene: Scene) -> None:
+def _go_on(scene: OperatedSession) -> None:
     scene.operator.tell("grip")
     scene.operator.signal(signal.SIGCONT)
 
 
 FAULTS = (
     Fault("grip released", _tell("release"), _tell("grip")),
-    Fault("socket closed", _tell("close"), Scene.renew),
-    Fault("client killed", lambda s: s.operator.signal(signal.SIGKILL), Scene.renew),
+    Fault("socket closed", _tell("close"), OperatedSession.renew),
+    Fault("client killed", lambda s: s.operator.signal(signal.SIGKILL), OperatedSession.renew),
     Fault("client silent", lambda s: s.operator.signal(signal.SIGSTOP), _go_on),
     Fault("both controllers lost", _tell("lose"), _tell("grip")),
-    Fault(f"client's clock jumps by {JUMP:g} s", _tell("jump"), Scene.renew),
+    Fault(f"client's clock jumps by {JUMP:g} s", _tell("jump"), OperatedSession.renew),
     Fault("poses are no numbers", _tell("nan"), _tell("grip")),
     Fault(f"server hangs for {HANG:g} s", _hang, _tell("grip")),
     Fault("server killed -9", lambda s: s.signal(signal.SIGKILL)),
     Fault("log's process killed", _kill("journal")),
     Fault("robot's process killed", _kill("robot")),
-    Fault(f"a motor silent for {1e3 * HUSH:g} ms", lambda s: s.witness.hush(), motors=True),
+    Fault(f"a motor silent for {1e3 * HUSH:g} ms", lambda s: s.witness.signal_motors(signal.SIGUSR1), motors=True),
     Fault("machine's process killed, with motors", _kill("robot"), motors=True),
-    Fault("motors' process hangs", lambda s: os.kill(s.witness.motors, signal.SIGSTOP), motors=True),
-    Fault("motors' process killed", lambda s: os.kill(s.witness.motors, signal.SIGKILL), motors=True),
+    Fault("motors' process hangs", lambda s: s.witness.signal_motors(signal.SIGSTOP), motors=True),
+    Fault("motors' process killed", lambda s: s.witness.signal_motors(signal.SIGKILL), motors=True),
 )
 
 
-def suffered(fault: Fault, scene: Scene) -> Suffered:
+def suffered(fault: Fault, scene: OperatedSession) -> Suffered:
     """
     Raises:
         InputError: the robot never came to move, or did not rest, or nobody came back.
@@ -126,7 +126,7 @@ def suffered(fault: Fault, scene: Scene) -> Suffered:
     return found
 
 
-def _wait_for_motion(fault: Fault, scene: Scene) -> None:
+def _wait_for_motion(fault: Fault, scene: OperatedSession) -> None:
     now = began = time.monotonic()
     since = None
     while since is None or now - since < MOVING:

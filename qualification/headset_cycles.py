@@ -108,7 +108,7 @@ class Led:
 
 
 @dataclass(frozen=True)
-class Run:
+class CycleRun:
     """off: m, of the base at `alignment.at`, NaN where it was not aligned. why: it failed, "" where it did not."""
 
     presses: int
@@ -124,7 +124,7 @@ class Run:
         return (self.presses, self.plans, self.executions) == (2, 1, 1)
 
 
-async def served(package: Path, runs: int, folder: Path) -> list[Run]:
+async def served(package: Path, runs: int, folder: Path) -> list[CycleRun]:
     config, teleop = load_folder(SessionConfig, PROJECT / "conf/live"), load_folder(Teleop, PROJECT / "conf/teleop")
     alignment = replace(config.alignment, anchors=str(folder / "anchors.json"))
     config = replace(config, alignment=alignment, journal=replace(config.journal, folder=str(folder)))
@@ -138,7 +138,7 @@ async def served(package: Path, runs: int, folder: Path) -> list[Run]:
         return await driven(server, made, runs, alignment)
 
 
-async def driven(server: Server, made: SessionParts, runs: int, alignment: AlignmentSettings) -> list[Run]:
+async def driven(server: Server, made: SessionParts, runs: int, alignment: AlignmentSettings) -> list[CycleRun]:
     """By an operator in a browser."""
     mark, at = alignment.mark, json.dumps(alignment.at)
     robot = Led(made.robot, made.robot._limits, made.package)
@@ -168,7 +168,7 @@ async def driven(server: Server, made: SessionParts, runs: int, alignment: Align
             else:
                 plans, executions = (events[kind] for kind in COUNTED)
                 touches, off = told.get("touches", 0), told.get("off", np.nan)
-                found.append(Run(told["presses"], plans, executions, touches, off, told["why"]))
+                found.append(CycleRun(told["presses"], plans, executions, touches, off, told["why"]))
                 print(f"run {len(found)}: {found[-1]}", file=sys.stderr, flush=True)
                 events.clear()
                 places = robot.places(rng, mark)
@@ -183,7 +183,7 @@ async def driven(server: Server, made: SessionParts, runs: int, alignment: Align
     return found
 
 
-def table(found: list[Run]) -> list[str]:
+def table(found: list[CycleRun]) -> list[str]:
     """As Markdown."""
     runs, done = len(found), sum(not run.why and run.once for run in found)
     off = 1e3 * np.array([run.off for run in found])

@@ -20,7 +20,7 @@ GRIPPED = 1.0  # s for which it holds its grips, and confirms nothing
 AGAIN = 1.0  # s between two wishes to control
 
 
-class Operator:
+class OperatorProcess:
     """Told "lose", "jump", "nan" or "release", its inputs are wrong so; told "close", its socket is. Told "grip", it
     holds both grips and no more: it confirms nothing. Told "", it goes through cycles."""
 
@@ -53,7 +53,7 @@ class Operator:
 
 
 def operate(pipe: Connection, token: str, told: str) -> None:
-    """The process of an `Operator`."""
+    """The process of an `OperatorProcess`."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     asyncio.run(_operate(pipe, token, told))
 

@@ -14,7 +14,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 from qualification.guests import ADDRESS
-from qualification.operator import PATIENCE, Operator
+from qualification.operator import PATIENCE, OperatorProcess
 from qualification.witness import Watched, Witness, machine
 from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.ar.drivers.simulated_motors import SIMULATED
@@ -38,7 +38,7 @@ class Told:
 
 
 @dataclass
-class Session:
+class SessionProcess:
     """A session that runs. lines: what its server says, with the time, s."""
 
     server: BaseProcess
@@ -60,22 +60,22 @@ class Session:
 
 
 @dataclass
-class Scene(Session):
+class OperatedSession(SessionProcess):
     """A session in which something is done, with who controls it."""
 
-    operator: Operator = field(kw_only=True)
+    operator: OperatorProcess = field(kw_only=True)
 
     def renew(self) -> None:
         """Another client comes, and takes the grips."""
         self.operator.close()
-        self.operator = Operator(self.told.token, "grip")
+        self.operator = OperatorProcess(self.told.token, "grip")
 
 
 @contextlib.contextmanager
-def staged(package: Path, motors: bool) -> Iterator[Scene]:
+def staged(package: Path, motors: bool) -> Iterator[OperatedSession]:
     """A session that an operator controls; `motors` as of `running`."""
     with running(package, motors) as session:
-        scene = Scene(**vars(session), operator=Operator(session.told.token))
+        scene = OperatedSession(**vars(session), operator=OperatorProcess(session.told.token))
         try:
             yield scene
         finally:
@@ -84,14 +84,14 @@ def staged(package: Path, motors: bool) -> Iterator[Scene]:
 
 
 @contextlib.contextmanager
-def running(package: Path, motors: bool = False) -> Iterator[Session]:
+def running(package: Path, motors: bool = False) -> Iterator[SessionProcess]:
     """A session on the simulated robot; with `motors`, on the bus of simulated ones.
 
     Raises:
         InputError: it ends before it begins.
     """
     context = multiprocessing.get_context("spawn")
-    witness, (pipe, theirs) = Witness(context), context.Pipe()
+    witness, (pipe, theirs) = context.RawValue(Witness), context.Pipe()
     server = context.Process(target=serve, args=(theirs, witness, package, motors), name="server")
     server.start()
     theirs.close()
@@ -99,7 +99,7 @@ def running(package: Path, motors: bool = False) -> Iterator[Session]:
     try:
         while not isinstance(told := _received(pipe), Told):
             lines.append(told)
-        yield Session(server, told, witness, pipe, lines)
+        yield SessionProcess(server, told, witness, pipe, lines)
     finally:
         pipe.close()
         server.join(ENDS)

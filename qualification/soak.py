@@ -56,7 +56,7 @@ VISIT, STAY, HAND_OVER = 20.0, 8.0, 300.0  # s between visitors, of a visit, bet
 EARLY = 0.05  # share of the time after which memory is first looked at
 
 
-class Robot:
+class ScriptedRobot:
     """Where its plan says, by the session's clock."""
 
     def __init__(self, package: Package, teleop: Teleop) -> None:
@@ -85,7 +85,7 @@ class Robot:
 class Planning:
     """The first joint to one side and back again; previewed by two pieces."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: ScriptedRobot) -> None:
         self.robot, self.limits, self.made = robot.robot, robot.limits, 0
 
     def answers(self, order: Order | FollowRequest) -> Iterator[Answer]:
@@ -124,7 +124,7 @@ class Stepped(Server):
 
 async def session(package: Package, hours: float) -> None:
     teleop = load_folder(Teleop, PROJECT / "conf/teleop")
-    robot, clock, said = Robot(package, teleop), [0.0], Counter()
+    robot, clock, said = ScriptedRobot(package, teleop), [0.0], Counter()
     planning = Planning(robot)
     core = Teleoperation(teleop.core, package.reach, package.digest, teleop.mount_offset)
     previewer, token = InlinePreviewer(planning.answers), make_token()

@@ -2,7 +2,6 @@
 
 import ctypes
 import os
-import signal
 import time
 from multiprocessing.context import SpawnContext
 
@@ -20,62 +19,37 @@ LEAST = 1e-9  # rad or m between two tellings: it moves
 HEAD = 5  # numbers that a robot tells before its axes
 
 
-class Witness:
-    """Each number is written whole, by one process; times are s of the clock that all processes of a machine share.
+class Witness(ctypes.Structure):
+    """Made by `context.RawValue`, so that processes share it. Each number is written whole, by one process; times are s
+    of the clock that all processes of a machine share.
 
     The robot's: held, when it was first commanded to hold in its last motion, as it brakes it is so again and again;
     moved, when its axes, as they are sent, last moved; far, by how much a joint was off its first place at most, rad;
     begun, how many motions it began; running, whether one goes on; motors, the process of its motors, if it has some.
+    last_hold, held_in: the last command to hold, and the motion in which the first one was.
     """
 
-    def __init__(self, context: SpawnContext) -> None:
-        self._held, self._moved, self._far, self._begun, self._running, self._motors = (
-            context.RawValue(ctypes.c_double, 0.0) for _ in range(6)
-        )
-        self._told, self._held_in = 0.0, 0.0  # the last command to hold, and the motion in which the first one was
+    _fields_ = (
+        *((name, ctypes.c_double) for name in ("held", "moved", "far", "last_hold", "held_in")),
+        ("begun", ctypes.c_int64),
+        ("running", ctypes.c_bool),
+        ("motors", ctypes.c_int64),
+    )
 
-    @property
-    def held(self) -> float:
-        return self._held.value
-
-    @property
-    def moved(self) -> float:
-        return self._moved.value
-
-    @property
-    def far(self) -> float:
-        return self._far.value
-
-    @property
-    def begun(self) -> int:
-        return int(self._begun.value)
-
-    @property
-    def running(self) -> bool:
-        return bool(self._running.value)
-
-    @property
-    def motors(self) -> int:
-        assert self._motors.value, "a session with motors"
-        return int(self._motors.value)
-
-    @motors.setter
-    def motors(self, pid: int) -> None:
-        self._motors.value = pid
-
-    def hush(self) -> None:
-        """The first motor gives no feedback for `hushed.HUSH` s."""
-        os.kill(self.motors, signal.SIGUSR1)
+    def signal_motors(self, number: int) -> None:
+        """SIGUSR1: the first motor gives no feedback for `hushed.HUSH` s."""
+        assert self.motors, "a session with motors"
+        os.kill(self.motors, number)
 
     def note(self, numbers: np.ndarray, moved: bool, far: float) -> None:
         """Of the robot's process: what it tells the server."""
         if moved:
-            self._moved.value = time.monotonic()
-        self._far.value = max(self._far.value, far)
-        if numbers[HOLD_TIME] != self._told and numbers[SERIAL] != self._held_in:
-            self._held.value, self._held_in = numbers[HOLD_TIME], numbers[SERIAL]
-        self._told, self._begun.value = numbers[HOLD_TIME], numbers[SERIAL]
-        self._running.value = MODES[int(numbers[MODE])] == "running"
+            self.moved = time.monotonic()
+        self.far = max(self.far, far)
+        if numbers[HOLD_TIME] != self.last_hold and numbers[SERIAL] != self.held_in:
+            self.held, self.held_in = numbers[HOLD_TIME], numbers[SERIAL]
+        self.last_hold, self.begun = numbers[HOLD_TIME], int(numbers[SERIAL])
+        self.running = MODES[int(numbers[MODE])] == "running"
 
 
 class Watched(RobotChannel):

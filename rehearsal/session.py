@@ -106,7 +106,8 @@ class RehearsedRobot:
         try:
             self.robot.send(joints, self._straight - commands)
         except InputError as error:
-            self._fault = str(error)
+            self._fault = self._fault or str(error)
+            self.stop()
         self.robot.advance(dt)
 
 

@@ -28,7 +28,6 @@ from trunkline.report.certificate.certificate import inputs_of
 from trunkline.report.certificate.coverage import is_inside, pulls_of
 from trunkline.report.certificate.poses import conditions_of, draw_poses
 from trunkline.twin.twin import Twin
-from upkeep.results import recorded
 
 COUNT, SEED, BATCH = 500, 20, 20
 
@@ -53,7 +52,7 @@ def main() -> int:
     parser.add_argument("--poses", type=int, default=COUNT, help=f"stop after so many of {COUNT}")
     arguments = parser.parse_args()
     twin, trials = Twin.load(ARTIFACTS), read_trials(TRIALS, DECIDING)
-    chain, conditions = read_chain(twin.arm), conditions_of(trials)
+    chain, conditions = read_chain(twin.arm.model), conditions_of(trials)
     rng = np.random.default_rng(SEED)
     poses = draw_poses(chain, conditions, COUNT, rng)
     pulls, back = pulls_of(chain, poses), rng.random(COUNT) < 0.5
@@ -68,15 +67,13 @@ def main() -> int:
     asked = load_config(Report, "report")
     ingested = json.loads((ARTIFACTS / "ingest/metrics.json").read_text())
     kept = list(rows.read().values())
-    with recorded("certificate", keep=len(kept) == COUNT, origin=rows.origin):
+    with rows.recorded(len(kept) == COUNT):
         draws = np.random.default_rng(asked.seed)
         inputs = inputs_of(twin, trials, ingested, asked.arms, draws)
         found = budget(inputs, poses[: len(kept)], asked.arms, asked.each, draws)
         tips = np.array([[float(row[axis]) for axis in "xyz"] for row in kept])
         loose = np.max(pulls[: len(kept)], axis=1) <= 0
         print("\n".join(told_lines(tips, found, loose, back[: len(kept)])))
-        if line := rows.attempts():
-            print(line)
     return 0
 
 

@@ -11,13 +11,13 @@ import argparse
 import sys
 from contextlib import redirect_stdout
 from dataclasses import dataclass, field
-from importlib import import_module
 
 import mujoco
 import numpy as np
 from scipy.stats import t as student
 from threadpoolctl import threadpool_limits
 
+from studies.stage_chain import committed
 from tests.support.matched_plant import FRAME, curl, markers_of, motion, small_model, static_pull, tilt
 from tests.support.noisy_trials import WEIGHTS, Stage, measured, releases, with_values
 from trunkline.compute.progress import progress
@@ -26,12 +26,10 @@ from trunkline.identification.fit.certainty import certainty
 from trunkline.identification.fit.optimizers import LeastSquares
 from trunkline.identification.fit.problem import Bounds, Problem
 from trunkline.identification.fit.search import descend, search
-from trunkline.identification.fit.settings import IdentificationSettings
 from trunkline.identification.fit.surrogate import surrogate
 from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.identification.simulate.experiment import prepare
 from trunkline.model.arm.joints import Joints, MaxwellElement
-from trunkline.pipeline.config import load_config
 from trunkline.recordings.trials.trial import Trial
 from upkeep.results import recorded
 
@@ -85,17 +83,12 @@ STAGES = {
 }  # fmt: skip
 
 
-def settings_of(name: str) -> IdentificationSettings:
-    """The committed settings of a stage."""
-    return load_config(import_module(f"stages.identify_{name}").Config, f"identify_{name}")
-
-
 def bounds_of(name: str) -> dict[str, Bounds]:
     """The ranges of a stage's parameters: about the truth, and no wider than the committed ones that hold it, which
     keep a slow branch and a fast one apart."""
     found = {}
     for key, value in STAGES[name].true.items():
-        own = settings_of(name).parameters[key]
+        own = committed(f"identify_{name}").parameters[key]
         low = max(own.low, value / RANGE) if own.low < value else value / RANGE
         high = min(own.high, value * RANGE) if own.high > value else value * RANGE
         found[key] = own if parameter_named(key).signed else Bounds(low, high)
@@ -103,7 +96,7 @@ def bounds_of(name: str) -> dict[str, Bounds]:
 
 
 @dataclass
-class Coverage:
+class IntervalCoverage:
     """errors: of ln(value), or of a signed value over the truth, per repetition and parameter. widths: half, of the
     intervals. lost: repetitions whose search did not converge."""
 
@@ -137,7 +130,7 @@ def mismatched(truth: mujoco.MjModel) -> mujoco.MjModel:
     return plant
 
 
-def cover(name: str, is_matched: bool, repetitions: int) -> Coverage:
+def cover(name: str, is_matched: bool, repetitions: int) -> IntervalCoverage:
     """The repetitions of one stage."""
     stage, bounds, frames = STAGES[name], bounds_of(name), FRAMES[name]
     model = small_model(UNITS, stage.joints, **stage.motors)
@@ -150,7 +143,7 @@ def cover(name: str, is_matched: bool, repetitions: int) -> Coverage:
     }
     exact = np.array([parameter_named(key).coordinate(value) for key, value in expected.items()])
     unit = np.array([1.0 if key in scaled else abs(value) for key, value in expected.items()])
-    found = Coverage(list(stage.true), len(clean))
+    found = IntervalCoverage(list(stage.true), len(clean))
     with redirect_stdout(sys.stderr), progress(repetitions, f"coverage of {name}", "repetitions") as bar:
         for repetition in range(repetitions):
             rng = np.random.default_rng([repetition, list(STAGES).index(name)])

@@ -1,6 +1,6 @@
 """Which physics an arm needs: a Markdown table, the simplest model first.
 
-    python -m studies.effects [--folds N] [--only NAME ...]
+    python -m studies.effects [--only NAME ...]
 
 Needs the filtered trials of a session. The simplest model has springs, dampers and prompt motors alone. Effects are
 tried one after the other, each in the stage that identifies it: the stage is fitted with and without it, trials of the
@@ -18,16 +18,14 @@ import contextlib
 import sys
 import time
 from dataclasses import dataclass, field, replace
-from importlib import import_module
 
 import mujoco
 import numpy as np
 
 from stages.build_mjcf import Config as CadConfig
 from stages.build_mjcf import cad_arm
-from studies.choices import Chain, next_link
-from studies.demo_session import STAGES, require_demo
 from studies.rows import Rows, digest
+from studies.stage_chain import STAGES, StageChain, committed, require_demo, run_stages
 from trunkline.errors import in_one_line
 from trunkline.identification.evaluation.baselines import hanging_still, noise_floor
 from trunkline.identification.evaluation.evaluation import Prediction, replay
@@ -41,11 +39,10 @@ from trunkline.pipeline.config import load_config
 from trunkline.pipeline.identify import CAD_MODEL, TRIALS, read_reported
 from trunkline.recordings.trials.splits import VALIDATE
 from trunkline.recordings.trials.trial import Trial
-from upkeep.results import recorded
 
 
 @dataclass(frozen=True)
-class Effect:
+class ModelEffect:
     """A term of the model, the stage that identifies it, and its parameters with their ranges.
 
     joints, holes: what it adds to them. dead_time, lag: guesses of the motors', s.
@@ -65,43 +62,43 @@ def ranges(low: float, high: float, *names: str) -> dict[str, Bounds]:
 
 
 SHARES, TIMES = (0.01, 3.0), (0.02, 20.0)  # of a spring's stiffness; s
-EFFECTS: dict[str, Effect] = {
-    "hardening": Effect("hardening", "identify_stiffness", ranges(0.02, 20.0, "hardening")),
-    "round": Effect("round joints", "identify_stiffness", {}, Joints(round=True)),
-    "place": Effect("place of the joints", "identify_stiffness", ranges(-0.2, 1.0, "joint_place")),
-    "mount": Effect("mount tilt", "identify_stiffness", ranges(-0.1, 0.1, "mount_tilt_x", "mount_tilt_y")),
-    "bend": Effect("rest shape, even", "identify_stiffness", ranges(-0.05, 0.05, "rest_bend_x", "rest_bend_y")),
-    "gradient": Effect(
+EFFECTS: dict[str, ModelEffect] = {
+    "hardening": ModelEffect("hardening", "identify_stiffness", ranges(0.02, 20.0, "hardening")),
+    "round": ModelEffect("round joints", "identify_stiffness", {}, Joints(round=True)),
+    "place": ModelEffect("place of the joints", "identify_stiffness", ranges(-0.2, 1.0, "joint_place")),
+    "mount": ModelEffect("mount tilt", "identify_stiffness", ranges(-0.1, 0.1, "mount_tilt_x", "mount_tilt_y")),
+    "bend": ModelEffect("rest shape, even", "identify_stiffness", ranges(-0.05, 0.05, "rest_bend_x", "rest_bend_y")),
+    "gradient": ModelEffect(
         "rest shape, rising", "identify_stiffness", ranges(-0.05, 0.05, "rest_gradient_x", "rest_gradient_y")
     ),
-    "branch": Effect(
+    "branch": ModelEffect(
         "Maxwell branch", "identify_damping",
         ranges(*SHARES, "relaxation") | ranges(*TIMES, "relaxation_time"), Joints([MaxwellElement(0.3, 0.5)]),
     ),
-    "branch_2": Effect(
+    "branch_2": ModelEffect(
         "second Maxwell branch", "identify_damping",
         ranges(*SHARES, "relaxation_2") | ranges(*TIMES, "relaxation_time_2"), Joints([MaxwellElement(0.2, 2.0)]),
     ),
-    "slider": Effect(
+    "slider": ModelEffect(
         "Jenkins element", "identify_damping",
         ranges(*SHARES, "hysteresis") | ranges(5e-4, 0.3, "yield_bend"), Joints(sliders=[JenkinsElement(0.2, 0.02)]),
     ),
-    "friction": Effect(
+    "friction": ModelEffect(
         "tendon friction", "identify_damping",
         ranges(0.005, 3.0, "tendon_friction") | ranges(0.003, 0.3, "friction_time"),
     ),
-    "holes": Effect(
+    "holes": ModelEffect(
         "capstan friction", "identify_control", ranges(0.005, 2.0, "capstan_friction"), holes=GuideHoles(0.2, 8)
     ),
-    "dead_time": Effect("dead time", "identify_control", ranges(0.001, 0.2, "dead_time"), dead_time=0.02),
-    "lag": Effect("lag of the motors", "identify_control", ranges(0.002, 0.3, "time_constant"), lag=0.02),
+    "dead_time": ModelEffect("dead time", "identify_control", ranges(0.001, 0.2, "dead_time"), dead_time=0.02),
+    "lag": ModelEffect("lag of the motors", "identify_control", ranges(0.002, 0.3, "time_constant"), lag=0.02),
 }  # fmt: skip
-FOLDS = 3
+FOLDS = 3  # groups of trials that are left out in turn
 NO_LAG = 1e-6  # s; MuJoCo's filter wants some
 OPTIONAL = {name for effect in EFFECTS.values() for name in effect.parameters}
 
 
-def cad_model(effects: list[Effect]) -> mujoco.MjModel:
+def cad_model(effects: list[ModelEffect]) -> mujoco.MjModel:
     """The CAD model with what the effects add to it."""
     config = load_config(CadConfig, "build_mjcf")
     config.joints = Joints(
@@ -118,41 +115,32 @@ def cad_model(effects: list[Effect]) -> mujoco.MjModel:
     return model
 
 
-def settings_of(stage: str, effects: list[Effect]) -> IdentificationSettings:
+def settings_of(stage: str, effects: list[ModelEffect]) -> IdentificationSettings:
     """The committed settings of a stage, of the optional parameters those of `effects` alone; no factors of joints."""
-    config = load_config(import_module(f"stages.{stage}").Config, stage)
+    config = committed(stage)
     parameters = {name: span for name, span in config.parameters.items() if name not in OPTIONAL}
     for effect in effects:
         parameters |= effect.parameters if effect.stage == stage else {}
     return replace(config, parameters=parameters, per_joint=[])
 
 
-def left_out(link: Chain, stage: str, folds: int) -> np.ndarray:
+def left_out(link: StageChain, stage: str) -> np.ndarray:
     """Position error of every trial to identify from, not having been seen by the last stage's fit, mm."""
     kinds = settings_of(stage, []).experiments
     fitted = [e for e in link.experiments if e.kind in kinds]
     with contextlib.redirect_stdout(sys.stderr):
-        table = errors_left_out(stage, link.result, fitted, link.fit, folds)
+        table = errors_left_out(stage, link.result, fitted, link.fit, FOLDS)
     return table[table["model"] == "identified"]["e_position_mm"].to_numpy()
 
 
-def chain(effects: list[Effect], last: str, known: dict[str, Chain]) -> Chain:
-    """The stages up to `last`, each on what the one before it found."""
-    model, spent, key = cad_model(effects), [], ""
-    for stage in STAGES:
-        config = settings_of(stage, effects)
-        lag = model.actuator_dynprm[:1, 0]
-        key += f"{stage} {config} {model.nq} {model.ntendon} {model.nhistory} {lag}\n"
-        if key not in known:
-            with contextlib.redirect_stdout(sys.stderr):
-                known[key] = next_link(model, spent, stage, config, read_reported(config), is_quick=False)
-        model, spent = known[key].model, known[key].spent
-        if stage == last:
-            break
-    return known[key]
+def chain(effects: list[ModelEffect], last: str, chains: dict[str, StageChain]) -> StageChain:
+    """The stages up to `last`, with `effects`."""
+    model = cad_model(effects)
+    key = f"{model.nq} {model.ntendon} {model.nhistory} {model.actuator_dynprm[:1, 0]}\n"
+    return run_stages((key, model), lambda stage: settings_of(stage, effects), chains, last=last)
 
 
-def validated(title: str, link: Chain, trials: list[Trial], cad: mujoco.MjModel) -> list[str]:
+def validated(title: str, link: StageChain, trials: list[Trial], cad: mujoco.MjModel) -> list[str]:
     """Rows of the last table: errors on `validate` by kind, beside those of what knows less, and the noise floor.
 
     Args:
@@ -175,7 +163,7 @@ def validated(title: str, link: Chain, trials: list[Trial], cad: mujoco.MjModel)
     return rows
 
 
-def tried(names: list[str], table: Rows, folds: int, known: dict[str, Chain]) -> list[Effect]:
+def tried(names: list[str], table: Rows, chains: dict[str, StageChain]) -> list[ModelEffect]:
     """The effects that are kept of those to try. Rows that the table lacks are added."""
     done, kept, last = table.read(), [], ("", np.array([]))
     for name in names:
@@ -183,8 +171,8 @@ def tried(names: list[str], table: Rows, folds: int, known: dict[str, Chain]) ->
         if name not in done:
             begun, stage = time.perf_counter(), effect.stage
             if last[0] != stage:  # else what stood after the last effect of the stage is what stands before this one
-                last = stage, left_out(chain(kept, stage, known), stage, folds)
-            errors = left_out(chain([*kept, effect], stage, known), stage, folds)
+                last = stage, left_out(chain(kept, stage, chains), stage)
+            errors = left_out(chain([*kept, effect], stage, chains), stage)
             gain = last[1] - errors
             standard_error = gain.std(ddof=1) / np.sqrt(len(gain))
             pays = bool(gain.mean() > standard_error)
@@ -211,19 +199,17 @@ def effect_table(rows: dict[str, dict]) -> str:
 @in_one_line
 def main() -> int:
     parser = argparse.ArgumentParser(prog="studies.effects", description=__doc__)
-    parser.add_argument("--folds", type=int, default=FOLDS, help="groups of trials that are left out in turn")
     parser.add_argument("--only", nargs="+", choices=EFFECTS, default=list(EFFECTS), help="effects to try")
     arguments = parser.parse_args()
     require_demo(CAD_MODEL)
-    known: dict[str, Chain] = {}
+    chains: dict[str, StageChain] = {}
     every = [settings_of(stage, list(EFFECTS.values())) for stage in STAGES]
-    told = [load_config(CadConfig, "build_mjcf"), every, list(EFFECTS.values()), arguments.folds, arguments.only]
-    is_whole = arguments.only == list(EFFECTS) and arguments.folds == FOLDS
-    table = Rows("effects" if is_whole else "effects_part", digest(told, TRIALS), "effect")
-    with recorded("effects", keep=is_whole, origin=table.origin):
-        kept = tried(arguments.only, table, arguments.folds, known)
-        rows = table.read()
-        print(effect_table(rows))
+    made_of = [load_config(CadConfig, "build_mjcf"), every, list(EFFECTS.values()), FOLDS, arguments.only]
+    is_whole = arguments.only == list(EFFECTS)
+    table = Rows("effects" if is_whole else "effects_part", digest(made_of, TRIALS), "effect")
+    with table.recorded(is_whole):
+        kept = tried(arguments.only, table, chains)
+        print(effect_table(table.read()))
         words = "the tip's also in % of length; null: the mean shape at rest; CAD: the model without data"
         print(f"\nErrors on `validate`, {words}.\n")
         errors = "E_internal (mm) | position (mm) | tip (mm) | tip (%)"
@@ -231,10 +217,8 @@ def main() -> int:
         print("|---|---|---:|---:|---:|---:|---:|---:|---:|", flush=True)
         for title, effects in (("simplest", []), ("chosen", kept)):
             for stage in STAGES:
-                link, trials = chain(effects, stage, known), read_reported(settings_of(stage, effects))
+                link, trials = chain(effects, stage, chains), read_reported(settings_of(stage, effects))
                 print("\n".join(validated(f"{title}, {stage}", link, trials, cad_model(effects))), flush=True)
-        if line := table.attempts():
-            print(line)
     return 0
 
 

@@ -16,20 +16,20 @@ from pathlib import Path
 from omegaconf import OmegaConf
 
 from trunkline.errors import InputError, in_one_line
+from trunkline.pipeline.config import PROJECT
 from upkeep.readme import score_table
 from upkeep.results import recorded
 from upkeep.truth_table import truth_table
 
-ROOT = Path(__file__).parents[1]
 SETTINGS = Path(__file__).with_suffix(".yaml")
 LAB = {"plant": "cousin", "experiments": "table"}
 
 
 def set_up(folder: Path) -> list[str]:
     """Write the settings of the lab and of the stages into `folder`. Returns the stages, in their order."""
-    lab = OmegaConf.load(ROOT / "demo/params.yaml")
+    lab = OmegaConf.load(PROJECT / "demo/params.yaml")
     (folder / "demo").mkdir()
-    (folder / "demo/conf").symlink_to(ROOT / "demo/conf")
+    (folder / "demo/conf").symlink_to(PROJECT / "demo/conf")
     OmegaConf.save(OmegaConf.merge(lab, {"record": LAB}), folder / "demo/params.yaml")
     settings = OmegaConf.load(SETTINGS)
     OmegaConf.save(settings, folder / "params.yaml")
@@ -44,7 +44,7 @@ def run(module: str, folder: Path) -> None:
     Raises:
         InputError: it fails, having said why.
     """
-    path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
+    path = os.pathsep.join(filter(None, [str(PROJECT), os.environ.get("PYTHONPATH")]))
     command = [sys.executable, "-m", module]
     done = subprocess.run(command, cwd=folder, env=os.environ | {"PYTHONPATH": path}, stdout=sys.stderr, check=False)
     if done.returncode:

@@ -4,9 +4,11 @@ A row says what it was made of, and of which code (upkeep/origin.py). Rows of an
 other code stay in the table, and count for nothing. What is done once more is a further row: the first one counts.
 """
 
+import contextlib
 import csv
 import hashlib
 import io
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +16,7 @@ import pandas as pd
 
 from trunkline.files import written_whole
 from upkeep.origin import Origin, origin_of
-from upkeep.results import FOLDER, command_line, modules_of
+from upkeep.results import FOLDER, command_line, modules_of, recorded
 
 TEXTS = ("made_of", "commit", "code")  # columns
 
@@ -71,16 +73,23 @@ class Rows:
         with written_whole(self.path) as part:
             part.write_text(_text([*rows, {self.key: key, **cells, **last}]), encoding="utf-8")
 
+    @contextlib.contextmanager
+    def recorded(self, keep: bool) -> Iterator[None]:
+        """What is printed meanwhile goes to docs/results/<name>.json, of the rows' origin; a last line says what is in
+        the table beside the rows that count."""
+        with recorded(self.name, keep, origin=self.origin):
+            yield
+            if line := self.attempts():
+                print(line)
+
     def attempts(self) -> str:
         """A line that says what is in the table beside the rows that count; "" where there is nothing."""
-        counted, uncounted = len(self.read()), self.uncounted()
-        others = [row for row in uncounted if not self._counts(row)]
-        again = len(uncounted) - len(others)
+        others = [row for row in self._every() if not self._counts(row)]
+        counted, again = len(self.read()), len(self.uncounted()) - len(others)
         words = [f"{again} further attempts, which do not count"] if again else []
-        commits = ", ".join(dict.fromkeys(row.get("commit") or "none that is named" for row in others))
-        words += (
-            [f"{len(others)} rows of other code or settings, which do not count (commits {commits})"] if others else []
-        )
+        if others:
+            commits = ", ".join(dict.fromkeys(row.get("commit") or "none that is named" for row in others))
+            words.append(f"{len(others)} rows of other code or settings, which do not count (commits {commits})")
         return f"{counted} rows, and {' and '.join(words)}" if words else ""
 
     def uncounted(self) -> list[dict[str, str]]:

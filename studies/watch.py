@@ -7,11 +7,9 @@ stands the demo session's, which were planned and not drawn. Trials that are sco
 as they take long; the charts are made anew from them.
 """
 
-import argparse
 import json
 import sys
 import tempfile
-from collections.abc import Callable
 from contextlib import redirect_stdout
 from copy import deepcopy
 from dataclasses import replace
@@ -31,8 +29,8 @@ from demo.record import Config
 from demo.recorder import write_log, write_session
 from demo.rig import ROOT
 from demo.truth import Truth
-from studies.demo_session import require_demo
 from studies.rows import Rows, digest
+from studies.stage_chain import require_demo
 from trunkline.compute.progress import progress
 from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.config import load_config
@@ -45,14 +43,20 @@ from trunkline.tools.monitor.history import read_score, score_row
 from trunkline.tools.monitor.loading import load_logs
 from trunkline.tools.monitor.monitor import LEARN, scorer_of
 from trunkline.tools.monitor.scores import Score, Scorer
-from upkeep.results import recorded
 
 MODEL, TRIALS = Path("artifacts/identify_control/arm.xml"), Path("data/processed/filter")
 SOFTER = 0.95  # of the stiffness
 SEED, SEEDS = 8, 20
-KINDS = ("static_tilt", "release", "curl", "static_pull", "motion")  # a number of its own for the draws of each
 EACH = {"static_tilt": 160, "release": 130, "static_pull": 60, "curl": 40, "motion": 10}  # of the unchanged arm
 AFTER = {"static_tilt": 3, "release": 3, "curl": 3, "static_pull": 3}  # of the softer one, a seed
+PERFORMED = {  # the laboratory's method of a kind, and whether it draws
+    "static_tilt": (Laboratory.tilts, True),
+    "release": (Laboratory.releases, False),
+    "curl": (Laboratory.curls, False),
+    "static_pull": (Laboratory.pulls, False),
+    "motion": (Laboratory.motions, True),
+}
+KINDS = tuple(PERFORMED)  # a number of its own for the draws of each
 TELLING = ("static_tilt", "release")  # kinds that tell stiffness well
 BEFORE = 8  # trials of the unchanged arm with which a chart begins
 LATEST = 3  # trials within which a change should be found
@@ -82,14 +86,8 @@ def planned(kind: str, base: Experiments, rng: np.random.Generator) -> Experimen
 
 def done(lab: Laboratory, kind: str, plan: Experiments, rng: np.random.Generator) -> Truth:
     """The trial of a kind."""
-    ways: dict[str, Callable[[], list[Truth]]] = {
-        "static_tilt": lambda: lab.tilts(plan, rng),
-        "release": lambda: lab.releases(plan),
-        "curl": lambda: lab.curls(plan),
-        "static_pull": lambda: lab.pulls(plan),
-        "motion": lambda: lab.motions(plan, rng),
-    }
-    return ways[kind]()[0]
+    perform, draws = PERFORMED[kind]
+    return perform(lab, plan, *([rng] if draws else []))[0]
 
 
 def softened(plant: Plant) -> Plant:
@@ -113,13 +111,11 @@ def scored(lab: Laboratory, config: Config, kind: str, rng: np.random.Generator,
     return scorer.score(taken.trials[truth.name])
 
 
-def wanted(seeds: int, unchanged: int) -> list[tuple[str, str, int]]:
-    """Arm, kind and number of every trial, in the order in which they are done."""
-    after = [("softer", kind, i) for kind, each in AFTER.items() for i in range(each * seeds)]
+def wanted() -> list[tuple[str, str, int]]:
+    """Arm, kind and number of every trial, in the order in which they are done; the unchanged arm's are mixed."""
+    after = [("softer", kind, i) for kind, each in AFTER.items() for i in range(each * SEEDS)]
     before = [("unchanged", kind, i) for kind, each in EACH.items() for i in range(each)]
-    order = np.random.default_rng(SEED).permutation(len(before))  # the mixture is the same, however many are done
-    first = len(TELLING) * AFTER[TELLING[0]] * seeds
-    return after[:first] + [before[i] for i in order[:unchanged]] + after[first:]
+    return after + [before[i] for i in np.random.default_rng(SEED).permutation(len(before))]
 
 
 def collect(rows: Rows, trials: list[tuple[str, str, int]], scorer: Scorer) -> None:
@@ -246,7 +242,7 @@ def outcome(empty: Chart, case: tuple[list[Score], list[Score]]) -> tuple[int, C
     return 0, chart
 
 
-def report(reference: list[Score], trials: list, rows: dict[str, dict], seeds: int, scorer: Scorer) -> None:
+def report(reference: list[Score], trials: list, rows: dict[str, dict], scorer: Scorer) -> None:
     """What the scores so far say."""
     names = scorer.parameters
     told = {key: str(rows[name]["told"]) for key in trials if (name := "_".join(map(str, key))) in rows}
@@ -254,11 +250,11 @@ def report(reference: list[Score], trials: list, rows: dict[str, dict], seeds: i
     scores = {key: unpacked(text) for key, text in told.items() if not text.startswith("refused")}
     unchanged = [score for (arm, _, _), score in scores.items() if arm == "unchanged"]
     softer = {kind: {i: s for (arm, k, i), s in scores.items() if (arm, k) == ("softer", kind)} for kind in AFTER}
-    orders = [np.random.default_rng([SEED, seed]).permutation(len(unchanged)) for seed in range(seeds)]
+    orders = [np.random.default_rng([SEED, seed]).permutation(len(unchanged)) for seed in range(SEEDS)]
     mixed = [[unchanged[i] for i in order] for order in orders]
     firsts = [[s for kind in KINDS for s in [s for s in own if s.kind == kind][:LEARN]] for own in mixed]
     seen, wolf = [], []
-    for words, references in (("as they come", firsts), ("as planned", [reference] * seeds)):
+    for words, references in (("as they come", firsts), ("as planned", [reference] * SEEDS)):
         known = [{id(score) for score in own} for own in references]
         rests = [[score for score in own if id(score) not in ids] for own, ids in zip(mixed, known, strict=True)]
         made = {id(own): chart_of(Baseline(own), len(names)) for own in references}
@@ -277,23 +273,16 @@ def report(reference: list[Score], trials: list, rows: dict[str, dict], seeds: i
 
 @in_one_line
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="studies.watch", description=__doc__)
-    parser.add_argument("--seeds", type=int, default=SEEDS, help="charts of the softer arm, of each kind of trial")
-    parser.add_argument("--unchanged", type=int, default=sum(EACH.values()), help="trials of the other, at most")
-    arguments = parser.parse_args()
     require_demo(MODEL)
     scorer = scorer_of(MODEL, Path("."))
     lab = [*sorted(Path("demo").rglob("*.py")), ROOT / "conf"]
     rows = Rows("watch", digest((SEED, SOFTER, scorer.parameters), MODEL, TRIALS, *lab), "trial")
     with threadpool_limits(1, user_api="blas"):
         reference = referred(rows, scorer)
-        trials = wanted(arguments.seeds, arguments.unchanged)
+        trials = wanted()
         collect(rows, trials, scorer)
-        known, whole = rows.read(), (arguments.seeds, arguments.unchanged) == (SEEDS, sum(EACH.values()))
-        with recorded("watch", keep=whole, origin=rows.origin):
-            report(reference, trials, known, arguments.seeds, scorer)
-            if line := rows.attempts():
-                print(line)
+        with rows.recorded(keep=True):
+            report(reference, trials, rows.read(), scorer)
     return 0
 
 

@@ -26,8 +26,9 @@ from upkeep.origin import Origin, code_of, git, origin_of, reads_of
 
 FOLDER = Path("docs/results")
 COMMANDS = ("studies", "benchmarks", "qualification")  # rooms whose commands keep results
-RECORDED = re.compile(r"\b(?:recorded|qualify)\(\"(\w+)\"")
-ARCHIVES = {"results-1": "f922469a"}  # the commit of each tag, as a tag may not travel with a clone
+RECORDED = re.compile(r"\b(?:recorded|qualify|Rows)\(\"(\w+)\"")
+# the commit of each tag, as a tag may not travel with a clone
+ARCHIVES = {"results-1": "f922469a", "results-2": "3a340d6b"}
 
 
 class Both(io.TextIOBase):

@@ -7,6 +7,7 @@ done; stopped, it goes on from there. Rows of other code, other settings or anot
 """
 
 import argparse
+import contextlib
 import sys
 import time
 from dataclasses import asdict, astuple, fields
@@ -15,7 +16,7 @@ from pathlib import Path
 import pandas as pd
 from omegaconf import OmegaConf
 
-from studies.payload.chart import Cell, HeaviestMass, PayloadSettings, cells, chart_rows
+from studies.payload.chart import Cell, HeaviestMass, PayloadSettings, cells, heaviest
 from studies.payload.figure import payload_figure
 from studies.rows import Rows, digest
 from trunkline.ar.hybrid.friction import IMPRATIO, SOLIMP, SOLREF
@@ -25,7 +26,6 @@ from trunkline.model_files import read_spec
 from trunkline.pipeline.config import validated
 from trunkline.report.figures.style import save_figure
 from trunkline.settings import read_yaml
-from upkeep.results import recorded
 
 MODEL = Path("artifacts/identify_control/arm.xml")
 SETTINGS = Path("studies/payload/payload.yaml")
@@ -59,10 +59,11 @@ def main() -> int:
     made_of = digest((sorted(settings.items()), IMPRATIO, SOLREF, SOLIMP), MODEL)
     rows = None if options.quick else Rows("payload", made_of, "cell")
     outcomes = {} if rows is None else rows.read()
-    done = {cell for cell in cells(chart) if name_of(cell) in outcomes}
+    todo = [cell for cell in cells(chart) if name_of(cell) not in outcomes][: options.cells]
     begun, grasps = time.process_time(), 0
-    with progress(min(len(cells(chart)) - len(done), options.cells), "payload", "cells") as bar:
-        for _, (cell, outcome) in zip(range(options.cells), chart_rows(arm, chart, done), strict=False):
+    with progress(len(todo), "payload", "cells") as bar:
+        for cell in todo:
+            outcome = heaviest(arm, chart, cell)
             found = {name: float(f"{value:.6g}") if isinstance(value, float) else value
                      for name, value in (asdict(cell) | asdict(outcome)).items()}  # fmt: skip
             outcomes[name_of(cell)] = found
@@ -75,10 +76,8 @@ def main() -> int:
         is_whole = rows is not None and len(table) == len(cells(chart))
         if is_whole:
             save_figure(payload_figure(table), FIGURE)
-        with recorded("payload", keep=is_whole, origin=rows and rows.origin):
+        with contextlib.nullcontext() if rows is None else rows.recorded(is_whole):
             print(table[[*KEYS, *FOUND]].to_string(index=False))
-            if rows is not None and (line := rows.attempts()):
-                print(line)
     if grasps:
         print(f"{grasps} grasps, {(time.process_time() - begun) / grasps:.2f} s of processor each")
     return 0

@@ -8,7 +8,6 @@ An object hangs from a hook above it, its axis level and across the bending plan
 its bar level, all others with their axis upright. The arm hangs straight down beside it and bends in a vertical plane.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 from typing import Annotated, Literal
@@ -143,8 +142,8 @@ def try_masses(arm: mujoco.MjSpec, chart: PayloadSettings, cell: Cell, wrap: flo
             if middle[2] + thing.half_height > 0:
                 raise InputError(f"height: found {chart.height} m, expected an object below the mount")
         surfaces = {TABLE: SupportSurface([0.0, 0.0, top], list(TABLE_SIZE), "wood")}
-    mount, world = FixedMount("fixed"), WorldGeometry(None, surfaces, hook)
-    model = compose(arm, mount, world, Placed(thing, middle, quaternion, hanging)).compile()
+    world = WorldGeometry(None, surfaces, hook)
+    model = compose(arm, FixedMount("fixed"), world, Placed(thing, middle, quaternion, hanging)).compile()
     model.opt.timestep = chart.timestep
     draws = np.random.default_rng(chart.seed).normal(size=(chart.placements, 2)) * chart.spread
     poses = np.tile([*middle, *quaternion], (chart.placements, 1))
@@ -156,7 +155,7 @@ def try_masses(arm: mujoco.MjSpec, chart: PayloadSettings, cell: Cell, wrap: flo
     tries = Tries(
         np.tile(poses, (len(masses), 1)), np.repeat(masses, chart.placements), pulls, np.full(count, cell.friction)
     )
-    return try_grasps(model, compose(arm, mount).compile(), tries, chart.schedule, tuple(surfaces))
+    return try_grasps(model, tries, chart.schedule, tuple(surfaces))
 
 
 def heaviest(arm: mujoco.MjSpec, chart: PayloadSettings, cell: Cell) -> HeaviestMass:
@@ -180,10 +179,3 @@ def heaviest(arm: mujoco.MjSpec, chart: PayloadSettings, cell: Cell) -> Heaviest
         else:
             lost = rung
     return HeaviestMass(chart.masses[heaviest_held], best, wrap, grasps)
-
-
-def chart_rows(arm: mujoco.MjSpec, chart: PayloadSettings, done: set[Cell]) -> Iterator[tuple[Cell, HeaviestMass]]:
-    """Every cell that is not `done`, with what came of it."""
-    for cell in cells(chart):
-        if cell not in done:
-            yield cell, heaviest(arm, chart, cell)

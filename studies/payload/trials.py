@@ -1,9 +1,8 @@
 """Grasps tried in a batch: the arm closes on an object, which then loses its support, and the mount shakes.
 
-The mount stands still, and all is simulated in the frame of the arm's base: mounts that differ are worlds and gravities
-that differ. To lift is to take the support away: the hook lets go, and tables sink at the speed at which the arm would
-rise. To shake the mount with acceleration a is to shake gravity, g - a: an object that the arm holds cannot tell, and
-what stands below is gone by then.
+The mount stands still at the origin. To lift is to take the support away: the hook lets go, and tables sink at the
+speed at which the arm would rise. To shake the mount with acceleration a is to shake gravity, g - a: an object that the
+arm holds cannot tell, and what stands below is gone by then.
 """
 
 import re
@@ -14,15 +13,13 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 from pydantic import Field
-from scipy.spatial.transform import Rotation
 
 from trunkline.ar.hybrid.objects import GRIP, object_geoms
 from trunkline.ar.hybrid.outcomes import stays
 from trunkline.ar.hybrid.worlds import HOOK_LENGTH
-from trunkline.frames import STANDARD_GRAVITY, rotation_from_wxyz, wxyz_from_rotation
+from trunkline.frames import STANDARD_GRAVITY, rotation_from_wxyz
 from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.motion import batch_of, hold, move
-from trunkline.model.simulation.rest import settle
 from trunkline.model.simulation.winch import Winches
 
 Seconds = Annotated[float, Field(gt=0, le=60)]
@@ -31,8 +28,6 @@ PAID_OUT = 0.2  # m, of a cable that does not pull: out of the way of any bend
 PAY_TIME = 0.3  # s, in which it is paid out
 UNIT_CENTER = re.compile(r"unit_\d+_center")
 RECORD = ("site_xpos",)
-UP = (0.0, 0.0, 1.0)
-AT_ORIGIN = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # a pose
 
 
 @dataclass
@@ -75,20 +70,16 @@ class Tries:
     """B grasps to be tried.
 
     Attributes:
-        poses: of the objects in the world at first, position, m, and quaternion. Shape (B, 7). A hook moves along.
+        poses: of the objects in the base frame at first, position, m, and quaternion. Shape (B, 7). A hook moves along.
         masses: kg. Shape (B,).
         pulls: how much shorter than in the straight arm each cable is commanded, m; one of 0 is paid out. Shape (B, K).
         friction: sliding coefficients of the objects. Shape (B,).
-        mounts: poses of the arm's base in the world, likewise; at its origin by default. Shape (B, 7).
-        before: pulls under which the arm rests at first; straight by default. Shape (B, K).
     """
 
     poses: np.ndarray
     masses: np.ndarray
     pulls: np.ndarray
     friction: np.ndarray
-    mounts: np.ndarray | None = None
-    before: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.poses)
@@ -103,15 +94,11 @@ class Tried:
             NaN once MuJoCo has warned.
         distance: from there to the centre of the nearest unit, m. Shape (B, F).
         let_go: the row from which the object had no support.
-        tensions: of the cables when the object was let go, N. Shape (B, K).
-        qpos: of the model in the end. Shape (B, nq).
     """
 
     path: np.ndarray
     distance: np.ndarray
     let_go: int
-    tensions: np.ndarray
-    qpos: np.ndarray
 
     @property
     def dropped(self) -> np.ndarray:
@@ -125,50 +112,41 @@ class Tried:
             return stays(self.dropped, self.distance[:, self.let_go], self.distance[:, -1], sag, slip)
 
 
-def try_grasps(
-    model: mujoco.MjModel, arm: mujoco.MjModel, tries: Tries, schedule: Schedule, surfaces: tuple[str, ...] = ()
-) -> Tried:
-    """Try B grasps.
+def try_grasps(model: mujoco.MjModel, tries: Tries, schedule: Schedule, surfaces: tuple[str, ...] = ()) -> Tried:
+    """Try B grasps, the arm straight at first.
 
     Args:
         model: composed on a fixed mount at the origin, with a body `object`, which may hang by equality `hanging`.
-        arm: composed likewise, by itself.
         surfaces: geoms that sink.
     """
     count, timestep, address = len(tries), model.opt.timestep, model.jnt_qposadr[model.joint("object").id]
     batch = batch_of(model, count)
-    to_base = _set_up(batch, model, tries)
+    _set_up(batch, model, tries)
     place, gravity, geoms = batch.bind("qpos"), batch.expand("opt.gravity"), batch.expand("geom_pos")
-    motors = ArmModel(model).actuators
-    straight = model.tendon_length0[model.actuator_trnid[motors, 0]]
-    begun = np.zeros((count, len(motors))) if tries.before is None else tries.before
-    initial = straight + np.where(begun > 0, -begun, 0.0 if tries.before is None else PAID_OUT)
-    if tries.before is not None:
-        place[:, : arm.nq] = settle(arm, initial, to_base.apply(model.opt.gravity)).qpos
-    ArmModel(model).unload_branches(place)
-    tie = _hang(batch, model, place[:, address : address + 7], to_base.apply(UP))
+    arm = ArmModel(model)
+    straight = model.tendon_length0[model.actuator_trnid[arm.actuators, 0]]
+    initial = np.tile(straight, (count, 1))
+    place[:, address : address + 7] = tries.poses
+    arm.unload_branches(place)
+    tie = _hang(batch, model, tries.poses)
 
     steps, simulations = round(BLOCK / timestep), np.arange(count, dtype=np.int32)
     hold(batch, model, initial)
     winches = Winches(batch, initial)
     blocks = round(schedule.length / BLOCK)
     centers = [site for site in range(model.nsite) if UNIT_CENTER.fullmatch(model.site(site).name)]
-    distance = np.full((count, blocks), np.nan)
-    path, tensions = np.full((count, blocks, 3), np.nan), np.full((count, len(straight)), np.nan)
+    distance, path = np.full((count, blocks), np.nan), np.full((count, blocks, 3), np.nan)
     grip, sinking = model.site(GRIP).id, [model.geom(name).id for name in surfaces]
-    sink = to_base.apply([0, 0, -schedule.sink * BLOCK])
     moving, let_go = simulations, round(schedule.let_go / BLOCK)
     for block in range(blocks):
         time = block * BLOCK
-        gravity[:] = to_base.apply(model.opt.gravity - schedule.acceleration(time))
-        if block == let_go:
-            tensions[moving] = -batch.bind("actuator_force")[moving][:, motors]
-            if tie is not None:
-                batch.bind("eq_active")[:, tie] = 0
+        gravity[:] = model.opt.gravity - schedule.acceleration(time)
+        if block == let_go and tie is not None:
+            batch.bind("eq_active")[:, tie] = 0
         if block >= let_go:
-            geoms[:, sinking] += sink[:, None]
+            geoms[:, sinking, 2] -= schedule.sink * BLOCK
         times = time + timestep * np.arange(steps)
-        commands = straight + _drawn(initial[moving] - straight, tries.pulls[moving], times, schedule.close)
+        commands = straight + _drawn(tries.pulls[moving], times, schedule.close)
         recorded = move(batch, winches.deliver(commands, moving), RECORD, steps, steps - 1, ids=moving)
         path[moving, block] = recorded["site_xpos"][:, 0, grip]
         away = recorded["site_xpos"][:, 0, centers] - path[moving, block, None]
@@ -177,24 +155,18 @@ def try_grasps(
         if not len(moving):
             break
     path[batch.warning.any(axis=(1, 2)), -1] = np.nan
-    return Tried(path, distance, let_go, tensions, place.copy())
+    return Tried(path, distance, let_go)
 
 
-def _drawn(begun: np.ndarray, pulls: np.ndarray, time: np.ndarray, close: float) -> np.ndarray:
-    """Commands at `time` (T,), less the straight arm's, m, from `begun` (B, K) on. Shape (B, T, K)."""
+def _drawn(pulls: np.ndarray, time: np.ndarray, close: float) -> np.ndarray:
+    """Commands at `time` (T,), less the straight arm's, m, from straight to `pulls` (B, K). Shape (B, T, K)."""
     drawn, paid = np.minimum(time / close, 1)[:, None], np.minimum(time / PAY_TIME, 1)[:, None]
-    closed, begun, pulled = np.where(pulls > 0, -pulls, PAID_OUT)[:, None], begun[:, None], pulls[:, None] > 0
-    return begun + np.where(pulled, drawn, paid) * (closed - begun)
+    pulls = pulls[:, None]
+    return np.where(pulls > 0, -drawn * pulls, paid * PAID_OUT)
 
 
-def _set_up(batch: Batch, model: mujoco.MjModel, tries: Tries) -> Rotation:
-    """Give each simulation its world, as its mount has it, and its object; the turns from the world into the bases."""
-    mounts = np.tile(AT_ORIGIN, (len(tries), 1)) if tries.mounts is None else tries.mounts
-    to_base = rotation_from_wxyz(mounts[:, 3:]).inv()
-    fixed = np.flatnonzero(model.geom_bodyid == 0)
-    for geom in fixed:
-        batch.expand("geom_pos")[:, geom] = to_base.apply(model.geom_pos[geom] - mounts[:, :3])
-        batch.expand("geom_quat")[:, geom] = wxyz_from_rotation(to_base * rotation_from_wxyz(model.geom_quat[geom]))
+def _set_up(batch: Batch, model: mujoco.MjModel, tries: Tries) -> None:
+    """Give each simulation the friction and the mass of its object."""
     body = model.body("object").id
     for geom in object_geoms(model):
         friction = model.geom_friction[geom]
@@ -202,19 +174,14 @@ def _set_up(batch: Batch, model: mujoco.MjModel, tries: Tries) -> Rotation:
     batch.expand("body_mass")[:, body] = tries.masses
     batch.expand("body_inertia")[:, body] = model.body_inertia[body] * (tries.masses / model.body_mass[body])[:, None]
     batch.set_const()
-    address = model.jnt_qposadr[model.joint("object").id]
-    place = batch.bind("qpos")
-    place[:, address : address + 3] = to_base.apply(tries.poses[:, :3] - mounts[:, :3])
-    place[:, address + 3 : address + 7] = wxyz_from_rotation(to_base * rotation_from_wxyz(tries.poses[:, 3:]))
-    return to_base
 
 
-def _hang(batch: Batch, model: mujoco.MjModel, poses: np.ndarray, up: np.ndarray) -> int | None:
+def _hang(batch: Batch, model: mujoco.MjModel, poses: np.ndarray) -> int | None:
     """Put each hook where the object's own pose asks for it; the number of the equality, None where nothing hangs."""
     tie = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_EQUALITY, "hanging")
     if tie < 0:
         return None
     ends = poses[:, :3] + rotation_from_wxyz(poses[:, 3:]).apply(model.eq_data[tie, :3])
     batch.expand("eq_data")[:, tie, 3:6] = ends
-    batch.expand("geom_pos")[:, model.geom("hook").id] = ends + HOOK_LENGTH / 2 * up
+    batch.expand("geom_pos")[:, model.geom("hook").id] = ends + [0, 0, HOOK_LENGTH / 2]
     return tie

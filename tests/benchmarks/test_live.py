@@ -10,7 +10,7 @@ import pytest
 from aiohttp import WSMessage, WSMsgType
 
 from benchmarks.live import Holds, Looks, halves
-from benchmarks.watching import Asker, Frames, Span
+from benchmarks.watching import Asker, RobotFrames, Span
 from trunkline.ar.session import binary
 from trunkline.errors import InputError
 
@@ -31,7 +31,7 @@ def test_ages_are_from_the_time_that_is_told_until_a_frame_has_come():
 
 
 def test_frames_of_the_robot_alone_are_kept_with_the_time_they_tell():
-    frames = Frames()
+    frames = RobotFrames()
     for kind in ("robot", "shell"):
         message = binary.frame(kind, set(), 0, 1, 3.25, np.empty(0))
         frames(WSMessage(WSMsgType.BINARY, message, None))

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from tests.mutants.operators import mutants
-from tests.mutants.targets import drawn, read_reasons
+from tests.mutants.targets import drawn, read_reasons, read_targets
 
 JUDGE = """
 LONGEST = 3
@@ -214,3 +214,10 @@ def test_a_sample_is_the_same_for_a_seed_and_another_for_another():
 def test_reasons_are_read_by_mutant(tmp_path):
     write(tmp_path, [], {"why": ["a", "b"], "because": ["c"]})
     assert read_reasons(tmp_path) == {"a": "why", "b": "why", "c": "because"}
+
+
+def test_every_target_edit_and_reason_that_is_committed_is_of_the_code_as_it_is():
+    """Else `make mutants_sample` says so, which `make test` does not run."""
+    folder = Path(__file__).parent
+    every = {mutant.key for mutant in read_targets(folder, folder.parents[1])}
+    assert read_reasons(folder).keys() <= every

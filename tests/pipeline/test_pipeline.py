@@ -303,7 +303,7 @@ def test_an_edit_reruns_exactly_what_depends_on_it(pipeline, stages, name):
         ("trunkline/identification/fit/search.py", ["identify_stiffness", "identify_damping", "identify_control"]),
         ("trunkline/kinematics/dataset/sampling.py", ["report", "fk_dataset", "train_ik", "reachability"]),
         ("trunkline/kinematics/ik/network.py", ["train_ik"]),
-        ("trunkline/kinematics/panda/inverse.py", ["reachability"]),
+        ("trunkline/kinematics/panda/inverse.py", ["report", "reachability"]),
         ("trunkline/report/certificate/budget.py", ["report"]),
         ("trunkline/unity/rules.py", ["package_unity"]),
     ],

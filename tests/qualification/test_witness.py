@@ -12,7 +12,7 @@ TENDONS = 3
 
 def test_a_motion_and_its_first_hold_are_noted():
     context = multiprocessing.get_context("spawn")
-    witness = Witness(context)
+    witness = context.RawValue(Witness)
     channel = Watched(context, TENDONS, 1, witness)
 
     def tell(joint, cable, mode, serial, held):

@@ -1,6 +1,7 @@
 """Operator, core, planner and a robot that goes where it is sent: from hands to a motion, only after a confirmation."""
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,14 +12,20 @@ from rehearsal import settings
 from rehearsal.experiments.bench import ORIGINS, rehearse
 from rehearsal.operator.hands import RayHand
 from rehearsal.operator.scripts import Operator
-from rehearsal.session import REFERENCE, Session
+from rehearsal.session import RATE, REFERENCE, TICKS, RehearsedRobot, Session
 from tests.ar.teleop.test_plan import BENT, LIMITS, NETWORK, OFFSET, START, STRAIGHT
 from tests.support.operator import PACKAGE, Everywhere, config
 from trunkline.ar.hybrid.rollout_batch import Stated
 from trunkline.ar.preview.grasp_preview import GraspPreviewer
-from trunkline.ar.teleop.messages import World
+from trunkline.ar.session.robot import DEAD_MAN
+from trunkline.ar.teleop.executor import BRAKE
+from trunkline.ar.teleop.following import Following
+from trunkline.ar.teleop.messages import ExecutorReport, World
+from trunkline.ar.teleop.plan import Plan
 from trunkline.ar.teleop.planner import Planner
 from trunkline.ar.teleop.rigid_ik import RigidIK
+from trunkline.ar.teleop.trajectory import JOINTS, gentle
+from trunkline.errors import InputError
 
 THING = np.array([0.6, 0.1, 0.1])
 PREDICTION = SimpleNamespace(
@@ -70,7 +77,7 @@ class Sent:
         self.sent.append(np.append(joints, pulls))
 
     def advance(self, dt):
-        pass
+        self.time += dt
 
 
 def session(off: list[float]) -> tuple[Session, Operator]:
@@ -173,3 +180,91 @@ def test_the_plan_that_was_run_is_foreseen_when_it_is_asked_for(ran):
     np.testing.assert_allclose(made.robot.joints[0], plan.joints[-1], atol=1e-9)
     assert made.predict().digest == plan.digest()
     assert len(asked) == 1, "once"
+
+
+# --- the robot, by itself
+
+
+FRAMES = round((DEAD_MAN + BRAKE) * RATE) + 2  # in which one that is not permitted any more has come to rest
+
+
+class Refusing(Sent):
+    """A robot that takes no command from the one numbered `first` on."""
+
+    def __init__(self, first):
+        super().__init__()
+        self.first = first
+
+    def send(self, joints, pulls):
+        super().send(joints, pulls)
+        if len(self.sent) >= self.first:
+            raise InputError(f"command {len(self.sent)}: refused")
+
+
+def rehearsed(stand_in, turn=0.5) -> tuple[RehearsedRobot, Plan]:
+    """At rest, and a plan from there on."""
+    here = np.append(START, STRAIGHT)
+    rows = gentle(here, here + turn * np.eye(len(here))[0], LIMITS, 0.01, 2.0)
+    plan = Plan(0.01, rows[:, :JOINTS], rows[:, JOINTS:], (("approach", 0),), PACKAGE, "world")
+    return RehearsedRobot(stand_in, Arc([]), LIMITS, OFFSET), plan  # type: ignore[arg-type]
+
+
+def frames(robot: RehearsedRobot, count: int, permits: bool) -> None:
+    for _ in range(count):
+        if permits:
+            robot.permit()
+        robot.advance()
+
+
+def test_a_rehearsed_robot_does_not_begin_without_a_permit():
+    robot, plan = rehearsed(Sent())
+    assert robot.start(plan, plan.digest()) == ""
+    frames(robot, 60, permits=False)
+    np.testing.assert_array_equal(robot.axes.joints, START)
+    assert not robot.moved
+
+
+def test_a_rehearsed_robot_is_sent_where_its_axes_are_and_outlasts_a_few_frames_without_a_permit():
+    robot, plan = rehearsed(stand_in := Sent())
+    assert robot.start(plan, plan.digest()) == ""
+    while robot.state().mode == "running":
+        frames(robot, 1, permits=True)
+        frames(robot, int(DEAD_MAN * RATE) - 1, permits=False)
+        np.testing.assert_array_equal(stand_in.sent[-1], [*robot.axes.joints, *(STRAIGHT - robot.axes.commands)])
+    assert robot.state() == ExecutorReport("done", plan.digest())
+    assert stand_in.time == pytest.approx(len(stand_in.sent) / RATE / TICKS)
+
+
+@pytest.mark.parametrize(("follows", "count"), [(False, 40), (True, 15)])  # frames until it is under way
+def test_a_rehearsed_robot_that_is_not_permitted_any_more_rests_and_goes_on_by_another_start_alone(follows, count):
+    robot, plan = rehearsed(Sent())
+    begins = partial(robot.start, plan, plan.digest())
+    if follows:
+        begins = partial(robot.follow, Following(0.3, 0.0, OFFSET))
+    assert begins() == ""
+    for _ in range(count):
+        robot.hear(0.0, np.append(plan.joints[-1], plan.commands[-1]) if follows else None)
+        frames(robot, 1, permits=True)
+    assert robot.state().mode == "running"
+    frames(robot, FRAMES + 30 * follows, permits=False)
+    assert robot.state().mode == "idle"
+    rests = robot.axes.joints.copy()
+    assert START[0] + 0.01 < rests[0] < plan.joints[-1, 0] - 0.01
+    frames(robot, 60, permits=True)
+    np.testing.assert_array_equal(robot.axes.joints, rests)
+    assert (begins() == "") == follows, "the plan begins elsewhere"
+
+
+def test_a_rehearsed_robot_brakes_as_soon_as_it_refuses_a_command_and_says_the_first():
+    """As the process of a live session's robot does: it does not wait until it is not permitted any more."""
+    robot, plan = rehearsed(Refusing(first=60))
+    assert robot.start(plan, plan.digest()) == ""
+    while robot.state().mode == "running":
+        frames(robot, 1, permits=True)
+    assert robot.state() == ExecutorReport("fault", plan.digest(), "command 60: refused")
+    frames(robot, round(BRAKE * RATE) + 1, permits=True)
+    rests = robot.axes.joints.copy()
+    frames(robot, 60, permits=True)
+    np.testing.assert_array_equal(robot.axes.joints, rests)
+    assert rests[0] < plan.joints[-1, 0] - 0.01
+    assert robot.state().fault == "command 60: refused"

@@ -7,7 +7,7 @@ import pytest
 from omegaconf import OmegaConf
 
 from stages.build_mjcf import Config as CadConfig
-from studies.effects import EFFECTS, Effect
+from studies.effects import EFFECTS, ModelEffect
 from tests.support.workbench import ROOT
 from trunkline.pipeline.config import load_config
 
@@ -41,7 +41,7 @@ def departures(chosen: dict[str, bool], on: dict[str, bool], table: dict[str, tu
     return problems
 
 
-def is_in(effect: Effect, cad: CadConfig, identified: set[str]) -> bool:
+def is_in(effect: ModelEffect, cad: CadConfig, identified: set[str]) -> bool:
     """Whether the CAD model has its parts and the stages identify its parameters."""
     parts = [cad.joints.round] if effect.joints.round else []
     parts += [bool(cad.joints.sliders)] if effect.joints.sliders else []

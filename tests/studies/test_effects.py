@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from studies import effects
-from studies.choices import Chain
 from studies.effects import EFFECTS, NO_LAG, cad_model, settings_of, tried, validated
 from studies.rows import Rows
+from studies.stage_chain import StageChain
 from tests.support.matched_plant import curl, markers_of, small_model
 from trunkline.identification.simulate.experiment import prepare
 from upkeep.origin import Origin
@@ -35,7 +35,7 @@ def test_errors_stand_beside_null_model_cad_model_and_noise_floor():
     cad.jnt_stiffness[:] *= 3
     trials = [curl(plant, 20, split, frames=60, noise=1e-4) for split in ("identify", "validate")]
     experiments = [prepare(trial, model, 60) for trial in trials]
-    link = Chain(model, experiments, SimpleNamespace(markers=markers_of(model)), [], None)
+    link = StageChain(model, experiments, SimpleNamespace(markers=markers_of(model)), [], None)
     (row,) = validated("this", link, trials, cad)
     title, kind, _, position, tip, percent, null, guess, floor = row.strip("| ").split(" | ")
     assert (title, kind) == ("this", "curl")
@@ -50,15 +50,15 @@ WORTH = {"hardening": 1.0, "round": -0.5, "place": 0.25, "branch": 0.5}  # mm by
 def test_an_effect_is_kept_if_it_pays_and_is_not_tried_twice(monkeypatch, tmp_path):
     fits = []
 
-    def left_out(kept, stage, folds):
+    def left_out(kept, stage):
         fits.append((stage, len(kept)))
         noise = 0.1 * np.array([-1, 1, 0]) * len(kept)
         return 5.0 - sum(WORTH[name] for name in WORTH if EFFECTS[name] in kept) + noise
 
     monkeypatch.setattr(effects, "left_out", left_out)
-    monkeypatch.setattr(effects, "chain", lambda kept, stage, known: kept)
+    monkeypatch.setattr(effects, "chain", lambda kept, stage, chains: kept)
     table = Rows("effects", "arm", "effect", tmp_path, Origin("aaaaaaa", "", {}))
-    kept = tried(["hardening", "round", "place"], table, 3, {})
+    kept = tried(["hardening", "round", "place"], table, {})
     assert kept == [EFFECTS["hardening"], EFFECTS["place"]]
     assert fits == [("identify_stiffness", number) for number in (0, 1, 2, 2)]
     rows = table.read()
@@ -68,6 +68,6 @@ def test_an_effect_is_kept_if_it_pays_and_is_not_tried_twice(monkeypatch, tmp_pa
         ("yes", pytest.approx(0.25), pytest.approx(4.0)),
     ]
     fits.clear()
-    assert tried(list(WORTH), table, 3, {}) == [*kept, EFFECTS["branch"]]
+    assert tried(list(WORTH), table, {}) == [*kept, EFFECTS["branch"]]
     assert fits == [("identify_damping", 2), ("identify_damping", 3)]
     assert list(table.read()) == list(WORTH)

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.model.arm_model import ArmModel
 from trunkline.twin.posterior import Posterior
 from trunkline.twin.twin import Provenance, Twin
 
@@ -13,7 +14,8 @@ from trunkline.twin.twin import Provenance, Twin
 def twin_of(model: mujoco.MjModel, tables: dict[str, dict] | None = None) -> Twin:
     """Of a model, as if stages had written `tables` of it."""
     tables = tables or {}
-    return Twin(mujoco.MjSpec(), model, Posterior.from_tables(tables), Provenance(Path("arm.xml"), {}, tables))
+    provenance = Provenance(Path("arm.xml"), {}, tables)
+    return Twin(mujoco.MjSpec(), ArmModel(model), Posterior.from_tables(tables), provenance)
 
 
 def posterior_about(

@@ -29,7 +29,7 @@ def test_a_folder_of_artifacts_and_its_last_model_are_one_twin(artifacts):
     assert twin.provenance == alone.provenance
     assert list(twin.provenance.tables) == ["identify_stiffness", "identify_damping", "identify_control"]
     assert list(twin.provenance.files)[0] == (artifacts / "identify_control/arm.xml").as_posix()
-    assert twin.arm.nu > 0
+    assert twin.arm.model.nu > 0
     assert "kp" in twin.posterior.names
     assert same(twin.posterior, alone.posterior)
 
@@ -38,6 +38,26 @@ def test_an_earlier_model_knows_no_later_table(artifacts):
     assert list(Twin.load(artifacts / "identify_damping/arm.xml").provenance.tables) == [
         "identify_stiffness", "identify_damping"
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("stage", ["identify_damping", "identify_control"])
+def test_a_stage_that_ran_without_a_table_is_refused(stage, artifacts, tmp_path):
+    """Else what it identified would count as known to the last digit."""
+    for name in ("identify_stiffness", "identify_damping", "identify_control"):
+        shutil.copytree(artifacts / name, tmp_path / name)
+    (tmp_path / stage / "parameters.json").unlink()
+    with pytest.raises(InputError, match=f"{stage}/parameters.json"):
+        Twin.load(tmp_path)
+
+
+def test_in_a_stage_s_own_folder_its_model_knows_the_tables_before_it(artifacts, monkeypatch):
+    there = Twin.load(artifacts / "identify_control/arm.xml")
+    monkeypatch.chdir(artifacts / "identify_control")
+    here = Twin.load("arm.xml")
+    assert list(here.provenance.tables) == list(there.provenance.tables)
+    assert here.provenance.fitted_to == there.provenance.fitted_to
+    assert here.provenance.digest == there.provenance.digest
+    assert same(here.posterior, there.posterior)
 
 
 def test_a_package_has_the_same_posterior_packed_and_unpacked(artifacts, tmp_path):
@@ -52,6 +72,15 @@ def test_a_package_has_the_same_posterior_packed_and_unpacked(artifacts, tmp_pat
     assert packed.provenance.package
     assert packed.provenance.digest == made_of.provenance.digest
     assert packed.provenance.fitted_to == made_of.provenance.fitted_to
+
+
+@pytest.mark.parametrize("damaged", ["Runtime/Model/parameters.json", "Runtime/Model/calibrated.xml"])
+def test_a_damaged_package_is_one_line(damaged):
+    with pytest.raises(InputError, match=f"{damaged}: found sha256"):
+        Twin.of_package(read_tarball(package()) | {damaged: b"{"})
+    files = {path: data for path, data in read_tarball(package()).items() if path != damaged}
+    with pytest.raises(InputError, match=f"{damaged}: found sha256 none"):
+        Twin.of_package(files)
 
 
 def test_a_model_that_no_stage_identified_leaves_nothing_open(artifacts, tmp_path):

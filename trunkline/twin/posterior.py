@@ -63,8 +63,11 @@ class Posterior:
                 for j, other in enumerate(stages):
                     if i != j and stage == other:
                         correlation[i, j] = tables[stage]["correlation"][name][names[j]]
-            except (KeyError, TypeError, ValueError) as error:
-                complaint = f"{error!r}, expected what a stage of identification writes"
+            except KeyError as error:
+                way_out = "expected it: make artifacts and packages of an earlier release anew"
+                raise InputError(f"{stage}/parameters.json: {name}: found no {error}, {way_out}") from error
+            except (TypeError, ValueError) as error:
+                complaint = f"found {error}, expected what a stage of identification writes"
                 raise InputError(f"{stage}/parameters.json: {name}: {complaint}") from error
         estimate, half, degrees, low, high = rows.T
         return cls(names, stages, estimate, half / stdtrit(degrees, 0.975), degrees, correlation, low, high)
@@ -83,6 +86,7 @@ class Posterior:
         """What was identified, in the parameter's unit."""
         return float(parameter_named(name).value(self.estimate[self.names.index(name)]))
 
+    @np.errstate(over="ignore")  # far draws of a few degrees of freedom, which the range cuts
     def values(self, z: np.ndarray) -> dict[str, np.ndarray]:
         """By name, in the parameters' units, from z of shape (D, P), no further out than the range."""
         return {

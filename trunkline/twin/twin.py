@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from trunkline.errors import InputError
 from trunkline.files import file_digest
-from trunkline.identification.stages import MODEL, STAGES, TABLE, final_model, read_tables
+from trunkline.identification.stages import MODEL, STAGES, TABLE, final_model, read_table, read_tables
+from trunkline.model.arm_model import ArmModel
 from trunkline.model_files import read_spec
 from trunkline.twin.package import MANIFEST, arm_of, manifest_of, package_digest, read_package, tables_of
 from trunkline.twin.posterior import Posterior
@@ -52,7 +53,7 @@ class Twin:
     and cables that rub. posterior: of its parameters."""
 
     spec: mujoco.MjSpec
-    arm: mujoco.MjModel
+    arm: ArmModel
     posterior: Posterior
     provenance: Provenance
 
@@ -77,22 +78,31 @@ class Twin:
         """From the MJCF at `path`: a chain of hinges that hangs from the world's origin."""
         if not path.is_file():
             raise InputError(f"{path}: no such file, expected the MJCF of an arm")
-        spec, folder = read_spec(path), path.parent
+        spec, folder = read_spec(path), path.parent if path.parent.name else path.parent.resolve()
         arm = spec.compile()
         _check_chain(arm, path)
-        stages = STAGES[: STAGES.index(folder.name) + 1] if folder.name in STAGES else (folder.name,)
-        tables = read_tables(folder.parent, stages) if (folder / TABLE).is_file() else {}
+        if folder.name in STAGES:
+            stages = STAGES[: STAGES.index(folder.name) + 1]
+            ran = [s for s in stages if any((folder.parent / s / name).is_file() for name in (MODEL, TABLE))]
+            tables = {stage: read_table(folder.parent / stage / TABLE) for stage in ran}
+        else:
+            tables = read_tables(folder.parent, (folder.name,))
         files = [path, *(folder.parent / stage / TABLE for stage in tables)]
         digests = {file.as_posix(): file_digest(file) for file in files}
-        return cls(spec, arm, Posterior.from_tables(tables), Provenance(path, digests, tables))
+        return cls(spec, ArmModel(arm), Posterior.from_tables(tables), Provenance(path, digests, tables))
 
     @classmethod
     def of_package(cls, files: dict[str, bytes]) -> "Twin":
-        """From a package's files by path."""
-        spec, tables, manifest = arm_of(files), tables_of(files), manifest_of(files)
+        """From a package's files by path.
+
+        Raises:
+            InputError: a file is not the one that the manifest means, or the package has no arm to preview with.
+        """
+        manifest, digest = manifest_of(files), package_digest(files)
+        spec, tables = arm_of(files), tables_of(files)
         model = Path(manifest["hybrid"]["arm"])
-        provenance = Provenance(model, manifest["sha256"], tables, package_digest(files), manifest["versions"])
-        return cls(spec, spec.compile(), Posterior.from_tables(tables), provenance)
+        provenance = Provenance(model, manifest["sha256"], tables, digest, manifest["versions"])
+        return cls(spec, ArmModel(spec.compile()), Posterior.from_tables(tables), provenance)
 
 
 def _check_chain(model: mujoco.MjModel, path: Path) -> None:

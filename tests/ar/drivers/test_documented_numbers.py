@@ -17,6 +17,7 @@ from trunkline.ar.drivers import (
     setpoint_filter,
     simulated_motors,
     time_scaling,
+    watchdog,
     winch,
 )
 from trunkline.ar.drivers import robot as machine
@@ -46,11 +47,11 @@ FIGURES = {
         (r"every ms it sends both limbs their setpoints for (30) ms later", [machine.LEAD / ms]),
         (r"without a permit for (80) ms it slows", [robot.DEAD_MAN / ms]),
         (r"run out \((30) ms\), do not come \((50) ms\) or are played late \((0\.3) s\)",
-         [machine.LEAD / ms, driver.SILENT / ms, setpoint_filter.BEHIND]),
+         [machine.LEAD / ms, watchdog.SILENT / ms, setpoint_filter.BEHIND]),
         (r"plays their setpoints, (1000) times a second", [1 / driver.TICK]),
-        (r"or it is late itself \((50) ms\): the cables", [driver.SILENT / ms]),
+        (r"or it is late itself \((50) ms\): the cables", [watchdog.SILENT / ms]),
         (r"A motor silent for (20) ms: no current", [motors.SILENT / ms]),
-        (r"or it is late itself \((50) ms\), a point", [driver.SILENT / ms]),
+        (r"or it is late itself \((50) ms\), a point", [watchdog.SILENT / ms]),
         (r"late by less than the (30) ms has no other effect", [machine.LEAD / ms]),
         (r"again (30) ms ahead", [machine.LEAD / ms]),
         (r"silent for (0\.1) s, or ends, is a fault of the robot", [driver_client.SILENT]),

@@ -444,6 +444,17 @@ def test_from_hands_to_a_robot_that_has_arrived(session):
     assert session.robot.stops == 1  # as control began
 
 
+def test_what_runs_is_still_known_where_its_preview_breaks_off_meanwhile(session):
+    """Else the world would not hear at its end of what it grasped."""
+    controller, plan = session.executing().controller, session.controller.plan
+    refusal = PlanReport(controller._asked, refused="preview: ValueError: it diverged")
+    assert not controller.answered(PlanAnswer(refusal), session.now)
+    assert controller.plan is plan
+    session.until(lambda intent: intent.mode == "aim")
+    session.tick()
+    assert controller._believed == plan.digest()
+
+
 def let_go(session):
     session.left, session.right = {}, {}
     session.wait(0.1)

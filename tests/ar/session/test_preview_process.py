@@ -36,6 +36,7 @@ from trunkline.ar.teleop.messages import Box, Target, Thing
 from trunkline.ar.teleop.object_shapes import below_grip
 from trunkline.ar.teleop.planner import Planner
 from trunkline.ar.teleop.rigid_ik import RigidIK
+from trunkline.errors import InputError
 from trunkline.model.arm.contact_geometry import read_geometry
 from trunkline.pipeline.config import PROJECT, load_folder
 
@@ -220,6 +221,21 @@ def test_what_breaks_a_preview_refuses_its_plan_and_not_the_next():
     assert sent[-1].report.refused == "preview: ValueError: two"
 
 
+def test_a_process_whose_first_preview_breaks_off_does_not_begin():
+    """No plan could ever be confirmed: that is better said before anybody comes."""
+
+    class Broken(PreviewPlanner):
+        def _shown(self, *args):
+            raise ValueError("two\nlines")
+
+    s, asked = simulation(), order()
+    plan = made().planner.plan(asked.request, asked.world, asked.joints, asked.commands)
+    broken = Broken(SimpleNamespace(plan=lambda *_: plan), made().foresight, made().bodies)  # type: ignore[arg-type]
+    package = SimpleNamespace(straight=s.commands, digest="a package", tip=lambda *_: TIP)
+    with pytest.raises(InputError, match="preview: ValueError: two"):
+        preview_process.warm(broken, package, make_world(()))  # type: ignore[arg-type]
+
+
 def test_an_order_that_is_left_goes_no_further():
     def go_on():
         raise Overtaken
@@ -253,3 +269,15 @@ def test_where_no_body_is_shown_nothing_is_simulated_to_be_shown():
     assert piece.last
     assert len(piece.poses) == 0
     assert begun.preview.duration == pytest.approx(planned.plan.duration + made().previewing.hold, abs=0.02)
+
+
+@pytest.mark.parametrize("tip", [TIP, (0.5, 0.1, -0.6)], ids=["a plan", "a refusal"])
+def test_in_line_the_batch_of_an_older_order_is_left(tip):
+    planner = PreviewPlanner(made().planner, made().foresight, ())
+    inline = InlinePreviewer(planner.answers, lambda order: order.request.serial == 2)
+    inline.submit(order(1))
+    inline.submit(order(2, tip=tip))
+    newest, _ = planner.prediction, inline.poll()
+    inline.predict()
+    assert inline.poll() == []
+    assert planner.prediction is newest

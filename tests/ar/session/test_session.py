@@ -6,13 +6,14 @@ import gc
 import os
 import signal
 import socket
+import time
 from contextlib import closing
 
 import numpy as np
 import pytest
 
 from tests.ar.teleop.test_plan import MOUNT, OFFSET, TIP
-from tests.support.live import Hands, Laid, binary, controlling, hand, laid
+from tests.support.live import RATE, Hands, Laid, binary, controlling, hand, laid
 from trunkline.ar.session import binary as wire
 from trunkline.ar.session.__main__ import main
 from trunkline.ar.session.gc_policy import NEVER
@@ -160,6 +161,30 @@ def test_a_button_is_not_left_to_wait_for_the_next_tick():
             await guest.hears("state", mode="stopped")
 
     asyncio.run(press())
+
+
+@pytest.mark.parametrize("answers", [ValueError("a pipe"), ["no answer"]], ids=["no poll", "a broken answer"])
+def test_what_fails_as_the_previewer_answers_stops_the_robot_and_the_session_goes_on(answers):
+    here, clock = Laid(1), [time.monotonic()]
+    here.server.now = lambda: clock[0]
+
+    def broken():
+        if isinstance(answers, Exception):
+            raise answers
+        return answers
+
+    def step():
+        clock[0] += 1 / RATE
+        here.server.step()
+
+    poll, here.planning.poll = here.planning.poll, broken
+    step()
+    assert len(here.robot.stops) == 1
+    assert here.robot.permits == 0
+    assert here.log[-1].endswith("; the robot holds")
+    here.planning.poll = poll
+    step()
+    assert here.controller.intent.mode == "stopped"
 
 
 @pytest.mark.realtime

@@ -222,7 +222,7 @@ def test_a_mount_may_be_tilted_as_it_is_identified_but_not_be_another_frame(lab,
         spec.body("base").quat = [np.cos(np.radians(degrees) / 2), np.sin(np.radians(degrees) / 2), 0, 0]
         (tmp_path / "arm.xml").write_text(spec.to_xml())
         if message is None:
-            assert Twin.load(tmp_path / "arm.xml").arm.nq
+            assert Twin.load(tmp_path / "arm.xml").arm.model.nq
         else:
             with pytest.raises(InputError, match=message):
                 Twin.load(tmp_path / "arm.xml")

@@ -109,7 +109,7 @@ def test_previews_and_the_certificate_draw_the_same_numbers_from_the_same_seed(w
     with np.load(written.with_suffix(".npz")) as packed:
         for name, values in expected.items():
             np.testing.assert_array_equal(packed[name], values)
-    certified = parameter_shifts(twin.arm, twin.posterior, *poses_of(model), 5, np.random.default_rng(0))
+    certified = parameter_shifts(twin.arm.model, twin.posterior, *poses_of(model), 5, np.random.default_rng(0))
     stated = [arm.tips(poses_of(model)[1]) for arm in arms_with(model, drawn)]
     np.testing.assert_allclose(certified + arm_of(model).tips(poses_of(model)[1]), stated, atol=1e-9)
 
@@ -246,7 +246,7 @@ def test_widened_it_spreads_as_much_more(tmp_path, written):
     assert wide["centre"] == pytest.approx(narrow["centre"])
 
 
-@pytest.mark.parametrize("spoil", ["nothing", "model", "json", "parameter"])
+@pytest.mark.parametrize("spoil", ["nothing", "model", "json", "parameter", "part"])
 def test_what_is_no_identified_arm_is_one_line_and_writes_nothing(spoil, tmp_path, capsys):
     folder, out = tmp_path / "artifacts", tmp_path / "out.json"
     expected = "found no identify_stiffness/arm.xml"
@@ -258,11 +258,15 @@ def test_what_is_no_identified_arm_is_one_line_and_writes_nothing(spoil, tmp_pat
         expected = "arm.xml: stiffness: found "
     if spoil == "json":
         (folder / "identify_control/parameters.json").write_text('{"parameters": {"kp": {}}}')
-        expected = "expected what a stage of identification writes"
+        expected = "identify_control/parameters.json: kp: found no 'interval_95_given_model', expected it: make"
     if spoil == "parameter":
         path = folder / "identify_control/parameters.json"
         path.write_text(path.read_text().replace("force_range", "kp_ratio"))
         expected = "'kp_ratio'"
+    if spoil == "part":
+        path = folder / "identify_control/parameters.json"
+        path.write_text(path.read_text().replace("force_range", "tendon_angle_9"))
+        expected = "arm.xml: tendon_angle_9: found an arm without its part, expected the model that was identified"
     assert main([str(folder), "--out", str(out)]) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert expected in line

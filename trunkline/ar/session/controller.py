@@ -178,6 +178,8 @@ class SessionController:
         if serial != self._asked:
             return False
         if isinstance(answer, PlanAnswer):
+            if self._started:  # its preview breaks off, but it runs already
+                return False
             self.report, self.plan = answer.report, answer.plan
             self.log_writer.event("planned", report=answer.report)
         elif isinstance(answer, PreviewBegun):

@@ -18,12 +18,13 @@ from threadpoolctl import threadpool_limits
 
 from trunkline.ar.preview.package import Package, read_package
 from trunkline.ar.preview.settings import Previewing
-from trunkline.ar.session.previewer import Answer, FollowRequest, Order, PreviewPiece, PreviewPlanner
+from trunkline.ar.session.previewer import Answer, FollowRequest, Order, PlanAnswer, PreviewPiece, PreviewPlanner
 from trunkline.ar.teleop.config import TeleoperationConfig
 from trunkline.ar.teleop.messages import Request, Target, Targets, World
 from trunkline.ar.teleop.vectors import DOWN
 from trunkline.compute.processes import end_with_parent, leave_signals_to_parent
 from trunkline.compute.threads import thread_count
+from trunkline.errors import InputError
 from trunkline.kinematics.panda.kinematics import mount_pose
 
 NICE = 10
@@ -136,7 +137,11 @@ def run(
 
 def warm(planner: PreviewPlanner, package: Package, world: World) -> None:
     """Plan and preview once for nothing: what is compiled on its first call would keep the first user waiting, and so
-    would the twin of the `world`."""
+    would the twin of the `world`.
+
+    Raises:
+        InputError: there is a plan, but its preview breaks off, as any user's would.
+    """
     robot, straight = planner.robot_model.robot, package.straight
     joints = np.array(robot.ready)
     x, y, z = (float(value) for value in mount_pose(joints[None], robot.mount_offset)[0][0])
@@ -144,9 +149,14 @@ def warm(planner: PreviewPlanner, package: Package, world: World) -> None:
     a, b, c = (float(value) for value in package.tip((x, y, z), targets, straight - PULL * np.eye(len(straight))[0]))
     request = Request(0, replace(targets, tip=Target((a, b, c))), "", package.digest)
     order = Order(request, World(""), joints, straight)
+    planned = False
     for answer in planner.answers(order):
         if isinstance(answer, PreviewPiece):
             break
+        if isinstance(answer, PlanAnswer):
+            if planned:
+                raise InputError(answer.report.refused)
+            planned = answer.plan is not None
     planner.prepare(replace(order, world=world))
 
 

@@ -255,7 +255,7 @@ class InlinePreviewer:
         self._later: Iterator[Answer] = iter(())
 
     def submit(self, order: Order | FollowRequest) -> None:
-        answers = self._answers(order)
+        answers, self._later = self._answers(order), iter(())
         waits = isinstance(order, FollowRequest) or self._predicted(order)
         for answer in answers:
             self._ready.append(answer)

@@ -76,7 +76,7 @@ def certify(
     Raises:
         InputError: the trials are of another arm, or of another session than the model was fitted to.
     """
-    model, tables = twin.arm, twin.provenance.tables
+    model, tables = twin.arm.model, twin.provenance.tables
     check_trials(trials, model)
     check_fitted(tables, trials)
     rng = np.random.default_rng(config.seed)
@@ -128,7 +128,7 @@ def certify(
 
 def inputs_of(twin: Twin, trials: list[Trial], ingested: dict, arms: int, rng: np.random.Generator) -> Inputs:
     """Of the budget. ingested: metrics of the stage `ingest`."""
-    model, parameters, noise = twin.arm, twin.posterior, ingested["position_noise_mm"] / 1e3
+    model, parameters, noise = twin.arm.model, twin.posterior, ingested["position_noise_mm"] / 1e3
     rested = at_rest(trials)
     tip = replay(model, [], trials[0].markers).tip
     residuals = tip_residuals(model, rested, tip)

@@ -57,7 +57,7 @@ def _run(args: argparse.Namespace) -> int:
     if args.reference is not None and out.resolve() in (args.reference.resolve(), args.reference.resolve().parent):
         raise InputError(f"--out: {out}: found the reference there, expected another folder: it would be written over")
     twin = Twin.load(args.model)
-    models = {"model": twin.arm} | ({} if args.cad is None else {"cad": Twin.load(args.cad).arm})
+    models = {"model": twin.arm.model} | ({} if args.cad is None else {"cad": Twin.load(args.cad).arm.model})
     written = written_beside(twin, args.settings)
     trials = trials_of(args.session, args.settings, "evaluate")
     if len(sessions_of(trials)) == 1 and (session := written.session_of(trials)):

@@ -219,7 +219,7 @@ class DriftMonitor:
 def scorer_of(model: Path, settings: Path) -> Scorer:
     """What scores trials against the MJCF at `model`, as the stage that wrote it compared them."""
     twin = Twin.load(model)
-    arm, written = twin.arm, written_beside(twin, settings)
+    arm, written = twin.arm.model, written_beside(twin, settings)
     params = read_yaml(settings / "params.yaml")
     stage = next((stage for stage in STAGES if stage in params), None)
     if stage is None:

@@ -44,7 +44,7 @@ def main(arguments: list[str] | None = None) -> int:
     if args.widen < 0 or args.draws < 0:
         raise InputError("--widen, --draws: found a number below 0, expected 0 or more")
     twins = [Twin.load(folder) for folder in args.artifacts]
-    model, provenance = twins[0].arm, twins[0].provenance
+    model, provenance = twins[0].arm.model, twins[0].provenance
     check_model(twins[0])
     posterior = of_population([twin.posterior for twin in twins]) if len(twins) > 1 else twins[0].posterior
     posterior = replace(posterior, deviation=args.widen * posterior.deviation)

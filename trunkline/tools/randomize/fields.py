@@ -53,9 +53,10 @@ def check_model(twin: Twin) -> None:
     stated = {name: row["value"] for table in tables for name, row in table["parameters"].items()}
     for name, expected in stated.items():
         parameter = parameter_named(name)
-        if not parameter.belongs_to(twin.arm):
-            raise InputError(f"{where}: {name}: found no {parameter.part}, expected the model that was identified")
-        value = parameter.read(twin.arm)
+        if not parameter.belongs_to(twin.arm.model):
+            problem = "found an arm without its part, expected the model that was identified"
+            raise InputError(f"{where}: {name}: {problem}")
+        value = parameter.read(twin.arm.model)
         if abs(value - expected) > NEAR * abs(expected) + NEAR**2:
             unit = f" {parameter.unit}" if parameter.unit else ""
             stated_value = f"{expected:.6g}{unit} of parameters.json"
