@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.ndimage import binary_dilation
 
 from trunkline.recordings.signals.smoothing import low_pass
 from trunkline.recordings.trials import start
@@ -116,6 +117,25 @@ def test_what_nobody_measured_does_not_tell_when_the_arm_is_let_go(hidden):
     frees = [free_time(time, marked, begins[0].time, measured) for marked in (positions, wrong)]
     assert frees[0] == frees[1]
     assert release_time(time, wrong, smooth).time != pytest.approx(0.5037, abs=1.5 / RATE)
+
+
+@pytest.mark.parametrize(("begin", "end"), [(0.3, 0.5), (0.45, 0.55), (0.52, 0.65), (0.55, 0.75), (0.6, 0.9)])
+@pytest.mark.parametrize("hidden", [slice(2, 3), slice(None)], ids=["tip", "all"])
+def test_a_gap_about_the_release_moves_it_little(begin, end, hidden):
+    """Bridged evenly, as the filter does: the release of an arm that was lost for a moment is no more than a gap off,
+    and such an arm was held before."""
+    time, positions = ring_down(0.5037, 3e-4, 0)
+    measured = everywhere(positions)
+    measured[(time >= begin) & (time < end), hidden] = False
+    for marker, there in enumerate(measured.T):
+        for axis in range(3):
+            positions[:, marker, axis] = np.interp(time, time[there], positions[there, marker, axis])
+    positions = smooth(positions.reshape(len(time), -1)).reshape(positions.shape)
+    measured = ~binary_dilation(~measured, np.ones((7, 1)))
+    release = release_time(time, positions, smooth, measured)
+    assert not release.in_motion
+    assert release.time == pytest.approx(0.5037, abs=2.5 / RATE)
+    assert free_time(time, positions, release.time, measured) == pytest.approx(0.5037, abs=0.07)
 
 
 def test_an_arm_that_swings_from_the_first_frame_was_released_before():

@@ -57,7 +57,7 @@ def release_time(time: np.ndarray, positions: np.ndarray, measured: np.ndarray, 
             where they count.
     """
     step = float(time[1] - time[0])
-    speed = robust_length(np.gradient(positions, time, axis=0), _within(measured, 1))
+    speed = robust_length(np.gradient(positions, time, axis=0), _or_all(_within(measured, 1)))
     until = np.argmax(speed) + 1 + _frames(AHEAD, step)
     end = _end_of_hold(positions[:until], measured[:until], step)
     if end is None:
@@ -74,9 +74,7 @@ def _let_go(
     speed, m/s, that the hand had given the arm by then."""
     step = float(time[1] - time[0])
     window = (time >= guess - HOLD) & (time <= guess + FREE)
-    markers = measured[window].all(axis=0)
-    if not markers.any():
-        markers = np.ones_like(markers)  # each has a gap there: what bridges it is all that there is
+    markers = _or_all(np.asarray(measured[window].all(axis=0)))
     motion = positions[window][:, markers].reshape(window.sum(), -1)
     before_release = np.vander((time[window] - guess) / HOLD, DEGREE + 1)
     instants = np.arange(max(guess - SEARCHED, time[window][0]), guess + min(SEARCHED, FREE / 2), step / TRIES)
@@ -139,7 +137,7 @@ def departures(
         weights = np.vander([ahead / past], 3) @ np.linalg.pinv(powers)
         led = np.tensordot(weights, positions[frame - past : frame + 1], 1)
         counts = measured[frame - past : frame + 1].all(axis=0) & measured[frame + ahead]
-        distances.append(robust_length(positions[frame + ahead] - led, counts[None])[0])
+        distances.append(robust_length(positions[frame + ahead] - led, _or_all(counts)[None])[0])
     return np.array(distances)
 
 
@@ -159,18 +157,26 @@ def free_time(time: np.ndarray, positions: np.ndarray, measured: np.ndarray, beg
     """
     counts = np.broadcast_to(measured[..., None], positions.shape)
     way = positions.max(axis=0, where=counts, initial=-np.inf) - positions.min(axis=0, where=counts, initial=np.inf)
-    farthest = int(np.argmax(way.max(axis=-1)))
-    tip, counts = positions[:, farthest], _within(measured, 2)[:, farthest]
-    velocity = np.gradient(tip, time, axis=0)
-    speed, pull = (np.linalg.norm(v, axis=1) for v in (velocity, np.gradient(velocity, time, axis=0)))
-    top = np.argmax(np.where(counts, speed, 0))
-    swings = np.flatnonzero(counts & (time >= begin) & (np.arange(len(time)) <= top))
+    velocity, counts = np.gradient(positions, time, axis=0), _within(measured, 2)
+    top = np.argmax(np.where(counts, np.linalg.norm(velocity, axis=2), 0), axis=0)
+    swing = (time >= begin)[:, None] & (np.arange(len(time))[:, None] <= top)
+    whole = np.all(counts | ~swing, axis=0) & measured.any(axis=0)
+    if not whole.any():  # as `_or_all`
+        return free_time(time, positions, np.ones_like(measured), begin)
+    farthest = int(np.argmax(np.where(whole, way.max(axis=-1), -np.inf)))
+    pull = np.linalg.norm(np.gradient(velocity[:, farthest], time, axis=0), axis=1)
+    swings = np.flatnonzero(swing[:, farthest])
     return float(time[swings[np.argmax(pull[swings])]]) if len(swings) else begin
 
 
 def _within(measured: np.ndarray, frames: int) -> np.ndarray:
     """Where so many frames to either side were measured too, of (T, S)."""
     return binary_erosion(measured, np.ones((2 * frames + 1, 1)), border_value=1)
+
+
+def _or_all(counts: np.ndarray) -> np.ndarray:
+    """All (..., S) where none counts: each has a gap there, and what bridges it is all that there is."""
+    return np.where(counts.any(axis=-1, keepdims=True), counts, True)
 
 
 def robust_length(vectors: np.ndarray, measured: np.ndarray) -> np.ndarray:
