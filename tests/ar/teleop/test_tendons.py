@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from tests.support.bent_chain import hardening_stump
+from trunkline.ar.teleop.correction import Bent, corrected
 from trunkline.ar.teleop.tendons import Network, bend
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY, downwards
 from trunkline.kinematics.ik.inputs import DIRECTION
 from trunkline.model.simulation.rest import settle
 from trunkline.model.statics.chain import read_chain
-from trunkline.model.statics.equilibria import equilibrium
+from trunkline.model.statics.equilibria import actuated, equilibrium
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +48,21 @@ def test_statics_bring_the_tip_where_a_poor_network_leaves_it_short(chain, azimu
     np.testing.assert_allclose(bent.tip, target, atol=1e-4)
     rest = settle(hardening_stump(), bent.commands[None], STANDARD_GRAVITY * down)
     np.testing.assert_allclose(rest.position[0], bent.tip, atol=5e-4)
+
+
+@pytest.mark.parametrize("beyond", [0.0, 0.01, 0.02])
+def test_no_tension_is_in_all_tendons_though_the_target_is_out_of_reach(chain, beyond):
+    """An answer whose tendons are all taut, as of a network that has each a little too short: nearer to a target beyond
+    the surface by more such tension, which the motors' limits and friction would turn into errors of the tip."""
+    down = downwards(0.0, 0.0)
+    tensions = np.full((1, chain.tendons), 0.1 * chain.max_tension[0])
+    tensions[0, 0] = 0.5 * chain.max_tension[0]
+    taut = equilibrium(chain, tensions, STANDARD_GRAVITY * down)
+    target = taut.position[0] * (1 - beyond)
+    bent = corrected(chain, Bent(taut.commands[0], taut.lengths[0], target), tuple(target), tuple(down))
+    rest = actuated(chain, bent.commands[None], STANDARD_GRAVITY * down)
+    assert rest.tensions.min() < 0.02 * chain.max_tension[0]
+    assert np.linalg.norm(bent.tip - taut.position[0]) < 0.02 * chain.length
 
 
 def test_a_network_of_directions_is_told_gravity_as_it_is(chain):

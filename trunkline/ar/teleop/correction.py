@@ -1,7 +1,9 @@
 """The network's answer made exact: a few steps nearer to the target, and where the arm then really comes to rest.
 
-Up to three Gauss-Newton steps of `ik.refine` bring the tip nearer, its orientation left free. What is said of the tip
-is the equilibrium under the commands themselves, as they are sent (`statics.equilibria.actuated`).
+Up to three Gauss-Newton steps of `ik.refine` bring the tip nearer, its orientation left free. Tension that all tendons
+share is then released: it hardly moves the tip, as it bends an arm with evenly spread tendons nowhere, but where a
+target is a little out of reach the steps find it, and it makes friction and motors decide where the tip ends. What is
+said of the tip is the equilibrium under the commands themselves, as they are sent (`statics.equilibria.actuated`).
 """
 
 from typing import NamedTuple
@@ -10,6 +12,7 @@ import numpy as np
 
 from trunkline.ar.teleop.vectors import IDENTITY, Vector
 from trunkline.frames import STANDARD_GRAVITY
+from trunkline.kinematics.dataset.sampling import sections
 from trunkline.kinematics.ik.refine import refine
 from trunkline.model.statics.chain import Chain
 from trunkline.model.statics.equilibria import actuated
@@ -37,18 +40,25 @@ def corrected(chain: Chain, first: Bent, tip: Vector, gravity: Vector) -> Bent |
 
     def sent(lengths: np.ndarray) -> Bent | None:
         better = refine(chain, target, lengths[None], lever=LEVER)
-        return _rest(chain, better.commands if better.converged[0] else first.commands[None], pull)
+        return _released(chain, better.commands if better.converged[0] else first.commands[None], pull)
 
     foreseen, improved = np.linalg.norm(first.tip - tip), sent(first.lengths)
     if improved is not None and np.linalg.norm(improved.tip - tip) <= foreseen + SURPRISE:
         return improved
     # cables of lengths that do not belong together may hold another shape than motors with those commands do
-    at_rest = _rest(chain, first.commands[None], pull)
+    at_rest = _released(chain, first.commands[None], pull)
     again = [bent for bent in (improved, at_rest and sent(at_rest.lengths), at_rest) if bent is not None]
     return min(again, key=lambda bent: float(np.linalg.norm(bent.tip - tip)), default=None)
 
 
-def _rest(chain: Chain, commands: np.ndarray, pull: np.ndarray) -> Bent | None:
-    """Where the arm rests under `commands` (1, K); None where it finds none."""
+def _released(chain: Chain, commands: np.ndarray, pull: np.ndarray) -> Bent | None:
+    """Where the arm rests under `commands` (1, K), once every tendon of a section of three or more has less tension by
+    that of the section's slackest. None where it finds no rest."""
     rest = actuated(chain, commands, pull)
+    shared = np.zeros_like(commands)
+    for section in (tendons for tendons in sections(chain) if len(tendons) > 2):
+        shared[:, section] = rest.tensions[:, section].min(axis=1, keepdims=True)
+    if rest.converged[0] and shared.any():
+        commands = rest.lengths - (rest.tensions - shared) / chain.gain
+        rest = actuated(chain, commands, pull)
     return Bent(commands[0], rest.lengths[0], rest.position[0]) if rest.converged[0] else None
