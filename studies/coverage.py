@@ -154,9 +154,9 @@ def cover(name: str, is_matched: bool, repetitions: int) -> IntervalCoverage:
             rough = search(problem, ROUGH, repetition, lambda best: None)
             end = descend(problem, rough.vector, *POLISH, lambda best: None)
             assert end.linear is not None, "least squares ends on its own linearisation"
-            moves = surrogate(problem, end.vector, end.linear.residuals).moves
+            around = surrogate(problem, end.vector, end.linear.residuals)
             found.errors.append((end.vector - exact) / unit)
-            found.widths.append(certainty(end.linear, moves=moves).half_width / unit)
+            found.widths.append(certainty(end.linear, around=around).half_width / unit)
             found.lost += not end.converged
             bar.update(1)
     return found

@@ -55,4 +55,5 @@ def test_releases_begin_when_the_arm_is_let_go(raw):
     chosen = [t for t in session.trials if t.experiment == "release" and t.split == "identify"]
     for _, take, _ in load_raw_trials(raw / "demo", session.model_copy(update={"trials": chosen}), LIMITS):
         trial, _ = filter_raw_trial(take, FILTER)
-        assert abs(trial.start - truth["starts_s"][take.name]) < 2 * trial.start_sigma < 1 / 120
+        assert trial.start_sigma < 2 / 3 / 120  # as if the first guess, in whole frames, may be a frame off
+        assert abs(trial.start - truth["starts_s"][take.name]) < min(2 * trial.start_sigma, 1 / 240)

@@ -49,12 +49,12 @@ def repetitions(request) -> Repetitions:
         problem = Problem(model, experiments, markers_of(model), bounds, "positions", WEIGHTS)
         result = descend(problem, exact + rng.normal(0, 0.02, len(exact)), 12, 1e-6, lambda best: None)
         assert result.converged
-        moves = surrogate(problem, result.vector).moves
+        around = surrogate(problem, result.vector)
         errors.append(result.vector - exact)
-        widths.append(certainty(result.linear, moves=moves).half_width)
+        widths.append(certainty(result.linear, around=around).half_width)
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr("trunkline.identification.fit.certainty.RESAMPLINGS", RESAMPLINGS)
-            resampled.append(bootstrap(result.linear, 1, moves) - exact)
+            resampled.append(bootstrap(result.linear, 1, around) - exact)
     return Repetitions(list(stage.true), np.array(errors), np.array(widths), np.array(resampled))
 
 

@@ -178,14 +178,15 @@ def test_a_python_that_is_not_there_is_one_line():
 
 
 def test_it_imports_what_any_environment_has():
-    modules_of_it = ("driver_process", "driver", "driver_frames", "setpoint_filter", "realtime_priority")
+    modules_of_it = ("driver_process", "driver", "driver_frames", "setpoint_filter", "realtime_priority", "watchdog")
     for name in (*(f"drivers/{name}" for name in modules_of_it), "teleop/minimum_jerk"):
         tree = ast.parse((ROOT / f"trunkline/ar/{name}.py").read_text(encoding="utf-8"))
         modules = {node.module for node in tree.body if isinstance(node, ast.ImportFrom)}
         assert modules <= {
             "collections", "collections.abc", "dataclasses", "typing", "trunkline.ar.drivers.driver",
             "trunkline.ar.drivers.driver_frames", "trunkline.ar.drivers.setpoint_filter",
-            "trunkline.ar.drivers.realtime_priority", "trunkline.ar.teleop.minimum_jerk",
+            "trunkline.ar.drivers.realtime_priority", "trunkline.ar.drivers.watchdog",
+            "trunkline.ar.teleop.minimum_jerk",
             "trunkline.kinematics.panda.kinematics", "trunkline.kinematics.panda.limits",
         }  # fmt: skip
         plain = {alias.name for node in tree.body if isinstance(node, ast.Import) for alias in node.names}

@@ -1,15 +1,14 @@
 """How sure the identified parameters are."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import ndtr, stdtrit
 
 from trunkline.identification.fit.linearisation import Linearisation
+from trunkline.identification.fit.surrogate import Surrogate
 
 RESAMPLINGS = 20_000  # of which some twenty lie beyond each end of an interval of six trials
-Moves = Callable[[np.ndarray], np.ndarray]  # weights of T trials (B, T) → by how much the estimate moves (B, P)
 ALONE = 1e-9  # share of a parameter's information; if all other trials have less, one determines it alone
 
 
@@ -32,7 +31,7 @@ class Certainty:
     weakest: np.ndarray
 
 
-def certainty(linear: Linearisation, prior_deviation: float = 0.0, moves: Moves | None = None) -> Certainty:
+def certainty(linear: Linearisation, prior_deviation: float = 0.0, around: Surrogate | None = None) -> Certainty:
     """Jackknife over trials: how far the estimate moves when one is left out (CV3; MacKinnon, Nielsen, Webb 2023).
 
     Residuals of one trial hang together (the model is wrong in the same way from frame to frame), so a formula for
@@ -46,24 +45,24 @@ def certainty(linear: Linearisation, prior_deviation: float = 0.0, moves: Moves 
         linear: of the residuals, at the estimate.
         prior_deviation: standard deviation of the truth around the prior's mean, towards which the estimate is pulled
             where the trials say little; it widens the interval there.
-        moves: how the estimate answers weights of the trials; a Gauss-Newton step of `linear` if not given.
+        around: the surrogate around the estimate, by which it answers weights of the trials; `linear` if not given.
     """
     normals = linear.normals()
     trials, normal = len(normals), normals.sum(axis=0)
-    left_out = (moves or linear.moves)(1 - np.eye(trials))
+    left_out = (around or linear).moves(1 - np.eye(trials))
     left_out = left_out - left_out.mean(axis=0)
     covariance = left_out.T @ left_out * (trials - 1) / trials
     if linear.prior is not None:
         normal = normal + np.diag(linear.prior**2)
-    scale = 1 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    scaling = np.outer(scale, scale)
     if linear.prior is not None:
+        scaling = _scaling(normal)
         pulled = np.linalg.pinv(normal * scaling, hermitian=True) * scaling @ np.diag(linear.prior**2)
         covariance = covariance + prior_deviation**2 * pulled @ pulled.T
     error = np.sqrt(np.diag(covariance))
     error = np.where(_set_by_one_trial(normal, normals), np.inf, error)
     safe = np.where(error > 0, error, 1.0)
-    singular, directions = np.linalg.eigh(normal * scaling)
+    wide = normal if around is None else around.normals().sum(axis=0)  # by differences that no jump decides
+    singular, directions = np.linalg.eigh(wide * _scaling(wide))
     return Certainty(
         standard_error=error,
         half_width=error * float(stdtrit(max(trials - 1, 1), 0.975)),
@@ -73,13 +72,19 @@ def certainty(linear: Linearisation, prior_deviation: float = 0.0, moves: Moves 
     )
 
 
+def _scaling(normal: np.ndarray) -> np.ndarray:
+    """By what JᵀJ (P, P) is multiplied, element by element, for columns of unit length. Shape (P, P)."""
+    scale = 1 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    return np.outer(scale, scale)
+
+
 def _set_by_one_trial(normal: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Which parameters have no information in `normal` (P, P) without one of the trials' `normals` (T, P, P). (P,)."""
     least = np.min([np.diag(normal - normal_of_one) for normal_of_one in normals], axis=0)
     return least <= ALONE * np.diag(normal)
 
 
-def bootstrap(linear: Linearisation, seed: int, moves: Moves | None = None) -> np.ndarray:
+def bootstrap(linear: Linearisation, seed: int, around: Surrogate | None = None) -> np.ndarray:
     """95 % intervals of the estimate by giving trials random weights, again and again (Rubin 1981).
 
     It cross-checks `certainty`: it takes no symmetry for granted, and no formula for what a trial's weight does.
@@ -100,7 +105,7 @@ def bootstrap(linear: Linearisation, seed: int, moves: Moves | None = None) -> n
     weights = np.random.default_rng(seed).standard_exponential((RESAMPLINGS, trials))
     degrees = max(trials - 1, 1)
     tail = ndtr(-np.sqrt((trials + 1) / degrees) * stdtrit(degrees, 0.975))
-    interval = linear.vector + np.quantile((moves or linear.moves)(weights), [tail, 1 - tail], axis=0)
+    interval = linear.vector + np.quantile((around or linear).moves(weights), [tail, 1 - tail], axis=0)
     return np.where(_set_by_one_trial(normals.sum(axis=0), normals), [[-np.inf], [np.inf]], interval)
 
 

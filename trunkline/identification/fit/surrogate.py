@@ -3,7 +3,9 @@
 Of many parameters it is the first order alone: the second asks for too many candidates, and hours of small fits.
 
 First order does not do: a wrong model leaves residuals, and their own curvature then counts beside JᵀJ. Nor do small
-differences: simulated curls move by small jumps as a parameter changes, where joint limits close.
+differences: simulated curls move by small jumps as a parameter changes, where joint limits close. Where cables rub, the
+jumps are larger: there it is a least-squares fit to more candidates than it has coefficients, a central composite
+design (Box, Wilson 1951), and what of the second order may be jumps alone is taken out (James, Stein 1961).
 """
 
 from dataclasses import dataclass
@@ -48,6 +50,10 @@ class Surrogate:
         if not self.second:
             return self.grams.shape[1] - 1
         return round(np.sqrt(2 * self.grams.shape[1] + 0.25) - 1.5)
+
+    def normals(self) -> np.ndarray:
+        """JᵀJ of every trial, as `Linearisation.normals`. Shape (T, P, P)."""
+        return self.weights[:, None, None] * self.grams[:, 1 : self.count + 1, 1 : self.count + 1]
 
     def moves(self, weights: np.ndarray) -> np.ndarray:
         """By how much the minimum moves when trials weigh `weights` (B, T) times what they do. Shape (B, P)."""
@@ -101,20 +107,37 @@ class Surrogate:
 
 
 def surrogate(problem: Problem, vector: np.ndarray, residuals: list[np.ndarray] | None = None) -> Surrogate:
-    """Of the scalars `vector` (P,) of `problem`, from (P + 1)(P + 2) / 2 candidates, or P + 1 where P is large.
+    """Of the scalars `vector` (P,) of `problem`, from (P + 1)(P + 2) / 2 candidates, 2 P² + 1 where cables rub, or
+    P + 1 where P is large.
 
     Args:
         residuals: those at `vector`, where they are known. Per trial (R,).
     """
     second = len(vector) <= FEW
-    places = _stencil(reaches(problem), second)
-    coefficients = np.linalg.inv(features_at(places, second))
+    reach = reaches(problem)
+    places = _composite(reach) if second and problem.rubs else _stencil(reach, second)
     if residuals is None:
         residuals = [block[0] for block in problem.residuals(vector[None])]
     others = problem.residuals(vector + places[1:], near=vector)
     blocks = [np.concatenate([base[None], block]) for base, block in zip(residuals, others, strict=True)]
-    grams = np.stack([coefficients @ (block @ block.T) @ coefficients.T for block in blocks])
+    grams = _fitted(features_at(places, second), np.stack([block @ block.T for block in blocks]), len(vector))
     return Surrogate(grams / problem.trial_weights[:, None, None], problem.trial_weights, second)
+
+
+def _fitted(features: np.ndarray, products: np.ndarray, count: int) -> np.ndarray:
+    """Grams (T, F, F) of the coefficients that explain best, at places with `features` (N, F), residuals of which
+    `products` (T, N, N) are the inner products. What is left over are jumps; coefficients of second order are shrunk by
+    as much as jumps lengthen them (James, Stein 1961, the positive part). `count`: parameters, P."""
+    solve = np.linalg.pinv(features)
+    grams = solve @ products @ solve.T
+    spare = features.shape[0] - features.shape[1]
+    if spare:
+        left = np.trace(products, axis1=1, axis2=2) - np.sum((features.T @ products) * solve, axis=(1, 2))
+        jumps = left.sum() / spare * np.square(solve).sum(axis=1)
+        shares = np.clip(1 - jumps / np.maximum(np.diag(grams.sum(axis=0)), 1e-300), 0, 1)
+        shares[: count + 1] = 1
+        grams = grams * np.outer(shares, shares)
+    return grams
 
 
 def reaches(problem: Problem) -> np.ndarray:
@@ -129,6 +152,14 @@ def _stencil(reach: np.ndarray, second: bool) -> np.ndarray:
         return np.concatenate([np.zeros((1, len(reach))), steps])
     rows, columns = np.tril_indices(len(reach), -1)
     return np.concatenate([np.zeros((1, len(reach))), steps, -steps, steps[rows] + steps[columns]])
+
+
+def _composite(reach: np.ndarray) -> np.ndarray:
+    """The centre, both ends of every axis and all four corners of every two, for reaches (P,). Shape (2 P² + 1, P)."""
+    steps = np.diag(reach)
+    first, second = steps[np.tril_indices(len(reach), -1)[0]], steps[np.tril_indices(len(reach), -1)[1]]
+    corners = [first + second, first - second, second - first, -first - second]
+    return np.concatenate([np.zeros((1, len(reach))), steps, -steps, *corners])
 
 
 def _losses(grams: np.ndarray, places: np.ndarray, second: bool) -> np.ndarray:
