@@ -1,7 +1,7 @@
 """Every kind of arm: what `kind` in conf/build_mjcf/arm/<name>.yaml may be, and the settings that go with it.
 
 A kind is a dataclass in a file of this folder with a field `kind: Literal["<name>"]` and a method
-`build(actuation, solver, models) -> CadArm`, as `cad.Chain` has; it is found here by that field.
+`build(actuation, solver, models) -> CadArm`, as `ChainArm` has; it is found here by that field.
 """
 
 import pkgutil
