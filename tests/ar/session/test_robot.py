@@ -265,7 +265,7 @@ class Still:
     def poses(self):
         return np.empty((0, POSE))
 
-    def thing(self):
+    def object(self):
         return np.full(POSE, np.nan)
 
     def measured(self):

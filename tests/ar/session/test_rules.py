@@ -1,4 +1,4 @@
-"""Clock, lease, outbox and certificate by themselves: their rules, for every order in which things may come."""
+"""Clock, lease, outbox and certificate by themselves: their rules, for every order in which objects may come."""
 
 import asyncio
 import ssl

@@ -27,7 +27,7 @@ from trunkline.ar.teleop.vectors import DOWN
 
 SETTINGS, PACKAGE, WORLD = config().core, "a" * 64, World("world")
 NEAR, FORWARD = 1e-6, (1.0, 0.0, 0.0, 0.0)
-TARGETS = Targets(Target((0.5, 0.0, 0.5)), Target((0.6, 0.0, 0.2)), DOWN, 0.0, 0, 0.0, thing="the cup")
+TARGETS = Targets(Target((0.5, 0.0, 0.5)), Target((0.6, 0.0, 0.2)), DOWN, 0.0, 0, 0.0, object="the cup")
 REQUEST = Request(3, TARGETS, "world", PACKAGE)
 ENDS = ((0.5, 0.0, 0.5), (0.6, 0.0, 0.2))
 GRIPPING = Hand(0.6, buttons=("grip",), gripped_at=ENDS[0])
@@ -127,7 +127,7 @@ def test_a_plan_is_executed_by_the_preview_of_it_alone(mode, shown):
         (replace(PRESSED, buttons=("primary", "grip")), OFFER, True, False),
         (replace(PRESSED, pressed=()), OFFER, True, False),
         (PRESSED, None, True, False),
-        (PRESSED, replace(OFFER, thing="the box"), True, False),
+        (PRESSED, replace(OFFER, object="the box"), True, False),
         (PRESSED, OFFER, False, False),
     ],
 )

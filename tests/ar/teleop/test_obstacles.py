@@ -10,7 +10,7 @@ from tests.support.operator import READY_JOINTS, config
 from trunkline.ar.teleop import obstacles
 from trunkline.ar.teleop.alignment import base_quaternion
 from trunkline.ar.teleop.following import sought
-from trunkline.ar.teleop.messages import Box, Request, Target, Targets, World
+from trunkline.ar.teleop.messages import Obstacle, Request, Target, Targets, World
 from trunkline.ar.teleop.obstacles import LINK_RADIUS, refuse
 from trunkline.ar.teleop.plan import Plan
 from trunkline.ar.teleop.planner import Planner
@@ -48,7 +48,7 @@ def places(commands: np.ndarray) -> np.ndarray:
 
 
 def about(place: np.ndarray, half: float = 0.005) -> World:
-    return World("world", (Box("the table", tuple(map(float, place - half)), tuple(map(float, place + half))),))
+    return World("world", (Obstacle("the table", tuple(map(float, place - half)), tuple(map(float, place + half))),))
 
 
 def test_the_hanging_arm_in_a_solid_is_refused_at_once():
@@ -63,7 +63,7 @@ def test_a_solid_where_the_arm_curls_to_is_named_with_when():
         refuse(curling("approach", "curl"), there, OFFSET, CHAIN)
 
 
-def test_from_where_it_closes_about_a_thing_the_preview_shows_the_way():
+def test_from_where_it_closes_about_an_object_the_preview_shows_the_way():
     there = about(places(STRAIGHT - PULL)[-1])
     refuse(curling("approach", "curl", "lift"), there, OFFSET, CHAIN)
     refuse(curling("transfer", "release"), about(places(STRAIGHT)[-1]), OFFSET, CHAIN)
@@ -136,22 +136,22 @@ def test_a_solid_beside_the_mount_is_in_its_way_within_a_links_radius(axis, side
         low, high = mount - 0.005, mount + 0.005
         (low if side > 0 else high)[axis] = mount[axis] + side * off
         (high if side > 0 else low)[axis] = mount[axis] + side * (off + 0.01)
-        world = World("world", (Box("the post", tuple(map(float, low)), tuple(map(float, high))),))
+        world = World("world", (Obstacle("the post", tuple(map(float, low)), tuple(map(float, high))),))
         assert (_reason(one_row(READY), world) == "") == free
 
 
 @pytest.mark.parametrize("frame", range(2, 7))
 def test_every_moving_link_is_looked_at(frame):
     place = joint_frames(READY[None])[frame].p[:, 0]
-    world = World("world", (Box("the post", tuple(map(float, place)), tuple(map(float, place))),))
+    world = World("world", (Obstacle("the post", tuple(map(float, place)), tuple(map(float, place))),))
     assert _reason(one_row(READY), world).startswith("world: joint ")
 
 
 @pytest.mark.parametrize("first", [True, False])
 def test_every_solid_of_the_world_is_looked_at(first):
     (mount,), _ = mount_pose(READY[None], OFFSET)
-    free = Box("the shelf", (5.0, 5.0, 5.0), (6.0, 6.0, 6.0))
-    (bad,) = about(mount).boxes
+    free = Obstacle("the shelf", (5.0, 5.0, 5.0), (6.0, 6.0, 6.0))
+    (bad,) = about(mount).obstacles
     assert "the table" in _reason(one_row(READY), World("world", (bad, free) if first else (free, bad)))
 
 
@@ -166,7 +166,7 @@ def test_an_arm_that_finds_no_rest_is_not_seen_and_the_robot_still_is(monkeypatc
 
 
 def test_the_arms_last_pose_before_it_closes_is_looked_at_too():
-    """However rarely its poses are: the row before the curl that closes about a thing, and a plan's last one."""
+    """However rarely its poses are: the row before the curl that closes about an object, and a plan's last one."""
     rows, plan = np.arange(ROWS)[:, None], curling("approach", "curl", "lift")
     bent = replace(plan, commands=np.where(rows == CURL - 1, STRAIGHT - PULL, STRAIGHT))
     assert _reason(bent, about(places(STRAIGHT - PULL)[-1]), CHAIN).startswith("world: the arm would come into")

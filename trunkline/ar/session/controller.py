@@ -73,7 +73,7 @@ class HandInput:
 
 
 class SessionController:
-    """One robot, one core. `lift`: m by which a thing is lifted by a grasp. `log_writer`: of the session.
+    """One robot, one core. `lift`: m by which an object is lifted by a grasp. `log_writer`: of the session.
     `period`: s, of the arm's slowest vibration mode."""
 
     def __init__(
@@ -318,7 +318,7 @@ class SessionController:
         phases = tuple(name for name, _ in self.plan.phases) if done and self.plan is not None else ()
         if done:
             self._believed = executor.digest
-        self.world = update_world(self.world, robot_state.thing, phases, self.lift)
+        self.world = update_world(self.world, robot_state.object, phases, self.lift)
 
     # --- what is told
 

@@ -85,7 +85,7 @@ def refusal(state: TeleoperationState, message: Input, settings: Teleop) -> str:
 def takes_offer(state: TeleoperationState, message: Input, settings: Teleop) -> bool:
     """Whether the assistant's offer for the plan that is shown is taken: the rigid hand's primary, its grip let go."""
     hand, pinned = state.hands[("left", "right").index(settings.rigid_hand)], state.pinned
-    mine = pinned is not None and message.offer is not None and message.offer.thing == pinned.request.targets.thing
+    mine = pinned is not None and message.offer is not None and message.offer.object == pinned.request.targets.object
     return mine and "primary" in hand.pressed and not hand.grips
 
 
