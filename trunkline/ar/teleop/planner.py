@@ -8,8 +8,8 @@ import numpy as np
 from trunkline.ar.teleop.alignment import base_quaternion
 from trunkline.ar.teleop.grasping import Grasping, Leg
 from trunkline.ar.teleop.messages import Request, Targets, World
-from trunkline.ar.teleop.obstacles import refuse
 from trunkline.ar.teleop.plan import Plan
+from trunkline.ar.teleop.plan_checks import check_plan
 from trunkline.ar.teleop.rigid_ik import RigidIK
 from trunkline.ar.teleop.shaping import Shaper, shaped
 from trunkline.ar.teleop.tendons import Network, bend
@@ -66,7 +66,7 @@ class Planner:
             rows.append(np.concatenate([way[1:], np.tile(end, (round(leg.calm / self.step), 1))]))
         every = np.concatenate(rows)
         plan = Plan(self.step, every[:, :JOINTS], every[:, JOINTS:], tuple(phases), request.package, request.world)
-        refuse(plan, world, self.mount_offset, self.chain)
+        check_plan(plan, world, self.mount_offset, self.chain)
         return plan
 
     def _legs(

@@ -18,16 +18,18 @@ from trunkline.model.statics.chain import Chain
 from trunkline.model.statics.equilibria import actuated
 from trunkline.model.statics.placement import joint_places
 
-LINK_RADIUS = 0.08  # m, about the joints' centres and the mount, that no obstacle of the world may come into
+LINK_RADIUS = 0.08  # m, about the joints' centres and the mount, that no obstacle may come into
 EVERY = 0.04  # s between poses of the arm that are looked at
 
 
-def refuse(plan: Plan, world: World, mount_offset: float, chain: Chain | None = None) -> None:
-    """Whether the way is free, of the arm only where its statics are known: the `chain`. A plan may be of one row.
+def check_plan(plan: Plan, world: World, mount_offset: float, chain: Chain | None = None) -> None:
+    """Refuse a plan whose way is not free, of the arm only where its statics are known: the `chain`.
+
+    A plan may be of one row.
 
     Raises:
-        InputError: a joint beyond its limits, the robot touching itself, or one of its joints or the arm's axis in a
-            solid of the world.
+        InputError: a joint beyond its limits, the robot touching itself, or one of its joints or the arm's axis in an
+            obstacle.
     """
     for joint in range(JOINTS):
         angles = plan.joints[:, joint]

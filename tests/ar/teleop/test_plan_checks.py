@@ -7,12 +7,12 @@ import pytest
 
 from tests.support.bent_chain import hardening_stump
 from tests.support.operator import READY_JOINTS, config
-from trunkline.ar.teleop import obstacles
+from trunkline.ar.teleop import plan_checks
 from trunkline.ar.teleop.alignment import base_quaternion
 from trunkline.ar.teleop.following import sought
 from trunkline.ar.teleop.messages import Obstacle, Request, Target, Targets, World
-from trunkline.ar.teleop.obstacles import LINK_RADIUS, refuse
 from trunkline.ar.teleop.plan import Plan
+from trunkline.ar.teleop.plan_checks import LINK_RADIUS, check_plan
 from trunkline.ar.teleop.planner import Planner
 from trunkline.ar.teleop.rigid_ik import RigidIK
 from trunkline.ar.teleop.tendons import Network
@@ -53,32 +53,32 @@ def about(place: np.ndarray, half: float = 0.005) -> World:
 
 def test_the_hanging_arm_in_a_solid_is_refused_at_once():
     with pytest.raises(InputError, match=r"world: the arm would come into the table after 0\.00 s"):
-        refuse(curling("approach", "curl"), about(places(STRAIGHT)[-1]), OFFSET, CHAIN)
+        check_plan(curling("approach", "curl"), about(places(STRAIGHT)[-1]), OFFSET, CHAIN)
 
 
 def test_a_solid_where_the_arm_curls_to_is_named_with_when():
     there = about(places(STRAIGHT - PULL)[-1])
-    refuse(curling("approach", "curl"), there, OFFSET)  # of an arm that nobody knows, nothing is said
+    check_plan(curling("approach", "curl"), there, OFFSET)  # of an arm that nobody knows, nothing is said
     with pytest.raises(InputError, match=r"world: the arm would come into the table after 1\.[89]\d? s"):
-        refuse(curling("approach", "curl"), there, OFFSET, CHAIN)
+        check_plan(curling("approach", "curl"), there, OFFSET, CHAIN)
 
 
 def test_from_where_it_closes_about_an_object_the_preview_shows_the_way():
     there = about(places(STRAIGHT - PULL)[-1])
-    refuse(curling("approach", "curl", "lift"), there, OFFSET, CHAIN)
-    refuse(curling("transfer", "release"), about(places(STRAIGHT)[-1]), OFFSET, CHAIN)
+    check_plan(curling("approach", "curl", "lift"), there, OFFSET, CHAIN)
+    check_plan(curling("transfer", "release"), about(places(STRAIGHT)[-1]), OFFSET, CHAIN)
     with pytest.raises(InputError, match="the arm would come into"):
-        refuse(curling("approach", "curl", "lift"), about(places(STRAIGHT)[-1]), OFFSET, CHAIN)
+        check_plan(curling("approach", "curl", "lift"), about(places(STRAIGHT)[-1]), OFFSET, CHAIN)
 
 
 def test_what_is_beside_the_arms_way_is_not_in_it():
-    refuse(curling("approach", "curl"), about(places(STRAIGHT)[-1] + [0, 0, -0.05]), OFFSET, CHAIN)
+    check_plan(curling("approach", "curl"), about(places(STRAIGHT)[-1] + [0, 0, -0.05]), OFFSET, CHAIN)
 
 
 def test_a_solid_in_a_links_way_is_named_first_of_its_kind():
     (mount,), _ = mount_pose(READY[None], OFFSET)
     with pytest.raises(InputError, match=r"world: (joint \d|mount) of the rigid robot would come into the table after"):
-        refuse(curling("approach", "curl"), about(mount), OFFSET, CHAIN)
+        check_plan(curling("approach", "curl"), about(mount), OFFSET, CHAIN)
 
 
 # --- each criterion by itself, from both sides of its border
@@ -98,7 +98,7 @@ def test_no_joint_leaves_its_range_on_either_side(joint, side):
     plan = curling("approach", "curl")
     plan.joints[50, joint] = border + outwards * NEAR
     with pytest.raises(InputError, match=f"limit: joint {joint + 1} of the rigid robot would leave its range"):
-        refuse(plan, World("world"), OFFSET)
+        check_plan(plan, World("world"), OFFSET)
     plan.joints[50, joint] = border
     assert not _reason(plan, World("world")).startswith("limit")  # there, the robot may touch itself
 
@@ -106,7 +106,7 @@ def test_no_joint_leaves_its_range_on_either_side(joint, side):
 def _reason(plan: Plan, world: World, chain=None) -> str:
     """Why the way is not free, "" where it is."""
     try:
-        refuse(plan, world, OFFSET, chain)
+        check_plan(plan, world, OFFSET, chain)
     except InputError as error:
         return str(error)
     return ""
@@ -158,8 +158,8 @@ def test_every_solid_of_the_world_is_looked_at(first):
 def test_an_arm_that_finds_no_rest_is_not_seen_and_the_robot_still_is(monkeypatch):
     rest = actuated(CHAIN, STRAIGHT[None], gravity_in_base(0.0))
     lost = replace(rest, converged=np.array([False]))
-    monkeypatch.setattr(obstacles, "actuated", lambda chain, commands, pull: lost)
-    monkeypatch.setattr(obstacles, "joint_places", lambda chain, qpos: np.zeros((1, 3, 3)))
+    monkeypatch.setattr(plan_checks, "actuated", lambda chain, commands, pull: lost)
+    monkeypatch.setattr(plan_checks, "joint_places", lambda chain, qpos: np.zeros((1, 3, 3)))
     (mount,), _ = mount_pose(READY[None], OFFSET)
     assert _reason(one_row(READY), about(places(STRAIGHT)[-1]), CHAIN) == ""
     assert _reason(one_row(READY), about(mount), CHAIN).startswith("world: ")
