@@ -20,7 +20,7 @@ from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.ar.drivers.simulated_motors import SIMULATED
 from trunkline.ar.session import real, robot
 from trunkline.ar.session.hardware import hardware_of
-from trunkline.ar.session.session import opened
+from trunkline.ar.session.serving import opened
 from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT, load_folder
 

@@ -41,7 +41,7 @@ from trunkline.ar.session.previewer import (
 )
 from trunkline.ar.session.robot import RobotState
 from trunkline.ar.session.server import Composition, Server
-from trunkline.ar.session.session import listening
+from trunkline.ar.session.serving import listening
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.executor import SimulatedRobot

@@ -25,7 +25,7 @@ from qualification.browser import Page, browsing
 from trunkline.ar.preview.package import only_package
 from trunkline.ar.session import lease, robot
 from trunkline.ar.session.previewer import Answer, FollowRequest, Order, Previewer
-from trunkline.ar.session.session import Address, opened
+from trunkline.ar.session.serving import Address, opened
 from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.messages import Mode

@@ -19,7 +19,7 @@ from mcap.writer import Writer
 from mcap_ros2.decoder import DecoderFactory
 
 from tests.ar.session.test_robot import simulation
-from tests.ar.session.test_session import asked, executing, grips
+from tests.ar.session.test_serving import asked, executing, grips
 from tests.ar.teleop.test_plan import MOUNT, OFFSET, START, STRAIGHT, TIP
 from tests.support.disks import filling, full, stuck
 from tests.support.live import BODIES, RATE, controlling, hand, laid, patient

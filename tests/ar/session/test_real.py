@@ -25,7 +25,7 @@ from trunkline.ar.session.__main__ import parsed
 from trunkline.ar.session.hardware import hardware_of
 from trunkline.ar.session.real import HardwarePlant, Pursuit, RealRobot
 from trunkline.ar.session.robot import DEAD_MAN, HOLD_TIME, MODE, MODES, PERMIT, PERMITTED, STOPS, Goal, RobotChannel
-from trunkline.ar.session.session import alignment_for
+from trunkline.ar.session.serving import alignment_for
 from trunkline.ar.session.settings import SessionConfig as Live
 from trunkline.ar.session.simulated import Loop, TwinPlant
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop

@@ -17,7 +17,7 @@ from tests.support.live import RATE, Hands, Laid, binary, controlling, hand, lai
 from trunkline.ar.session import binary as wire
 from trunkline.ar.session.__main__ import main
 from trunkline.ar.session.gc_policy import NEVER
-from trunkline.ar.session.session import Address, expect_free
+from trunkline.ar.session.serving import Address, expect_free
 from trunkline.ar.teleop.messages import Intent
 from trunkline.ar.teleop.plan import Plan
 from trunkline.errors import InputError
@@ -362,7 +362,7 @@ def test_a_session_that_is_told_to_end_is_closed_in_order(monkeypatch, capsys, n
             await asyncio.sleep(0.05)
             closed.append(number)
 
-    monkeypatch.setattr("trunkline.ar.session.session.opened", opened)
+    monkeypatch.setattr("trunkline.ar.session.serving.opened", opened)
     try:
         assert main(["package.tgz", "--port", "18459"]) == 0
     finally:

@@ -1,4 +1,4 @@
-"""A live session: its processes, its port, its address."""
+"""Serving a live session: its processes, its port, its address."""
 
 import argparse
 import asyncio
