@@ -39,7 +39,7 @@ from trunkline.ar.session.previewer import (
     PreviewBegun,
     PreviewPiece,
 )
-from trunkline.ar.session.robot import RobotState
+from trunkline.ar.session.robot_process import RobotState
 from trunkline.ar.session.server import Composition, Server
 from trunkline.ar.session.serving import listening
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop

@@ -12,7 +12,7 @@ from trunkline.ar.drivers.driver_host import start_driver
 from trunkline.ar.drivers.motors import MotorsOnBus
 from trunkline.ar.session import real
 from trunkline.ar.session.hardware import Hardware
-from trunkline.ar.session.robot import HOLD_TIME, MODE, MODES, SERIAL, RobotChannel
+from trunkline.ar.session.robot_process import HOLD_TIME, MODE, MODES, SERIAL, RobotChannel
 from trunkline.ar.teleop.trajectory import JOINTS
 
 LEAST = 1e-9  # rad or m between two tellings: it moves

@@ -17,7 +17,7 @@ from trunkline.ar.preview.package import Package
 from trunkline.ar.session.controller import SessionController
 from trunkline.ar.session.messages import PredictionMessage
 from trunkline.ar.session.previewer import InlinePreviewer, PreviewPlanner
-from trunkline.ar.session.robot import DEAD_MAN, RobotState
+from trunkline.ar.session.robot_process import DEAD_MAN, RobotState
 from trunkline.ar.teleop.config import TeleoperationConfig
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.executor import SimulatedRobot

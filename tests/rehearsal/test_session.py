@@ -17,7 +17,7 @@ from tests.ar.teleop.test_plan import BENT, LIMITS, NETWORK, OFFSET, START, STRA
 from tests.support.operator import PACKAGE, Everywhere, config
 from trunkline.ar.hybrid.rollout_batch import Stated
 from trunkline.ar.preview.grasp_preview import GraspPreviewer
-from trunkline.ar.session.robot import DEAD_MAN
+from trunkline.ar.session.robot_process import DEAD_MAN
 from trunkline.ar.teleop.executor import BRAKE
 from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.messages import ExecutorReport, World

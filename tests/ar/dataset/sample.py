@@ -8,7 +8,7 @@ from tests.ar.teleop.test_plan import START, STRAIGHT
 from tests.support.operator import PACKAGE, Operator
 from trunkline.ar.session.log_format import SIMULATED, LogFormat, Subject
 from trunkline.ar.session.log_writer import LogWriter
-from trunkline.ar.session.robot import RobotState
+from trunkline.ar.session.robot_process import RobotState
 from trunkline.ar.teleop.messages import (
     ExecutorReport,
     Intent,

@@ -23,7 +23,7 @@ from trunkline.ar.drivers import (
 from trunkline.ar.drivers import robot as machine
 from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.ar.drivers.winch import WinchSettings
-from trunkline.ar.session import auth, client, clock, follow, lease, log_writer, real, robot, server
+from trunkline.ar.session import auth, client, clock, follow, lease, log_writer, real, robot_process, server
 from trunkline.ar.session.settings import SessionConfig as Live
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.executor import BRAKE
@@ -45,7 +45,7 @@ DELAYED = machine.LEAD + (machine.SMOOTH - 1) * driver.TICK  # s that limbs are 
 FIGURES = {
     PAGE: [
         (r"every ms it sends both limbs their setpoints for (30) ms later", [machine.LEAD / ms]),
-        (r"without a permit for (80) ms it slows", [robot.DEAD_MAN / ms]),
+        (r"without a permit for (80) ms it slows", [robot_process.DEAD_MAN / ms]),
         (r"run out \((30) ms\), do not come \((50) ms\) or are played late \((0\.3) s\)",
          [machine.LEAD / ms, watchdog.SILENT / ms, setpoint_filter.BEHIND]),
         (r"plays their setpoints, (1000) times a second", [1 / driver.TICK]),
@@ -55,7 +55,7 @@ FIGURES = {
         (r"late by less than the (30) ms has no other effect", [machine.LEAD / ms]),
         (r"again (30) ms ahead", [machine.LEAD / ms]),
         (r"silent for (0\.1) s, or ends, is a fault of the robot", [driver_client.SILENT]),
-        (r"no permit for (80) ms", [robot.DEAD_MAN / ms]),
+        (r"no permit for (80) ms", [robot_process.DEAD_MAN / ms]),
         (r"where the process is gone, for (0\.2) s, then no current", [driver_host.SETTLES]),
         (r"a joint (0\.05) rad off", [SET.arm.astray]),
         (r"a motor silent for (20) ms, too hot, or a cable (20) mm off", [motors.SILENT / ms, SET.motors.astray / mm]),
@@ -85,10 +85,10 @@ FIGURES = {
         (r"(0\.25) s, by its stamp or there and back", [clock.LATEST]),
         (r"sends nothing for (1) s", [lease.SILENCE]),
         (r"at once, or (1) s", [lease.SILENCE]),
-        (r"along the plan \| (0\.08) s \|", [robot.DEAD_MAN]),
-        (r"its process ends \| (0\.08) s \|", [robot.DEAD_MAN]),
+        (r"along the plan \| (0\.08) s \|", [robot_process.DEAD_MAN]),
+        (r"its process ends \| (0\.08) s \|", [robot_process.DEAD_MAN]),
         (r"the same as a stop \| (1) s \|", [follow.SILENT]),
-        (r"permits nothing \| (0\.15) s \|", [robot.STALE]),
+        (r"permits nothing \| (0\.15) s \|", [robot_process.STALE]),
         (r"as soon as a write fails; (1) s in which nothing", [LIVE.journal.period + log_writer.LATE]),
         (r"A token of (128) bits", [8 * auth.TOKEN_BYTES]),
         (r"valid for (2) minutes and (5) tries", [auth.CODE_SECONDS / 60, auth.CODE_TRIES]),

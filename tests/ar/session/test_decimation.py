@@ -7,7 +7,7 @@ from tests.ar.session.test_log import SUBJECT, Written
 from tests.ar.teleop.test_plan import START, STRAIGHT
 from trunkline.ar.session.decimation import AFTER, BEFORE, SELDOM, STILL, LogDecimation
 from trunkline.ar.session.log_format import JOINTS_SENT, POSES
-from trunkline.ar.session.robot import RobotState
+from trunkline.ar.session.robot_process import RobotState
 from trunkline.recordings.logs.joint_stream import joint_stream
 from trunkline.recordings.logs.log import read_log
 

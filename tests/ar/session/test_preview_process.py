@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tests.ar.session.test_robot import simulation
+from tests.ar.session.test_robot_process import simulation
 from tests.ar.teleop.test_plan import LIMITS, MOUNT, NETWORK, OFFSET, TIP, request
 from tests.support.operator import config
 from tests.support.small_arm import small_spec

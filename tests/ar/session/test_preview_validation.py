@@ -15,7 +15,7 @@ from trunkline.ar.session.log_format import LogFormat
 from trunkline.ar.session.log_reader import read_session_log
 from trunkline.ar.session.log_writer import LogWriter
 from trunkline.ar.session.preview_validation import Execution, _end, _grasped, _holds, executions, lines, main
-from trunkline.ar.session.robot import RobotState
+from trunkline.ar.session.robot_process import RobotState
 from trunkline.ar.teleop.messages import ExecutorReport, Intent, WorldObject
 from trunkline.kinematics.panda.kinematics import joint_frames, mount_pose
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.ar.session.test_robot import simulation, until
+from tests.ar.session.test_robot_process import simulation, until
 from tests.support.motors import PlayedMotors, homed
 from tests.support.operator import PACKAGE, config
 from trunkline.ar.drivers.driver import TICK
@@ -24,7 +24,17 @@ from trunkline.ar.drivers.time_scaling import TimeScaledRobot
 from trunkline.ar.session.__main__ import parsed
 from trunkline.ar.session.hardware import hardware_of
 from trunkline.ar.session.real import HardwarePlant, Pursuit, RealRobot
-from trunkline.ar.session.robot import DEAD_MAN, HOLD_TIME, MODE, MODES, PERMIT, PERMITTED, STOPS, Goal, RobotChannel
+from trunkline.ar.session.robot_process import (
+    DEAD_MAN,
+    HOLD_TIME,
+    MODE,
+    MODES,
+    PERMIT,
+    PERMITTED,
+    STOPS,
+    Goal,
+    RobotChannel,
+)
 from trunkline.ar.session.serving import alignment_for
 from trunkline.ar.session.settings import SessionConfig as Live
 from trunkline.ar.session.simulated import Loop, TwinPlant

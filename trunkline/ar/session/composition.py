@@ -15,7 +15,7 @@ from trunkline.ar.session.hardware import Hardware
 from trunkline.ar.session.log_format import SIMULATED, Subject
 from trunkline.ar.session.log_writer import LogWriterProcess, new_path
 from trunkline.ar.session.preview_process import PreviewProcess
-from trunkline.ar.session.robot import RobotProcess
+from trunkline.ar.session.robot_process import RobotProcess
 from trunkline.ar.session.scene import Shells, scene
 from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.session.simulated import Simulation

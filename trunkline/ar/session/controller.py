@@ -26,7 +26,7 @@ from trunkline.ar.session.previewer import (
     Previewer,
     PreviewPiece,
 )
-from trunkline.ar.session.robot import RobotState
+from trunkline.ar.session.robot_process import RobotState
 from trunkline.ar.session.ui_text import next_action, next_key
 from trunkline.ar.teleop.alignment import base_quaternion
 from trunkline.ar.teleop.core import Teleoperation

@@ -4,7 +4,7 @@ from collections import deque
 
 import numpy as np
 
-from trunkline.ar.session.robot import RobotState
+from trunkline.ar.session.robot_process import RobotState
 
 SELDOM = 0.25  # s between two that are kept then
 AFTER = 10.0  # s of rest that are kept whole: shapes at rest are identified from them

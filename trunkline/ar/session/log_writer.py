@@ -41,7 +41,7 @@ from trunkline.ar.session.log_format import (
     new_file,
     run,
 )
-from trunkline.ar.session.robot import RobotState
+from trunkline.ar.session.robot_process import RobotState
 from trunkline.ar.teleop import messages
 from trunkline.ar.teleop.messages import Input, Intent, Pose
 from trunkline.errors import InputError

@@ -23,7 +23,7 @@ from trunkline.ar.drivers.realtime_priority import raise_priority
 from trunkline.ar.drivers.robot import HardwareRobot
 from trunkline.ar.drivers.time_scaling import TimeScaledRobot
 from trunkline.ar.session.hardware import Hardware
-from trunkline.ar.session.robot import POSE, READY, TIME, RobotChannel, RobotProcess, RobotState
+from trunkline.ar.session.robot_process import POSE, READY, TIME, RobotChannel, RobotProcess, RobotState
 from trunkline.ar.session.simulated import Loop, Simulation, TwinPlant, drive
 from trunkline.ar.teleop.following import Follower, Following
 from trunkline.ar.teleop.messages import ExecutorReport

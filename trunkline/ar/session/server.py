@@ -26,7 +26,7 @@ from trunkline.ar.session.gc_policy import GCPolicy
 from trunkline.ar.session.lease import Control
 from trunkline.ar.session.previewer import PredictionAnswer, PreviewBegun, PreviewPiece
 from trunkline.ar.session.registration import mark_at
-from trunkline.ar.session.robot import next_report_time
+from trunkline.ar.session.robot_process import next_report_time
 from trunkline.ar.session.routes import Routes
 from trunkline.ar.session.scene import Shells
 from trunkline.ar.session.settings import AlignmentSettings

@@ -22,7 +22,7 @@ from trunkline.ar.session import simulated
 from trunkline.ar.session.bodies import BodyPoses, drawn_bodies
 from trunkline.ar.session.composition import SEARCH, subject_of
 from trunkline.ar.session.log_reader import tip_path
-from trunkline.ar.session.robot import (
+from trunkline.ar.session.robot_process import (
     DEAD_MAN,
     FRESH,
     MODE,
