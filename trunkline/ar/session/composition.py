@@ -94,7 +94,7 @@ def subject_of(simulation: Simulation, hardware: Hardware | None = None) -> Subj
 def robot_of(simulation: Simulation, hardware: Hardware | None) -> RobotProcess:
     """The simulated robot's process, or the real one's."""
     if hardware is not None:
-        from trunkline.ar.session.real import RealRobot  # with what hardware needs installed
+        from trunkline.ar.session.hardware_process import RealRobot  # with what hardware needs installed
 
         return RealRobot(hardware, simulation)
     tendons, bodies = len(simulation.commands), len(simulation.bodies)

@@ -18,9 +18,9 @@ from threadpoolctl import threadpool_limits
 from trunkline.ar.drivers.driver import Driver
 from trunkline.ar.drivers.driver_client import panda
 from trunkline.ar.drivers.driver_host import start_driver
+from trunkline.ar.drivers.hardware_robot import HardwareRobot
 from trunkline.ar.drivers.motors import MotorsOnBus
 from trunkline.ar.drivers.realtime_priority import raise_priority
-from trunkline.ar.drivers.robot import HardwareRobot
 from trunkline.ar.drivers.time_scaling import TimeScaledRobot
 from trunkline.ar.session.hardware import Hardware
 from trunkline.ar.session.robot_process import POSE, READY, TIME, RobotChannel, RobotProcess, RobotState
