@@ -252,7 +252,7 @@ def test_a_silent_holder_loses_the_lease_to_whoever_asked_and_the_robot_holds():
             await second.hears("lease", holder=first.id, asking=[second.id])
             first.sending.cancel()
             await asyncio.sleep(0.8)
-            assert here.server.control.holder == first.id
+            assert here.server.lease.holder == first.id
             await second.hears("lease", 1.0, holder=second.id, asking=[])
             assert (await second.hears("state"))["motion"] == "hold"
 
@@ -323,7 +323,7 @@ def test_the_same_client_again_ends_the_older_connection_and_the_lease():
             again = await here.come(id=guest.id)
             assert again.id == guest.id
             await asyncio.wait_for(guest.closed.wait(), 2.0)
-            assert here.server.control.holder == ""
+            assert here.server.lease.holder == ""
             assert list(here.server.clients) == [guest.id]
 
     asyncio.run(session())
