@@ -15,7 +15,7 @@ def stopped_by(message: Input) -> bool:
     return message.left.secondary or message.right.secondary
 
 
-def happened(
+def detect_events(
     state: TeleoperationState, message: Input, targets: Targets | None, ends: Ends, settings: Teleop
 ) -> tuple[dict[Event, bool], str]:
     """Of a sound step; `targets` are the present ones, `ends` those of the rays."""
