@@ -25,7 +25,7 @@ from qualification.guests import ADDRESS
 from trunkline.ar.session import binary
 from trunkline.ar.session.composition import SessionParts
 from trunkline.ar.session.server import Server
-from trunkline.ar.session.session import Address, opened
+from trunkline.ar.session.serving import Address, opened
 from trunkline.ar.session.tls import make_certificate, tls_context
 
 CROWD = 10  # watchers, of whom one does not read in the end

@@ -83,11 +83,11 @@ def grasp(path: Path) -> tuple[ComposedTwin, CommandTrajectory]:
     base = turns[0] @ np.diag([1.0, -1.0, -1.0])
     center = mounts[0] + base @ middle
     hook = [float(value) for value in center + [0, 0, DIAMETER / 2 + HOOK_ABOVE]]
-    thing = GraspObject("cylinder", DIAMETER, 0.12, MASS, "plastic")
+    object = GraspObject("cylinder", DIAMETER, 0.12, MASS, "plastic")
     level = np.zeros(4)
     mujoco.mju_mat2Quat(level, base.ravel())
     mujoco.mju_mulQuat(level, level.copy(), np.array(LEVEL))
-    placed = Placed(thing, center, (level[0], level[1], level[2], level[3]), True)
+    placed = Placed(object, center, (level[0], level[1], level[2], level[3]), True)
     model = compose(spec, robot, WorldGeometry(None, {}, hook), placed).compile()
     model.geom_contype[model.geom("hook").id] = 0  # a string: the rod above the hook's end would stand in the flange
     arm, time_step = spec.compile(), 0.002

@@ -3,7 +3,7 @@
     python -m qualification.acceptance [PACKAGE]
 
 How soon a preview is there, and whether the simulated robot does what it shows: on a package, by the process that plans
-in a live session. Each plan begins at rest; the robot is the live session's, stepped without waiting. The thing of a
+in a live session. Each plan begins at rest; the robot is the live session's, stepped without waiting. The object of a
 live session's settings is there, and the arm may push it on its way: such plans are told apart, as contacts are softer
 in a preview (`trunkline/ar/hybrid/rollouts.py`).
 
@@ -26,7 +26,7 @@ from qualification.command import qualify
 from trunkline.ar.preview.package import Package, read_package
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import preview_process
-from trunkline.ar.session.composition import SEARCH, simulation_of, solids, subject_of
+from trunkline.ar.session.composition import SEARCH, obstacles, simulation_of, subject_of
 from trunkline.ar.session.log_reader import tip_path
 from trunkline.ar.session.preview_process import PreviewProcess
 from trunkline.ar.session.previewer import Answer, Order, PlanAnswer, PreviewBegun, PreviewPiece
@@ -46,7 +46,7 @@ ENOUGH = 3.6  # s of a preview
 AROUND, HEADING = (0.15, 0.3, 0.1), 0.5  # m of mounts about the first, rad
 PULLS, LOOSE = (0.03, 0.12), 0.2  # m by which the first cable is pulled, and the others paid out
 COMES, POLLED = 600.0, 0.001  # s that the process may take, and after which it is looked whether it has answered
-PUSHED = 2e-3  # m by which a thing has moved that was pushed; on its string it never rests
+PUSHED = 2e-3  # m by which an object has moved that was pushed; on its string it never rests
 
 
 class Row(NamedTuple):
@@ -73,7 +73,7 @@ def rows(path: Path) -> list[Row]:
     package = read_package(path)
     joints = RigidIK(teleop.mount_offset).solve(SEARCH, config.ready, DOWN, 0.0)
     simulation = simulation_of(package, teleop, config, joints)
-    world = make_world(solids(config), () if config.thing is None else (config.thing,))
+    world = make_world(obstacles(config), () if config.object is None else (config.object,))
     with planning(path, teleop, config, simulation, world) as process:
         found = list(previews(process, package, config, simulation, world))
     first, enough, whole = np.array([(one.first, one.enough, one.whole) for one in found]).T
@@ -186,7 +186,7 @@ def _heard(process: PreviewProcess, serial: int) -> Previewed | None:
 
 def distances(found: Previewed, simulation: Simulation) -> tuple[np.ndarray, bool]:
     """Of the tip from where the preview has it, m (F,), once the simulated robot runs the plan; whether it pushed the
-    thing."""
+    object."""
     plant = TwinPlant(simulation)
     robot = SimulatedRobot(
         simulation.joints, simulation.commands, simulation.limits, simulation.package,
@@ -195,16 +195,16 @@ def distances(found: Previewed, simulation: Simulation) -> tuple[np.ndarray, boo
     if refused := robot.start(found.plan, found.plan.digest()):
         raise InputError(refused)
     body, place = subject_of(simulation).tip
-    row, times, poses, things = simulation.bodies.index(body), [0.0], [plant.poses()], [plant.thing()]
+    row, times, poses, objects = simulation.bodies.index(body), [0.0], [plant.poses()], [plant.object()]
     until = found.times + simulation.twin.model.opt.timestep  # of the step that ends with a frame
     while times[-1] < until[-1]:
         robot.advance(plant.tick)
         times.append(times[-1] + plant.tick)
         poses.append(plant.poses())
-        things.append(plant.thing())
+        objects.append(plant.object())
     tip = tip_path(np.array(poses)[:, row], place)
     there = np.stack([np.interp(until, times, axis) for axis in tip.T], axis=1)
-    pushed = bool((np.ptp(np.array(things)[:, :3], axis=0) > PUSHED).any())
+    pushed = bool((np.ptp(np.array(objects)[:, :3], axis=0) > PUSHED).any())
     return np.linalg.norm(there - tip_path(found.poses[:, row].astype(float), place), axis=1), pushed
 
 

@@ -26,7 +26,7 @@ from qualification.hushed import HUSH
 from qualification.operator import JUMP, PATIENCE
 from qualification.scene import OperatedSession, staged
 from trunkline.ar.session.log_reader import read_session_log
-from trunkline.ar.session.robot import DEAD_MAN
+from trunkline.ar.session.robot_process import DEAD_MAN
 from trunkline.errors import InputError
 
 GOAL = 0.15  # s

@@ -11,7 +11,7 @@ import numpy as np
 from aiohttp import ClientSession, WSMessage, WSMsgType
 
 from trunkline.ar.session import binary
-from trunkline.ar.session.session import Address
+from trunkline.ar.session.serving import Address
 from trunkline.errors import InputError
 
 ADDRESS = Address(18446)  # of every session that is measured: one at a time

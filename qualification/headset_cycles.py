@@ -35,7 +35,7 @@ from trunkline.ar.session.controller import Robot
 from trunkline.ar.session.hardware import hardware_of
 from trunkline.ar.session.registration import mark_at
 from trunkline.ar.session.server import Server
-from trunkline.ar.session.session import opened
+from trunkline.ar.session.serving import opened
 from trunkline.ar.session.settings import AlignmentSettings, SessionConfig
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.executor import AT_START

@@ -18,9 +18,9 @@ from qualification.operator import PATIENCE, OperatorProcess
 from qualification.witness import Watched, Witness, machine
 from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.ar.drivers.simulated_motors import SIMULATED
-from trunkline.ar.session import real, robot
+from trunkline.ar.session import hardware_process, robot_process
 from trunkline.ar.session.hardware import hardware_of
-from trunkline.ar.session.session import opened
+from trunkline.ar.session.serving import opened
 from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT, load_folder
 
@@ -120,8 +120,8 @@ def serve(pipe: Connection, witness: Witness, package: Path, motors: bool) -> No
     """The process of a session: until the other end of `pipe` is closed. All in it is as it is served, but that the
     robot's process tells the witness too, and that its bank, if it has one, has a motor that can be silent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    robot.RobotChannel, real.run = functools.partial(Watched, witness=witness), machine
-    real.RobotChannel = functools.partial(Watched, witness=None)  # the twin's: its class has another name now
+    robot_process.RobotChannel, hardware_process.run = functools.partial(Watched, witness=witness), machine
+    hardware_process.RobotChannel = functools.partial(Watched, witness=None)  # the twin's, of another name
     asyncio.run(_serve(pipe, package, motors))
 
 

@@ -39,9 +39,9 @@ from trunkline.ar.session.previewer import (
     PreviewBegun,
     PreviewPiece,
 )
-from trunkline.ar.session.robot import RobotState
+from trunkline.ar.session.robot_process import RobotState
 from trunkline.ar.session.server import Composition, Server
-from trunkline.ar.session.session import listening
+from trunkline.ar.session.serving import listening
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.executor import SimulatedRobot
@@ -150,7 +150,7 @@ async def session(package: Package, hours: float) -> None:
 
         async def control(guest: Guest) -> None:
             await guest.say(type="lease", action="ask")
-            await heard(lambda: server.control.holder == guest.told["welcome"]["id"])
+            await heard(lambda: server.lease.holder == guest.told["welcome"]["id"])
 
         guest, hands, visitors = await come(), Hands(), []
         await control(guest)
@@ -174,7 +174,7 @@ async def session(package: Package, hours: float) -> None:
                 found["missed"] += robot.stops == stops
                 if now // HAND_OVER > found["given"]:
                     await guest.say(type="lease", action="give", to=visitors[0][1].told["welcome"]["id"])
-                    await heard(lambda: server.control.holder == visitors[0][1].told["welcome"]["id"])
+                    await heard(lambda: server.lease.holder == visitors[0][1].told["welcome"]["id"])
                     await guest.leave()
                     guest, found["given"] = visitors.pop(0)[1], int(now // HAND_OVER)
                     found["hand-overs"] += 1

@@ -10,9 +10,9 @@ import numpy as np
 from trunkline.ar.drivers.driver_client import DriverClient
 from trunkline.ar.drivers.driver_host import start_driver
 from trunkline.ar.drivers.motors import MotorsOnBus
-from trunkline.ar.session import real
+from trunkline.ar.session import hardware_process
 from trunkline.ar.session.hardware import Hardware
-from trunkline.ar.session.robot import HOLD_TIME, MODE, MODES, SERIAL, RobotChannel
+from trunkline.ar.session.robot_process import HOLD_TIME, MODE, MODES, SERIAL, RobotChannel
 from trunkline.ar.teleop.trajectory import JOINTS
 
 LEAST = 1e-9  # rad or m between two tellings: it moves
@@ -82,5 +82,5 @@ def machine(channel: Watched, *setup) -> None:
         witness.motors = found.process.pid
         return found
 
-    real.motors_of = motors
-    real.run(channel, *setup)
+    hardware_process.motors_of = motors
+    hardware_process.run(channel, *setup)

@@ -13,7 +13,7 @@ AZIMUTH, ELEVATION = np.radians(-58), np.radians(22)  # from where it is seen
 SHOWN = ((-0.53, 1.05), (-0.44, 0.9))  # m, of the picture's plane
 GROUND = np.array([(-0.2, -0.65, -0.1), (0.8, -0.65, -0.1), (0.8, 0.65, -0.1), (-0.2, 0.65, -0.1)])  # m, of shadows
 RAYS = {"rigid ray": "tab:blue", "tip ray": "tab:red"}  # of the left and of the right hand
-PREVIEWED, ARM, PANDA, THING, WORLD = "tab:purple", "tab:orange", "0.45", "tab:green", "0.85"
+PREVIEWED, ARM, PANDA, OBJECT, WORLD = "tab:purple", "tab:orange", "0.45", "tab:green", "0.85"
 TRACED = 80  # shots, about 7 s
 AROUND = np.linspace(0, 2 * np.pi, 17)
 
@@ -72,15 +72,15 @@ def draw(plot, shots: list[Shot], name: str) -> None:
     for outline in outlines:
         _line(plot, _below(outline), color="0.85", lw=1)
     _line(plot, np.array([past.units[-1] for past in before]), color="0.4", lw=0.8)
-    _line(plot, np.array([past.thing for past in before]), color=THING, lw=0.8)
+    _line(plot, np.array([past.centre for past in before]), color=OBJECT, lw=0.8)
     if shot.hook is not None:
-        _line(plot, np.array([shot.thing, shot.hook]), color="0.3", lw=0.8)
+        _line(plot, np.array([shot.centre, shot.hook]), color="0.3", lw=0.8)
     _line(plot, robot, color=PANDA, lw=7, solid_joinstyle="round", solid_capstyle="round")
     _line(plot, shot.panda[:-1], color="0.25", ls="", marker="o", ms=5)
     _line(plot, np.vstack([shot.mount, shot.units]), color=ARM, lw=2)
     units = zip(shot.units, shot.axes, shot.radii, strict=True)
     faces = [(unit[0] @ _towards(), [_circle(*unit)], ARM) for unit in units]
-    faces.append((shot.thing @ _towards(), outlines, THING))
+    faces.append((shot.centre @ _towards(), outlines, OBJECT))
     for _, polygons, colour in sorted(faces, key=lambda face: face[0]):
         for polygon in polygons:
             _fill(plot, polygon, facecolor=colour, edgecolor="0.2", lw=0.5, alpha=0.9 if colour == ARM else 0.4)
@@ -103,7 +103,7 @@ def _figure(count: int):
     figure.subplots_adjust(0.01, 0.06, 0.99, 0.94, 0.02, 0)
     keys = [Line2D([], [], color=colour, ls="--", marker="o", ms=4, label=name) for name, colour in RAYS.items()]
     keys.append(Line2D([], [], color=PREVIEWED, ls="", marker="*", ms=9, label="previewed tip"))
-    keys.append(Line2D([], [], color=THING, ls="", marker="o", ms=8, alpha=0.5, label="object"))
+    keys.append(Line2D([], [], color=OBJECT, ls="", marker="o", ms=8, alpha=0.5, label="object"))
     figure.legend(handles=keys, loc="lower center", ncols=4, frameon=False, fontsize=8, columnspacing=1)
     return figure, plots
 
@@ -142,17 +142,17 @@ def _circle(centre: np.ndarray, axis: np.ndarray, radius: float) -> np.ndarray:
 
 def _outlines(shot: Shot) -> list[np.ndarray]:
     """Lines of the object: three great circles of a sphere, else the rims and four edges of each of its parts."""
-    turn, thing = rotation_from_wxyz(shot.turn), shot.object
-    radius = thing.diameter / 2
-    if thing.shape == "sphere":
-        return [_circle(shot.thing, axis, radius) for axis in turn.as_matrix()]
-    if thing.shape == "basket":
-        parts = [(part.shape, part.half, part.turn, part.place) for part in thing.parts().values()]
+    turn, object = rotation_from_wxyz(shot.turn), shot.object
+    radius = object.diameter / 2
+    if object.shape == "sphere":
+        return [_circle(shot.centre, axis, radius) for axis in turn.as_matrix()]
+    if object.shape == "basket":
+        parts = [(part.shape, part.half, part.turn, part.place) for part in object.parts().values()]
     else:
-        half = np.array([radius, radius, thing.half_height])
-        parts = [("cylinder" if thing.shape == "cylinder" else "box", half, np.eye(3), np.zeros(3))]
+        half = np.array([radius, radius, object.half_height])
+        parts = [("cylinder" if object.shape == "cylinder" else "box", half, np.eye(3), np.zeros(3))]
     lines = [line @ axes.T + place for shape, half, axes, place in parts for line in _edges(shape, half)]
-    return [turn.apply(line) + shot.thing for line in lines]
+    return [turn.apply(line) + shot.centre for line in lines]
 
 
 def _edges(shape: str, half: np.ndarray) -> list[np.ndarray]:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rehearsal.robot.scene import Object, SupportSurface
+from rehearsal.robot.scene import SceneObject, SupportSurface
 from rehearsal.session import RATE, Session
 from trunkline.frames import rotation_from_wxyz
 from trunkline.kinematics.panda.kinematics import FLANGE, joint_frames
@@ -20,7 +20,7 @@ class Shot:
     panda (9, 3): its base, its joints' frames and the flange. mount (3,). units (U, 3): centres of the arm's units;
     axes (U, 3): theirs; radii (U,). hands (2, 3), ends (2, 3): of the left and right ray, NaN where there is none.
     previewed (3,): where the shown plan's tip comes to rest, None where no plan is shown or run.
-    thing (3,): the object's centre; turn (4,): its quaternion, w first. hook: from which it hangs, None if it does not.
+    centre (3,): of the object; turn (4,): its quaternion, w first. hook: from which it hangs, None if it does not.
     """
 
     now: float
@@ -33,10 +33,10 @@ class Shot:
     hands: np.ndarray
     ends: np.ndarray
     previewed: np.ndarray | None
-    thing: np.ndarray
+    centre: np.ndarray
     turn: np.ndarray
     hook: np.ndarray | None
-    object: Object
+    object: SceneObject
     surfaces: list[SupportSurface]
 
 

@@ -24,7 +24,7 @@ from demo.plants.stranger import Stranger
 from demo.rig import ROOT as LAB
 from demo.rig import Config as Lab
 from rehearsal.operator.hands import as_hands_move
-from rehearsal.robot.scene import Object, Scene, SupportSurface
+from rehearsal.robot.scene import Scene, SceneObject, SupportSurface
 from rehearsal.robot.stand_in import SUBSTEPS, StandIn, StandInRobot, Truth
 from trunkline.frames import wxyz_from_rotation
 from trunkline.kinematics.panda.kinematics import Q_MAX, Q_MIN, mount_pose
@@ -110,24 +110,24 @@ class GraspTrial:
         self.lift = joints_for(MOUNT + [0, 0, LIFT], rotation, offset, self.grasp)
         self.aside = joints_for(MOUNT - [0, ASIDE, 0], rotation, offset, self.grasp)
         shape = (placement.shape, placement.diameter, placement.height, placement.mass)
-        far = Scene(None, Object(*shape, [5.0, 5.0, 5.0]), {})
+        far = Scene(None, SceneObject(*shape, [5.0, 5.0, 5.0]), {})
         centres, _ = StandInRobot(arm, far, settings, self.grasp, seed, LOOSENED).links()
         unit = int(np.searchsorted(np.cumsum(arm.chain.lengths), arm.chain.length - placement.beyond))
         side = rotation[:, 0] * [1, 1, 0] / np.linalg.norm(rotation[:2, 0])
         middle = centres[unit] + side * ((placement.diameter + arm.chain.widths[unit]) / 2 + placement.gap)
         if placement.hanging:
             turn = Rotation.from_rotvec(np.pi / 2 * side)  # its axis level, across the bending plane
-            thing = Object(*shape, middle.tolist(), wxyz_from_rotation(turn).tolist(), True)
+            object = SceneObject(*shape, middle.tolist(), wxyz_from_rotation(turn).tolist(), True)
             hook = middle + [0, 0, placement.diameter / 2 + STRING]
-            self.scene = Scene(FLOOR, thing, {}, hook.tolist())
+            self.scene = Scene(FLOOR, object, {}, hook.tolist())
         else:
-            thing = Object(*shape, [0.0, 0.0, 0.0])
-            place = middle - thing.grip
+            object = SceneObject(*shape, [0.0, 0.0, 0.0])
+            place = middle - object.grip
             if placement.shape == "cylinder" and not placement.sideways:
-                place[2] = centres[-1][2] + thing.half_height - CLEARANCE
-            thing.position = place.tolist()
-            top = place - [0, 0, thing.half_height]
-            self.scene = Scene(FLOOR, thing, {"table": SupportSurface(top.tolist(), TABLES[placement.shape])})
+                place[2] = centres[-1][2] + object.half_height - CLEARANCE
+            object.position = place.tolist()
+            top = place - [0, 0, object.half_height]
+            self.scene = Scene(FLOOR, object, {"table": SupportSurface(top.tolist(), TABLES[placement.shape])})
         self.robot = StandInRobot(arm, self.scene, settings, self.aside, seed, LOOSENED, substeps)
         self.pictures: list[tuple[str, np.ndarray, Truth]] = []
 
@@ -144,7 +144,7 @@ class GraspTrial:
         """m by which the object has moved against the units that held it at that picture: the arm may swing."""
         now = self.robot.links()[0], self.robot.truth()
         then = next((centres, truth) for name, centres, truth in self.pictures if name == since)
-        holding = np.linalg.norm(then[1].arm_thing, axis=1) > 0
+        holding = np.linalg.norm(then[1].arm_object, axis=1) > 0
         if not holding.any():
             return float("inf")
         before, after = (truth.grip - centres[holding].mean(axis=0) for centres, truth in (then, now))
@@ -153,7 +153,7 @@ class GraspTrial:
     def run(self) -> GraspOutcome:
         loose, drawn = LOOSENED, np.array([PULL, -LOOSE, -LOOSE])
         begun = time.process_time()
-        first = self.robot.truth().thing
+        first = self.robot.truth().object
         self.picture("start")
         self.go(1.0, self.aside, self.grasp, (loose, loose))
         self.go(SETTLE, self.grasp, self.grasp, (loose, loose))
@@ -168,8 +168,8 @@ class GraspTrial:
         self.go(2.0, self.lift, self.lift, (drawn, drawn))
         self.picture("held")
         last = self.robot.truth()
-        loads = np.linalg.norm(last.arm_thing, axis=1)
-        lifted, slipped = float(last.thing[2] - first[2]), self.moved("lifted")
+        loads = np.linalg.norm(last.arm_object, axis=1)
+        lifted, slipped = float(last.object[2] - first[2]), self.moved("lifted")
         return GraspOutcome(
             success=holds(lifted, slipped, last.hanging), lifted=lifted, slipped=slipped,
             creep=self.moved("calm"), units=int((loads > 0).sum()), force=float(loads.sum()),
@@ -178,7 +178,7 @@ class GraspTrial:
 
 
 def holds(lifted: float, slipped: float, hanging: bool) -> bool:
-    """Whether a thing is held that is so much higher than at first, m, has moved so far in the arm, m, and hangs or
+    """Whether an object is held that is so much higher than at first, m, has moved so far in the arm, m, and hangs or
     not."""
     return lifted > LIFT / 2 and slipped < SLIP and not hanging
 

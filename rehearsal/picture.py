@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
+from rehearsal.robot.rigid_object import RigidObject, rotation
 from rehearsal.robot.shapes import BOX
-from rehearsal.robot.thing import RigidObject, rotation
 
 CORNERS = np.array([(-1, -1), (-1, 1), (1, -1), (1, 1)])
 
@@ -17,7 +17,7 @@ def draw(trial, file: Path) -> None:
     pictures, scene = trial.pictures, trial.scene
     figure = Figure(figsize=(3.2 * len(pictures), 9))
     axes = figure.subplots(3, len(pictures), squeeze=False)
-    lines = outline(trial.robot.thing)
+    lines = outline(trial.robot.object)
     middle = pictures[0][2].grip
     for column, (name, centres, truth) in enumerate(pictures):
         turn = np.array(rotation(truth.quaternion))
@@ -26,7 +26,7 @@ def draw(trial, file: Path) -> None:
             for centre, width in zip(centres, trial.robot.arm.chain.widths, strict=True):
                 plot.add_patch(_circle(centre[[a, b]], width / 2))
             for line in lines:
-                points = line @ turn.T + truth.thing
+                points = line @ turn.T + truth.object
                 plot.plot(points[:, a], points[:, b], "k", lw=0.8)
             for surface in scene.surfaces.values():
                 top, size = np.array(surface.top), np.array(surface.size)
@@ -44,12 +44,13 @@ def draw(trial, file: Path) -> None:
     figure.savefig(file, dpi=70)
 
 
-def outline(thing: RigidObject) -> list[np.ndarray]:
-    """Lines in the thing's frame that show its shapes, m: two ends of each, and what joins them. Shapes (n, 3)."""
+def outline(object: RigidObject) -> list[np.ndarray]:
+    """Lines in the object's frame that show its shapes, m: two ends of each, and what joins them. Shapes (n, 3)."""
     angle = np.linspace(0, 2 * np.pi, 25)
     circle, square = np.column_stack([np.cos(angle), np.sin(angle)]), CORNERS[[0, 1, 3, 2, 0]]
     lines = []
-    for kind, half, edge, shift, turn in zip(thing.kind, thing.half, thing.edge, thing.shift, thing.turn, strict=True):
+    shapes = zip(object.kind, object.half, object.edge, object.shift, object.turn, strict=True)
+    for kind, half, edge, shift, turn in shapes:
         ends = square if kind == BOX and half.any() else circle
         first, last = (np.column_stack([ends, np.full(len(ends), z)]) * (half + edge) for z in (-1, 1))
         quarter = (len(ends) - 1) // 4

@@ -17,7 +17,7 @@ from trunkline.ar.preview.package import Package
 from trunkline.ar.session.controller import SessionController
 from trunkline.ar.session.messages import PredictionMessage
 from trunkline.ar.session.previewer import InlinePreviewer, PreviewPlanner
-from trunkline.ar.session.robot import DEAD_MAN, RobotState
+from trunkline.ar.session.robot_process import DEAD_MAN, RobotState
 from trunkline.ar.teleop.config import TeleoperationConfig
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.executor import SimulatedRobot
@@ -40,13 +40,13 @@ Place = Callable[[float], np.ndarray]  # true position (3,), m, of the object in
 class View:
     """What the operator sees at a frame, in the frame that the client takes for the Panda's base.
 
-    thing, tip (3,): m, of the object and of the robot's tip. previewed: m, where the shown plan's tip comes to rest.
+    object, tip (3,): m, of the object and of the robot's tip. previewed: m, where the shown plan's tip comes to rest.
     world: as the client believes it. probability: that the shown plan's grasp holds. offer: the assistant's.
     """
 
     now: float
     intent: Intent
-    thing: np.ndarray
+    object: np.ndarray
     tip: np.ndarray
     previewed: np.ndarray | None
     world: World
@@ -87,10 +87,10 @@ class RehearsedRobot:
         if not self.moved:
             mount, flange = (part[0] for part in mount_pose(readings.joints[None], self._mount_offset))
             self._hangs.append((readings.tip - mount) @ flange * [1, -1, -1])  # y and z are opposite to the flange's
-        thing = np.append(readings.thing, readings.thing_quaternion)
+        object = np.append(readings.object, readings.object_quaternion)
         tip, lengths = np.append(readings.tip, readings.tip_quaternion)[None], self._straight - readings.wound
         here = self.axes.joints, self.axes.commands
-        return RobotState(self.robot.time, 0.0, *here, thing, tip, readings.joints, lengths, self.hangs)
+        return RobotState(self.robot.time, 0.0, *here, object, tip, readings.joints, lengths, self.hangs)
 
     def advance(self) -> None:
         """Let a frame pass."""
@@ -129,7 +129,7 @@ class Session:
         self.package, self.config, self.robot, self.hands, self.place = package, config, robot, hands, place
         self.planner = PreviewPlanner(package.planner(config), foresight, ())
         self.previewer = InlinePreviewer(
-            self.planner.answers, lambda order: judged and bool(order.request.targets.thing)
+            self.planner.answers, lambda order: judged and bool(order.request.targets.object)
         )
         self.executor = RehearsedRobot(robot, package, self.planner.planner.limits, config.mount_offset)
         core = Teleoperation(config.core, package.reach, package.digest, config.mount_offset)
@@ -194,7 +194,7 @@ class Session:
 
     def _end(self, plan: Plan | None, intent: Intent) -> np.ndarray | None:
         """Where the twin's tip comes to rest at the end of a plan that grasps nothing, m (3,)."""
-        if plan is None or intent.request is None or intent.request.targets.thing:
+        if plan is None or intent.request is None or intent.request.targets.object:
             return None
         x, y, z = (float(value) for value in mount_pose(plan.joints[-1:], self.config.mount_offset)[0][0])
         return self.package.tip((x, y, z), intent.request.targets, plan.commands[-1])

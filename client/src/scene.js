@@ -10,10 +10,10 @@ import { mergedGeoms } from "./geoms.js";
 import { STRIDE } from "./wire.js";
 
 const ONE = new Vector3(1, 1, 1);
-const WIDEST = 4; // m, of a solid that is drawn as one; the floor's box is wider
-const OBJECT = "object"; // the body of the thing, where the model has one
+const WIDEST = 4; // m, of an obstacle that is drawn; the floor is wider
+const OBJECT = "object"; // the body of the object, where the model has one
 const FADED = 0.35; // of a live robot that is not heard of
-const WOOD = [0.55, 0.47, 0.38, 1], THING = [0.35, 0.7, 0.9, 1];
+const WOOD = [0.55, 0.47, 0.38, 1], GRASPABLE = [0.35, 0.7, 0.9, 1];
 
 export class RobotScene {
   constructor() {
@@ -123,23 +123,23 @@ export class RobotScene {
     if (this.tipReach) this.tipReach.visible = shown && Boolean(this.tipReach.filled);
   }
 
-  /** Solids and things as they are believed, but for those that the model has. */
+  /** Obstacles and objects as they are believed, but for those that the model has. */
   world(world) {
     this.known = world;
     this.believed?.removeFromParent();
-    const things = this.bodies?.includes(OBJECT) ? [] : world.things;
-    const wide = (box) => box.high[0] - box.low[0] > WIDEST;
-    this.floor.position.z = Math.min(0, ...world.boxes.map((box) => (wide(box) ? box.high[2] : box.low[2])));
-    const boxes = this.still ? [] : world.boxes.filter((box) => !wide(box));
-    const geoms = boxes.map(({ low, high }) => ({
+    const objects = this.bodies?.includes(OBJECT) ? [] : world.things;
+    const wide = ({ low, high }) => high[0] - low[0] > WIDEST;
+    this.floor.position.z = Math.min(0, ...world.boxes.map((obstacle) => (wide(obstacle) ? obstacle.high[2] : obstacle.low[2])));
+    const obstacles = this.still ? [] : world.boxes.filter((obstacle) => !wide(obstacle));
+    const geoms = obstacles.map(({ low, high }) => ({
       body: -1, shape: "box", quaternion: [1, 0, 0, 0], rgba: WOOD,
       position: low.map((x, axis) => (x + high[axis]) / 2), size: low.map((x, axis) => (high[axis] - x) / 2),
     }));
-    for (const { shape, diameter, height, position, quaternion } of things) {
+    for (const { shape, diameter, height, position, quaternion } of objects) {
       const [radius, half] = [diameter / 2, height / 2];
       const size = shape === "sphere" ? [radius] : shape === "cylinder" ? [radius, half] : [radius, radius, half];
       const known = shape === "sphere" || shape === "cylinder" ? shape : "box";
-      geoms.push({ body: -1, shape: known, size, position, quaternion, rgba: THING });
+      geoms.push({ body: -1, shape: known, size, position, quaternion, rgba: GRASPABLE });
     }
     const merged = mergedGeoms(geoms, []);
     this.believed = merged && new Mesh(merged, new MeshLambertMaterial({ vertexColors: true }));

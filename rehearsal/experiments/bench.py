@@ -14,7 +14,7 @@ from rehearsal import settings
 from rehearsal.experiments.result import Result
 from rehearsal.operator.hands import Person, RayHand
 from rehearsal.operator.scripts import Ending, Operator, Script, offset_of
-from rehearsal.robot.scene import Object, Scene
+from rehearsal.robot.scene import Scene, SceneObject
 from rehearsal.robot.stand_in import StandIn, StandInRobot, Truth
 from rehearsal.session import REFERENCE, Place, Session, View
 from rehearsal.settings import Free
@@ -24,7 +24,7 @@ from trunkline.ar.preview.package import Package, read_package
 from trunkline.ar.preview.preview_twin import RobotModel, robot_model_of
 from trunkline.ar.preview.settings import Previewing
 from trunkline.ar.teleop.config import TeleoperationConfig
-from trunkline.ar.teleop.messages import Box, World
+from trunkline.ar.teleop.messages import Obstacle, World
 from trunkline.ar.teleop.rigid_ik import RigidIK
 from trunkline.ar.teleop.vectors import DOWN
 from trunkline.errors import InputError
@@ -33,7 +33,7 @@ from trunkline.pipeline.config import PROJECT, load_config, load_folder
 ORIGINS = np.array([[-0.2, -0.1, -0.3], [0.2, -0.1, -0.3]])  # m, of the left and right hand in the reference frame
 START = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])  # rad, where the search for the ready pose begins
 FLOOR = -0.75  # m; the robot stands on a stand
-FLOOR_BOX = Box("the floor", (-3.0, -3.0, -2.0), (3.0, 3.0, FLOOR))
+FLOOR_OBSTACLE = Obstacle("the floor", (-3.0, -3.0, -2.0), (3.0, 3.0, FLOOR))
 LONGEST = 300.0  # s of a run
 
 
@@ -72,17 +72,17 @@ class Bench:
         assert self.world_model is not None
         return GraspPreviewer(self.world_model, self.package.grips(self.config), self.previewing)
 
-    def session(self, operator: Operator, thing: np.ndarray | None, seed: int, place: Place) -> Session:
-        """The stand-in at its ready pose; a sphere hangs at `thing` (3,), m, or there is none."""
+    def session(self, operator: Operator, object_center: np.ndarray | None, seed: int, place: Place) -> Session:
+        """The stand-in at its ready pose; a sphere hangs at `object_center` (3,), m, or there is none."""
         s = self.settings
         x, y, z = s.mount_ready
         ready = RigidIK(self.config.mount_offset).solve(START, (x, y, z), DOWN, 0.0)
         far = [5.0, 5.0, 5.0]
-        where = far if thing is None else thing.tolist()
-        hook = None if thing is None else [where[0], where[1], where[2] + s.diameter / 2 + s.string]
-        hung = Object("sphere", s.diameter, s.diameter, s.mass, where, hanging=thing is not None)
+        where = far if object_center is None else object_center.tolist()
+        hook = None if object_center is None else [where[0], where[1], where[2] + s.diameter / 2 + s.string]
+        hung = SceneObject("sphere", s.diameter, s.diameter, s.mass, where, hanging=object_center is not None)
         robot = StandInRobot(self.arm, Scene(FLOOR, hung, {}, hook), self.stand_in, ready, seed)
-        world = World("floor", (FLOOR_BOX,))
+        world = World("floor", (FLOOR_OBSTACLE,))
         hands = operator.left, operator.right
         return Session(self.package, self.config, robot, hands, world, place, self.foresight, self.judged)
 
@@ -113,7 +113,7 @@ class SessionFrame:
     now: float
     mode: str
     truth: Truth
-    thing: np.ndarray
+    object: np.ndarray
     joints: np.ndarray
     commands: np.ndarray
     units: np.ndarray
@@ -129,20 +129,20 @@ def executed(frames: list[SessionFrame]) -> SessionFrame | None:
 class Staged:
     """An experiment that is ready to be run: where, and what the operator does there. judge: fills in a result of how
     the script ended, the frames from where the robot began to move, and all views, and says why it failed, "" if it did
-    not. thing: what is grasped, in words. watch: fills in what it takes to look on after the script, while the robot
-    holds."""
+    not. object_name: what is grasped, in words. watch: fills in what it takes to look on after the script, while
+    the robot holds."""
 
     name: str
     seed: int
     session: Session
     script: Script
     judge: Callable[[Result, Ending, list[SessionFrame], list[View]], str]
-    thing: str = ""
+    object_name: str = ""
     watch: Callable[[Result, Ending, list[SessionFrame]], None] | None = None
 
     def judged(self, ending: object, frames: list[SessionFrame], views: list[View], seconds: float) -> Result:
         """What a run of `seconds` came to, whose script ended so."""
-        result = Result(self.name, self.seed, False, seconds=seconds, object=self.thing)
+        result = Result(self.name, self.seed, False, seconds=seconds, object=self.object_name)
         if isinstance(ending, Ending):
             result.cause = self.judge(result, ending, frames, views)
         else:
@@ -169,8 +169,8 @@ def rehearse(session: Session, script: Script) -> tuple[object, list[SessionFram
         views.append(view)
         if session.moved:
             truth, sent = session.robot.truth(), session.executor.axes
-            thing, (units, _) = session.place(session.now), session.robot.links()
-            frames.append(SessionFrame(session.now, view.intent.mode, truth, thing, sent.joints, sent.commands, units))
+            object, (units, _) = session.place(session.now), session.robot.links()
+            frames.append(SessionFrame(session.now, view.intent.mode, truth, object, sent.joints, sent.commands, units))
         try:
             script.send(view)
         except StopIteration as end:

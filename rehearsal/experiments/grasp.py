@@ -10,15 +10,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rehearsal import settings
-from rehearsal.experiments.bench import FLOOR, FLOOR_BOX, START, Bench, SessionFrame, Staged, executed
+from rehearsal.experiments.bench import FLOOR, FLOOR_OBSTACLE, START, Bench, SessionFrame, Staged, executed
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending, Operator
-from rehearsal.robot.scene import Object, Scene, SupportSurface
+from rehearsal.robot.scene import Scene, SceneObject, SupportSurface
 from rehearsal.robot.stand_in import StandInRobot
 from rehearsal.session import Session
 from trunkline.ar.hybrid.grasps import object_in_base
 from trunkline.ar.preview.world_model import make_world
-from trunkline.ar.teleop.messages import Box, Thing
+from trunkline.ar.teleop.messages import Obstacle, WorldObject
 from trunkline.ar.teleop.rigid_ik import RigidIK
 from trunkline.ar.teleop.vectors import DOWN
 from trunkline.errors import InputError
@@ -32,18 +32,18 @@ class Offered:
     """An object that hangs or stands, what it `stands` on, and the horizontal direction from the arm to it that suits
     it, (3,)."""
 
-    thing: Object
+    object: SceneObject
     towards: np.ndarray
     stands: SupportSurface | None
 
     @property
     def name(self) -> str:
-        return f"{'standing' if self.stands else 'hanging'} {self.thing.shape}"
+        return f"{'standing' if self.stands else 'hanging'} {self.object.shape}"
 
     @property
     def way(self) -> str:
         """By which it is grasped: `trunkline.ar.teleop.object_shapes.way_of_grasping`."""
-        return "basket" if self.thing.shape == "basket" else "hanging"
+        return "basket" if self.object.shape == "basket" else "hanging"
 
 
 def offered(
@@ -69,18 +69,18 @@ def offered(
     level = Rotation.from_euler("x", 0.0 if stands else np.pi / 2)  # a cylinder's axis, as a basket's bar already is
     turn = wxyz_from_rotation(Rotation.from_euler("z", yaw) * level).tolist()  # across `towards`
     mass = float(rng.uniform(of.light, heaviest))
-    thing = Object(shape, diameter, of.height, mass, place.tolist(), turn, hanging=not stands)
+    object = SceneObject(shape, diameter, of.height, mass, place.tolist(), turn, hanging=not stands)
     if not stands:
-        return Offered(thing, towards, None)
-    thing.position = (place - thing.grip).tolist()
-    top = [*thing.position[:2], thing.position[2] - thing.half_height]
-    return Offered(thing, towards, SupportSurface(top, list(s.stand)))
+        return Offered(object, towards, None)
+    object.position = (place - object.grip).tolist()
+    top = [*object.position[:2], object.position[2] - object.half_height]
+    return Offered(object, towards, SupportSurface(top, list(s.stand)))
 
 
 def session_of(
     bench: Bench,
     s: settings.Grasped,
-    object: Offered,
+    placed: Offered,
     operator: Operator,
     seed: int,
     table: SupportSurface | None = None,
@@ -88,52 +88,52 @@ def session_of(
     """The stand-in at its ready pose, the object on its string or its stand, the client's world as it is seen at
     first."""
     x, y, z = bench.settings.mount_ready
-    ready, thing = RigidIK(bench.config.mount_offset).solve(START, (x, y, z), DOWN, 0.0), object.thing
-    hook = [thing.position[0], thing.position[1], thing.position[2] + thing.diameter / 2 + s.string]
-    surfaces = {name: board for name, board in ((TABLE, table), (STAND, object.stands)) if board is not None}
-    scene = Scene(FLOOR, thing, surfaces, None if object.stands else hook)
+    ready, object = RigidIK(bench.config.mount_offset).solve(START, (x, y, z), DOWN, 0.0), placed.object
+    hook = [object.position[0], object.position[1], object.position[2] + object.diameter / 2 + s.string]
+    surfaces = {name: board for name, board in ((TABLE, table), (STAND, placed.stands)) if board is not None}
+    scene = Scene(FLOOR, object, surfaces, None if placed.stands else hook)
     robot = StandInRobot(bench.arm, scene, bench.stand_in, ready, seed)
-    boxes = (FLOOR_BOX, *(box_of(name, board) for name, board in surfaces.items()))
+    obstacles = (FLOOR_OBSTACLE, *(obstacle_of(name, board) for name, board in surfaces.items()))
     readings = robot.readings()
-    a, b, c = (float(value) for value in readings.thing)
-    d, e, f, g = (float(value) for value in readings.thing_quaternion)
-    object_seen = Thing(
-        NAME, thing.shape, thing.diameter, thing.height, thing.mass, (a, b, c), (d, e, f, g),
-        "standing" if object.stands else "hanging", thing.basket,
+    a, b, c = (float(value) for value in readings.object)
+    d, e, f, g = (float(value) for value in readings.object_quaternion)
+    object_seen = WorldObject(
+        NAME, object.shape, object.diameter, object.height, object.mass, (a, b, c), (d, e, f, g),
+        "standing" if placed.stands else "hanging", object.basket,
     )  # fmt: skip
     return Session(
-        bench.package, bench.config, robot, (operator.left, operator.right), make_world(boxes, (object_seen,)),
+        bench.package, bench.config, robot, (operator.left, operator.right), make_world(obstacles, (object_seen,)),
         lambda now: robot.truth().grip, bench.foresight, bench.judged,
     )  # fmt: skip
 
 
-def box_of(name: str, board: SupportSurface) -> Box:
+def obstacle_of(name: str, board: SupportSurface) -> Obstacle:
     """As the client is told of it."""
     half, top = np.array(board.size) / 2, np.array(board.top)
     (a, b, c), (d, e, f) = ((float(v) for v in corner) for corner in (top - half * [1, 1, 2], top + half * [1, 1, 0]))
-    return Box(name, (a, b, c), (d, e, f))
+    return Obstacle(name, (a, b, c), (d, e, f))
 
 
-def beside(bench: Bench, object: Offered) -> np.ndarray:
+def beside(bench: Bench, placed: Offered) -> np.ndarray:
     """Where the operator means the mount to be, less what is gripped, (3,), m: the grasp frame."""
-    frame = bench.config.basket.grasp if object.way == "basket" else bench.config.hanging.grasp
-    centre = object_in_base(bench.package.geometry, object.thing.diameter, frame, "dorsal")
-    return -centre[0] * object.towards - [0.0, 0.0, centre[2]]
+    frame = bench.config.basket.grasp if placed.way == "basket" else bench.config.hanging.grasp
+    centre = object_in_base(bench.package.geometry, placed.object.diameter, frame, "dorsal")
+    return -centre[0] * placed.towards - [0.0, 0.0, centre[2]]
 
 
 def grasp(bench: Bench, seed: int) -> Staged:
     rng, s = np.random.default_rng([seed, 2]), settings.grasped()
-    object = offered(bench, s, rng)
+    placed = offered(bench, s, rng)
     operator = bench.operator(rng)
-    session = session_of(bench, s, object, operator, seed)
+    session = session_of(bench, s, placed, operator, seed)
 
     def judge(result: Result, ending: Ending, frames: list[SessionFrame], _) -> str:
         cause = failure(ending, frames, s)
         tell(result, ending, session, not cause)
         return cause
 
-    script = operator.grasp(beside(bench, object), s.accept, s.hold)
-    return Staged("grasp", seed, session, script, judge, object.name)
+    script = operator.grasp(beside(bench, placed), s.accept, s.hold)
+    return Staged("grasp", seed, session, script, judge, placed.name)
 
 
 def tell(result: Result, ending: Ending, session: Session, succeeded: bool) -> None:
@@ -180,12 +180,12 @@ def failure(ending: Ending, frames: list[SessionFrame], s: settings.Grasped) -> 
     done = executed(frames)
     if done is None:
         return "stopped: no plan was run to its end"
-    lifted = done.thing[2] - frames[0].thing[2]
+    lifted = done.object[2] - frames[0].object[2]
     if done.truth.hanging or not lifted >= s.lifted:
-        if not any(frame.truth.arm_thing.any() for frame in frames):
+        if not any(frame.truth.arm_object.any() for frame in frames):
             return "aim: the arm never touched it"
         return f"slip: it was lifted by {1e3 * lifted:.0f} mm" + (", and hangs" if done.truth.hanging else "")
-    if any(frame.truth.thing_world.any() for frame in frames if frame.now >= done.now):
+    if any(frame.truth.object_world.any() for frame in frames if frame.now >= done.now):
         return "slip: it touched more than the arm as it was held"
     moved = in_arm(done, frames[-1])
     return "" if moved < s.slip else f"slip: it moved by {1e3 * moved:.0f} mm in the arm as it was held"
@@ -193,8 +193,8 @@ def failure(ending: Ending, frames: list[SessionFrame], s: settings.Grasped) -> 
 
 def in_arm(before: SessionFrame, after: SessionFrame) -> float:
     """m by which the object has moved against the units that held it before; infinite where none did."""
-    holding = np.linalg.norm(before.truth.arm_thing, axis=1) > 0
+    holding = np.linalg.norm(before.truth.arm_object, axis=1) > 0
     if not holding.any():
         return float("inf")
-    then, now = (frame.thing - frame.units[holding].mean(axis=0) for frame in (before, after))
+    then, now = (frame.object - frame.units[holding].mean(axis=0) for frame in (before, after))
     return float(np.linalg.norm(now - then))

@@ -25,22 +25,22 @@ def table_for(s: settings.Grasped, place: list[float], rng: np.random.Generator)
 
 def handle(bench: Bench, seed: int) -> Staged:
     rng, s = np.random.default_rng([seed, 3]), settings.grasped()
-    object = offered(bench, s, rng, STANDING)
-    table = table_for(s, object.thing.position, rng)
+    placed = offered(bench, s, rng, STANDING)
+    table = table_for(s, placed.object.position, rng)
     operator = bench.operator(rng)
-    session = session_of(bench, s, object, operator, seed, table)
+    session = session_of(bench, s, placed, operator, seed, table)
 
     def spot(view: View) -> np.ndarray:
-        """Where the grip is when the lowest point of the thing, as it hangs in the arm, is above the table."""
-        return session.in_client_frame(np.array(table.top)) + [0.0, 0.0, below_grip(view.world.thing(NAME)) + s.drop]
+        """Where the grip is when the lowest point of the object, as it hangs in the arm, is above the table."""
+        return session.in_client_frame(np.array(table.top)) + [0.0, 0.0, below_grip(view.world.object(NAME)) + s.drop]
 
     def judge(result: Result, ending: Ending, frames: list[SessionFrame], _) -> str:
         cause = why_not(ending, frames, session.robot.scene, s)
         tell(result, ending, session, not cause)
         return cause
 
-    script = operator.handle(beside(bench, object), spot, s.accept, s.calm)
-    return Staged("handle", seed, session, script, judge, object.name)
+    script = operator.handle(beside(bench, placed), spot, s.accept, s.calm)
+    return Staged("handle", seed, session, script, judge, placed.name)
 
 
 def why_not(ending: Ending, frames: list[SessionFrame], scene: Scene, s: settings.Grasped) -> str:
@@ -56,13 +56,13 @@ def why_not(ending: Ending, frames: list[SessionFrame], scene: Scene, s: setting
     if grasped is None or not ending.done:
         return failure(ending, frames, s)
     last, table = frames[-1], scene.surfaces[TABLE]
-    borne = last.truth.thing_world[scene.names().index(TABLE), 2] > BORNE * scene.object.mass * STANDARD_GRAVITY
+    borne = last.truth.object_world[scene.names().index(TABLE), 2] > BORNE * scene.object.mass * STANDARD_GRAVITY
     if borne and np.linalg.norm(last.truth.speed) < STILL:
-        return "" if not np.linalg.norm(last.truth.arm_thing) else "stopped: the arm still touches it"
+        return "" if not np.linalg.norm(last.truth.arm_object) else "stopped: the arm still touches it"
     second = [frame for frame in frames if frame.mode == "execute" and frame.now > grasped.now]
     if not second:
         return "slip: it was dropped before it was brought anywhere"
     half = np.array(table.size[:2]) / 2
-    if not any((np.abs(frame.thing[:2] - table.top[:2]) <= half).all() for frame in second):
+    if not any((np.abs(frame.object[:2] - table.top[:2]) <= half).all() for frame in second):
         return "slip: it was dropped on its way"
     return "missed: it did not stay on the table"

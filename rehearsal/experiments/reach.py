@@ -15,15 +15,15 @@ from trunkline.ar.session.messages import PredictionMessage
 
 def reach(bench: Bench, seed: int) -> Staged:
     rng = np.random.default_rng([seed, 0])
-    thing, operator = bench.place(rng), bench.operator(rng)
-    session = bench.session(operator, thing, seed, lambda now: thing)
+    object, operator = bench.place(rng), bench.operator(rng)
+    session = bench.session(operator, object, seed, lambda now: object)
     least, radius = bench.arm.chain.units - bench.settings.tip_units, bench.settings.diameter / 2
 
     def judge(result: Result, ending: Ending, frames: list[SessionFrame], _) -> str:
         result.plans = ending.plans
         result.aimed_mm, result.previewed_mm = 1e3 * ending.aimed, 1e3 * ending.previewed
         if frames:
-            result.nearest_mm = 1e3 * min(float(np.linalg.norm(frame.truth.tip - thing)) for frame in frames)
+            result.nearest_mm = 1e3 * min(float(np.linalg.norm(frame.truth.tip - object)) for frame in frames)
         return failure(ending, frames, least, radius)
 
     def watch(result: Result, ending: Ending, frames: list[SessionFrame]) -> None:
@@ -55,12 +55,12 @@ def failure(ending: Ending, frames: list[SessionFrame], least: int, radius: floa
         return why if why.startswith(("aim", "out of reach", "stopped")) else f"plan refused: {why}"
     first = next((frame for frame in frames if _touches(frame)), None)
     if first is not None:
-        thing, world = first.truth.arm_thing, first.truth.arm_world
-        if not (np.isfinite(thing).all() and np.isfinite(world).all()):
+        object, world = first.truth.arm_object, first.truth.arm_world
+        if not (np.isfinite(object).all() and np.isfinite(world).all()):
             return "error: the force of a contact is no number"
         if world.any():
             return "collision: the arm touched the world"
-        units = np.flatnonzero(thing.any(axis=1))
+        units = np.flatnonzero(object.any(axis=1))
         if units[0] < least:
             return f"collision: unit {units[0] + 1} touched it first"
     if not ending.done:
@@ -73,7 +73,7 @@ def failure(ending: Ending, frames: list[SessionFrame], least: int, radius: floa
 
 
 def _touches(frame: SessionFrame) -> bool:
-    return bool(frame.truth.arm_thing.any() or frame.truth.arm_world.any())
+    return bool(frame.truth.arm_object.any() or frame.truth.arm_world.any())
 
 
 def tell_end(result: Result, foreseen: PredictionMessage, tips: dict[str, np.ndarray]) -> None:

@@ -22,7 +22,7 @@ ASIDE = np.array([0.0, 0.0, 0.06])  # m by which the rigid ray is moved to drop 
 AGAIN = 0.5  # s after which the operator tries to follow again
 LIFTED = 0.05  # m from which on the operator sees that something is lifted
 GLANCE = 0.1  # s over which a velocity is seen
-HAND_OVERS = 2  # previews of a hand-over: how a thing lies in the arm does not change from one to the next
+HAND_OVERS = 2  # previews of a hand-over: how an object lies in the arm does not change from one to the next
 CALM = 2.0  # s after an arrival that the operator looks on
 LONGEST = 30.0  # s that the operator waits for anything
 
@@ -103,8 +103,8 @@ class Operator:
             targets, previewed = view.intent.targets, view.previewed
             if targets is None or previewed is None:
                 continue
-            off = self._look(previewed - view.thing)
-            ending = Ending(True, "", plans, _away(targets.tip.position, view.thing), _away(previewed, view.thing))
+            off = self._look(previewed - view.object)
+            ending = Ending(True, "", plans, _away(targets.tip.position, view.object), _away(previewed, view.object))
             if not self.judged or on_object(off, self.radius):
                 view = yield from self._click(self.right, "trigger", view)
                 view = yield from self._until(lambda view: view.intent.mode == "execute")
@@ -126,7 +126,7 @@ class Operator:
         """
         view = yield from self._until(lambda view: view.intent.mode == "aim")
         view = yield from self._place_tip(view, np.zeros(3))
-        view, why = yield from self._place_at(view, lambda view: view.thing + beside)
+        view, why = yield from self._place_at(view, lambda view: view.object + beside)
         ending = Ending(False, why)
         while not ending.why and ending.plans < self.person.patience:
             ending.plans += 1
@@ -144,23 +144,23 @@ class Operator:
                 ending.why = "aim: no preview was sure enough to hold"
                 view = yield from self._drop(view)
             if ending.plans < self.person.patience:
-                view, ending.why = yield from self._place_at(view, lambda view: view.thing + beside)
+                view, ending.why = yield from self._place_at(view, lambda view: view.object + beside)
         return ending
 
     def handle(self, beside: np.ndarray, spot: Callable[[View], np.ndarray], accept: float, watch: float) -> Script:
-        """Grasp, aim so that what is gripped will be at `spot`, as it appears with the thing as it then is in the arm,
+        """Grasp, aim so that what is gripped will be at `spot`, as it appears with the object as it then is in the arm,
         (3,), m, confirm what is sure enough to rest there, look on for `watch` s."""
         view = yield from self._until(lambda view: view.intent.mode == "aim")
-        hung = view.thing
+        hung = view.object
         ending = yield from self.grasp(beside, accept, CALM)
         view = yield from self._react()
-        if not ending.done or view.thing[2] - hung[2] < LIFTED:
+        if not ending.done or view.object[2] - hung[2] < LIFTED:
             ending.why = ending.why or "slip: it was not lifted"
             ending.done = False
             return ending
         ending.done, ending.probability = False, np.nan  # what was said of the grasp has come true
         for _ in range(HAND_OVERS):
-            view, ending.why = yield from self._place_thing(view, spot(view))
+            view, ending.why = yield from self._place_object(view, spot(view))
             if ending.why:
                 return ending
             ending.plans += 1
@@ -175,8 +175,8 @@ class Operator:
         ending.why = "aim: no preview was sure enough to rest"
         return ending
 
-    def _place_thing(self, view: View, spot: np.ndarray):
-        """The rigid target to where the thing that is held will be at `spot`; why not, "" if it is there."""
+    def _place_object(self, view: View, spot: np.ndarray):
+        """The rigid target to where the object that is held will be at `spot`; why not, "" if it is there."""
         self.left.press("grip", view.now)
         for _ in range(self.person.patience):
             targets = view.intent.targets
@@ -192,7 +192,7 @@ class Operator:
                 return view, f"out of reach: rigid target {targets.rigid.reach}"
             if np.linalg.norm(self._look(targets.tip.position - spot)) < self.band / 2:
                 return view, ""
-        return view, "aim: the thing's place was never where it was meant"
+        return view, "aim: the object's place was never where it was meant"
 
     def _ask(self, view: View) -> Part:
         """Ask for a plan, and see its preview to the end, or that there is none."""
@@ -259,7 +259,7 @@ class Operator:
             if view.now > pressed + CLICK:
                 self.right.let_go("stick_pressed")
             if view.intent.mode == "follow":
-                near = _away(view.tip, view.thing) < 2 * self.radius
+                near = _away(view.tip, view.object) < 2 * self.radius
                 if begun is None and (near or view.now - followed > LONGEST):
                     begun = view.now
                     begin(begun)
@@ -280,9 +280,9 @@ class Operator:
         """The tip target onto the object, until it looks so."""
         self.right.press("grip", view.now)
         for _ in range(self.person.patience):
-            view = yield from self._aim(self.right, view.thing + beside, 2 * self.radius, view.now)
+            view = yield from self._aim(self.right, view.object + beside, 2 * self.radius, view.now)
             end = view.intent.rays[1]
-            if end is not None and np.linalg.norm(self._look(end - view.thing - beside)) < self.radius / 2:
+            if end is not None and np.linalg.norm(self._look(end - view.object - beside)) < self.radius / 2:
                 break
         self.right.let_go("grip")
         return (yield from self._react())

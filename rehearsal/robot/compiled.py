@@ -15,7 +15,7 @@ import trunkline.model.statics.vectors
 # numba renews a cached kernel when its own file changes, not when a kernel it calls does in another file;
 # so the folder is named after the text of all of them.
 _HERE = Path(__file__).parent
-_OWN = [_HERE / f"{name}.py" for name in ("contact", "flange", "kernel", "shapes", "thing", "touching")]
+_OWN = [_HERE / f"{name}.py" for name in ("contact", "flange", "kernel", "rigid_object", "shapes", "touching")]
 _CALLED = [Path(inspect.getfile(module)) for module in (demo.plants.stranger_kernel, trunkline.model.statics.vectors)]
 _STAMP = hashlib.sha256(b"".join(file.read_bytes() for file in (*_OWN, *_CALLED))).hexdigest()[:12]
 

@@ -15,12 +15,12 @@ import numpy as np
 from demo.plants.stranger_kernel import accelerate, bend, place, pull, remember, wind, work_for
 from rehearsal.robot.compiled import kernel
 from rehearsal.robot.flange import accelerate_joints, carry, move_joints
-from rehearsal.robot.thing import move_thing, pull_string, rotation, spin_of, transposed
+from rehearsal.robot.rigid_object import move_object, pull_string, rotation, spin_of, transposed
 from rehearsal.robot.touching import touch_all
 from trunkline.model.statics.vectors import cross, plus, turned
 
 # columns of a row of what a tick ends with
-JOINTS, WOUND, TIP, TIP_AXES, THING = slice(0, 7), slice(7, 10), slice(10, 13), slice(13, 22), slice(22, 29)
+JOINTS, WOUND, TIP, TIP_AXES, OBJECT = slice(0, 7), slice(7, 10), slice(10, 13), slice(13, 22), slice(22, 29)
 COLUMNS = 29
 
 
@@ -47,7 +47,7 @@ def set_moving(work, state, turn, spin, speed, spinning, speeding):
 
 
 @kernel
-def step(h, links, state, work, straight, hand, wound, gravity, servos, mount, joints, target, discs, world, thing,
+def step(h, links, state, work, straight, hand, wound, gravity, servos, mount, joints, target, discs, world, object,
          motion, contacts):  # fmt: skip
     """One step of h s. wound (K,): m, commands of the motors. target (7,): rad, commands of the Panda."""
     accelerate_joints(servos, joints, target, h)
@@ -57,13 +57,13 @@ def step(h, links, state, work, straight, hand, wound, gravity, servos, mount, j
     bend(links, state, work, h, 1.0, False)
     pull(links, state, work, h, hand, straight)
     set_moving(work, state, turn, spin, speed, spinning, speeding)
-    force, torque = touch_all(h, discs, world, thing, motion, contacts, work, turn, origin)
+    force, torque = touch_all(h, discs, world, object, motion, contacts, work, turn, origin)
     pose = rotation(motion.quaternion)
-    hung, twisted = pull_string(thing, motion, pose, spin_of(thing, motion, pose))
+    hung, twisted = pull_string(object, motion, pose, spin_of(object, motion, pose))
     down = turned(transposed(turn), (gravity[0], gravity[1], gravity[2]))
     accelerate(links, state, work, h, down, 0.0)
     remember(links, state, h, False)
-    move_thing(thing, motion, plus(force, 1.0, hung), plus(torque, 1.0, twisted), gravity, h)
+    move_object(object, motion, plus(force, 1.0, hung), plus(torque, 1.0, twisted), gravity, h)
     move_joints(joints, h)
 
 
@@ -90,7 +90,7 @@ def look(links, state, work, mount, joints, motion, row):
 
 @kernel
 def run(ticks, substeps, tick, links, state, straight, wound, gravity, servos, mount, joints, target, discs, world,
-        thing, motion, contacts, rows):  # fmt: skip
+        object, motion, contacts, rows):  # fmt: skip
     """`ticks` ticks of `tick` s, each of `substeps` steps.
 
     Args:
@@ -103,5 +103,5 @@ def run(ticks, substeps, tick, links, state, straight, wound, gravity, servos, m
     for t in range(ticks):
         for _ in range(substeps):
             step(h, links, state, work, straight, hand, wound[t], gravity, servos, mount, joints, target[t], discs,
-                 world, thing, motion, contacts)  # fmt: skip
+                 world, object, motion, contacts)  # fmt: skip
         look(links, state, work, mount, joints, motion, rows[t])

@@ -2,14 +2,15 @@
 
 from dataclasses import dataclass, field
 from itertools import product
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
+from rehearsal.robot.rigid_object import Motion, RigidObject
 from rehearsal.robot.shapes import BOX, CYLINDER, distance
-from rehearsal.robot.thing import Motion, RigidObject
-from trunkline.ar.hybrid.basket import Basket, Part, parts_of, unit_inertia
+from trunkline.ar.hybrid.basket import Part, unit_inertia
+from trunkline.ar.hybrid.objects import ObjectShape
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 
@@ -36,41 +37,13 @@ class SupportSurface:
 
 
 @dataclass
-class Object:
-    """diameter: m; of a box or a toy, a box with round edges, its width along x and y; of a basket, its bar's. height:
-    m, idle for a sphere; of a basket, its box's. mass: kg. position: of its centre of mass, m. quaternion: w first;
-    (1, 0, 0, 0) stands upright. hanging: by a string, from the hook above it; a basket by its bar. basket: a basket's
-    other sizes, idle for other shapes."""
+class SceneObject(ObjectShape):
+    """position: of its centre of mass, m. quaternion: w first; (1, 0, 0, 0) stands upright. hanging: by a string, from
+    the hook above it; a basket by its bar."""
 
-    shape: Literal["cylinder", "box", "sphere", "toy", "basket"]
-    diameter: Annotated[float, Field(ge=0.005, le=0.5)]
-    height: Annotated[float, Field(ge=0.005, le=1)]
-    mass: Annotated[float, Field(gt=0, le=20)]
     position: Place
     quaternion: Quaternion = field(default_factory=lambda: [1.0, 0.0, 0.0, 0.0])
     hanging: bool = False
-    basket: Basket = Basket()
-
-    def __post_init__(self):
-        if self.shape == "basket":
-            self.basket.require_room(self.diameter)
-
-    @property
-    def half_height(self) -> float:
-        """m, from its centre of mass to what it stands on."""
-        if self.shape == "basket":
-            box = self.parts()["box"]
-            return float(box.half[2] - box.place[2])
-        return self.diameter / 2 if self.shape == "sphere" else self.height / 2
-
-    @property
-    def grip(self) -> np.ndarray:
-        """The middle of what the arm wraps, in the object's frame, m. Shape (3,)."""
-        return self.parts()["bar"].place if self.shape == "basket" else np.zeros(3)
-
-    def parts(self) -> dict[str, Part]:
-        """Of a basket, by their names."""
-        return parts_of(self.basket, self.diameter, self.height)
 
 
 @dataclass
@@ -78,7 +51,7 @@ class Scene:
     """floor: its height, m, or null. hook: its end, m, or null."""
 
     floor: Metres | None
-    object: Object
+    object: SceneObject
     surfaces: dict[str, SupportSurface] = field(default_factory=dict)
     hook: Place | None = None
 
@@ -110,7 +83,7 @@ class String:
     lip: Annotated[float, Field(gt=0, le=1)] = 0.01
 
 
-def make_thing(object: Object, hook: list[float] | None, string: String) -> tuple[RigidObject, Motion]:
+def make_rigid_object(object: SceneObject, hook: list[float] | None, string: String) -> tuple[RigidObject, Motion]:
     """The object as a rigid body, and where it is at first.
 
     Raises:
@@ -127,19 +100,19 @@ def make_thing(object: Object, hook: list[float] | None, string: String) -> tupl
         end = np.array(hook, dtype=float)
         length = float(np.linalg.norm(end - tied))
     kind, half, edge, place, turns = (np.array(column) for column in zip(*solids, strict=True))
-    thing = RigidObject(
+    body = RigidObject(
         kind=kind, half=half, edge=edge, shift=place, turn=turns, mass=object.mass,
         inertia=object.mass * _inertia(object), points=points, radius=radius, eye=eye, hook=end, string=length,
         tautness=string.tautness, loss=string.loss, lip=string.lip,
     )  # fmt: skip
-    return thing, Motion(
+    return body, Motion(
         np.array(object.position, dtype=float), wxyz_from_rotation(turn), np.zeros(3), np.zeros(3),
         np.array([float(object.hanging)]),
     )  # fmt: skip
 
 
 class Solid(NamedTuple):
-    """A shape in a thing's frame; see `thing.Thing`."""
+    """A shape in the object's frame; see `RigidObject`."""
 
     kind: int
     half: np.ndarray
@@ -148,7 +121,7 @@ class Solid(NamedTuple):
     turn: np.ndarray = np.eye(3)
 
 
-def _single(object: Object) -> tuple[list[Solid], np.ndarray, float]:
+def _single(object: SceneObject) -> tuple[list[Solid], np.ndarray, float]:
     """The shape of an object that has one, the points by which it lies on the world (P, 3), m, and their radius, m."""
     radius, half_height = object.diameter / 2, object.height / 2
     if object.shape == "sphere":
@@ -184,7 +157,7 @@ def _above(kind: int, half: np.ndarray, edge: float, up: np.ndarray) -> np.ndarr
     return out * up
 
 
-def _inertia(object: Object) -> np.ndarray:
+def _inertia(object: SceneObject) -> np.ndarray:
     """Moments of inertia of 1 kg about its axes, m². Shape (3,). A toy's round edges are left out."""
     width, height = object.diameter, object.height
     if object.shape == "basket":

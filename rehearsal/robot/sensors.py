@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 from scipy.spatial.transform import Rotation
 
-from rehearsal.robot.kernel import JOINTS, THING, TIP, TIP_AXES, WOUND
+from rehearsal.robot.kernel import JOINTS, OBJECT, TIP, TIP_AXES, WOUND
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 
 Delay = Annotated[float, Field(ge=0, le=10)]
@@ -36,7 +36,7 @@ class Readings:
     """What a client knows of the robot. Poses are in the frame that the client takes for the Panda's base.
 
     time, pose_time: s, of the instants that encoders and poses are of. joints (7,): rad. wound (K,): m of pull.
-    tip (3,), thing (3,): m, of the arm's tip and the object's centre. tip_quaternion, thing_quaternion (4,): w first.
+    tip (3,), object (3,): m, of the arm's tip and the object's centre. tip_quaternion, object_quaternion (4,): w first.
     """
 
     time: float
@@ -45,8 +45,8 @@ class Readings:
     wound: np.ndarray
     tip: np.ndarray
     tip_quaternion: np.ndarray
-    thing: np.ndarray
-    thing_quaternion: np.ndarray
+    object: np.ndarray
+    object_quaternion: np.ndarray
 
 
 class Instruments:
@@ -62,10 +62,10 @@ class Instruments:
         """What is told of two rows (`kernel.COLUMNS`,) of the past. Each reading draws noise of its own."""
         s, rng = self.sensors, self.rng
         tip, tip_turn = self._pose(poses[TIP], Rotation.from_matrix(poses[TIP_AXES].reshape(3, 3)))
-        thing, thing_turn = self._pose(poses[THING][:3], rotation_from_wxyz(poses[THING][3:]))
+        object, object_turn = self._pose(poses[OBJECT][:3], rotation_from_wxyz(poses[OBJECT][3:]))
         return Readings(
             time, pose_time, encoders[JOINTS] + s.joint_noise * rng.normal(size=7),
-            encoders[WOUND] + s.wound_noise_mm / 1000 * rng.normal(size=3), tip, tip_turn, thing, thing_turn,
+            encoders[WOUND] + s.wound_noise_mm / 1000 * rng.normal(size=3), tip, tip_turn, object, object_turn,
         )  # fmt: skip
 
     def _pose(self, place: np.ndarray, turn: Rotation) -> tuple[np.ndarray, np.ndarray]:

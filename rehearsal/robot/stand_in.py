@@ -14,11 +14,11 @@ from scipy.spatial.transform import Rotation
 from demo.plants.stranger import CALM, LONGEST_REST, REST_STEP, STILL, Stranger
 from demo.plants.stranger_kernel import LinkState, come_to_rest, work_for
 from rehearsal.robot.flange import Mount, Servos, carry
-from rehearsal.robot.kernel import COLUMNS, THING, TIP, TIP_AXES, look, run
-from rehearsal.robot.scene import Scene, String, make_thing
+from rehearsal.robot.kernel import COLUMNS, OBJECT, TIP, TIP_AXES, look, run
+from rehearsal.robot.rigid_object import rotation
+from rehearsal.robot.scene import Scene, String, make_rigid_object
 from rehearsal.robot.sensors import Instruments, Readings, Sensors
 from rehearsal.robot.shapes import nearest
-from rehearsal.robot.thing import rotation
 from rehearsal.robot.touch_settings import Touch, make_touch
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
@@ -29,7 +29,7 @@ from trunkline.model.arm.mjcf import unit_name
 TICK = 1e-3  # s
 SUBSTEPS = 6  # of a tick
 GRAVITY = np.array([0.0, 0.0, -STANDARD_GRAVITY])
-FASTEST = 20.0  # m/s of the thing; nothing here throws it so
+FASTEST = 20.0  # m/s of the object; nothing here throws it so
 MOST_PULL = 1.0  # m, beyond which a command is a mistake
 
 
@@ -62,9 +62,9 @@ class StandIn:
 class Truth:
     """What is so at this moment, for scoring alone; Panda's base frame.
 
-    tip (3,), thing (3,), grip (3,): m; of the object, its centre of mass and the middle of what the arm wraps of it.
+    tip (3,), object (3,), grip (3,): m; of the object, its centre of mass and the middle of what the arm wraps of it.
     tip_axes (3, 3), quaternion (4,): of the tip and of the object. speed (3,): m/s, its own.
-    arm_thing (U, 3), arm_world (U, W, 3), thing_world (W, 3): forces on the first of the two, N; W in the order of
+    arm_object (U, 3), arm_world (U, W, 3), object_world (W, 3): forces on the first of the two, N; W in the order of
     `Scene.names`. hanging: whether the object's string is on the hook.
     """
 
@@ -72,13 +72,13 @@ class Truth:
     joints: np.ndarray
     tip: np.ndarray
     tip_axes: np.ndarray
-    thing: np.ndarray
+    object: np.ndarray
     grip: np.ndarray
     quaternion: np.ndarray
     speed: np.ndarray
-    arm_thing: np.ndarray
+    arm_object: np.ndarray
     arm_world: np.ndarray
-    thing_world: np.ndarray
+    object_world: np.ndarray
     hanging: bool
 
 
@@ -100,9 +100,9 @@ class StandInRobot:
         self.joints = np.zeros((3, 7))
         self.joints[0] = self._checked(ready, 7, "ready")
         self.servos, self.mount = servos_of(settings.panda), _mount(settings.panda, arm)
-        self.thing, self.motion = make_thing(scene.object, scene.hook, settings.string)
+        self.object, self.motion = make_rigid_object(scene.object, scene.hook, settings.string)
         self.discs, self.world, self.contacts = make_touch(
-            arm.chain, arm.links, scene, self.thing, settings.touch, rough
+            arm.chain, arm.links, scene, self.object, settings.touch, rough
         )
         self.instruments = Instruments(settings.sensors, measuring)
         pulled = np.zeros(arm.tendons) if wound is None else np.array(wound, dtype=float)
@@ -148,7 +148,7 @@ class StandInRobot:
         pulls, targets = _arriving(self.pulled, self.ticks, count), _arriving(self.sent, self.ticks, count)
         run(
             count, self.substeps, TICK, arm.links, self.state, arm.straight, pulls, GRAVITY, self.servos, self.mount,
-            self.joints, targets, self.discs, self.world, self.thing, self.motion, self.contacts, rows,
+            self.joints, targets, self.discs, self.world, self.object, self.motion, self.contacts, rows,
         )  # fmt: skip
         if not (np.isfinite(rows[-1]).all() and np.linalg.norm(self.motion.speed) < FASTEST):
             raise FloatingPointError("the stand-in's engine diverged: its steps are too long")
@@ -166,13 +166,13 @@ class StandInRobot:
     def truth(self) -> Truth:
         """What is so."""
         row, c = self.rows[-1], self.contacts
-        thing, quaternion = row[THING][:3].copy(), row[THING][3:].copy()
-        grip = thing + np.array(rotation(quaternion)) @ self.scene.object.grip
+        object, quaternion = row[OBJECT][:3].copy(), row[OBJECT][3:].copy()
+        grip = object + np.array(rotation(quaternion)) @ self.scene.object.grip
         return Truth(
             time=self.time, joints=self.joints[0].copy(), tip=row[TIP].copy(),
-            tip_axes=row[TIP_AXES].reshape(3, 3).copy(), thing=thing, grip=grip, quaternion=quaternion,
+            tip_axes=row[TIP_AXES].reshape(3, 3).copy(), object=object, grip=grip, quaternion=quaternion,
             speed=self.motion.speed.copy(),
-            arm_thing=c.arm_thing.copy(), arm_world=c.arm_world.copy(), thing_world=c.thing_world.copy(),
+            arm_object=c.arm_object.copy(), arm_world=c.arm_world.copy(), object_world=c.object_world.copy(),
             hanging=bool(self.motion.hanging[0]),
         )  # fmt: skip
 
@@ -208,9 +208,9 @@ class StandInRobot:
         world = self.world
         shapes = zip(self.scene.names(), world.kind, world.half, world.edge, world.place, strict=True)
         solid = [(name, kind, half, edge, place, np.eye(3)) for name, kind, half, edge, place in shapes]
-        thing, pose = self.thing, np.array(rotation(self.motion.quaternion))
+        object, pose = self.object, np.array(rotation(self.motion.quaternion))
         for kind, half, edge, shift, turn in zip(
-            thing.kind, thing.half, thing.edge, thing.shift, thing.turn, strict=True
+            object.kind, object.half, object.edge, object.shift, object.turn, strict=True
         ):
             solid.append(("the object", kind, half, edge, self.motion.place + pose @ shift, pose @ turn))
         for unit, (centre, axis) in enumerate(zip(*self.links(), strict=True)):

@@ -1,4 +1,4 @@
-"""How hard and how rough things are: the settings of contacts, and what the kernels take of them."""
+"""How hard and how rough objects are: the settings of contacts, and what the kernels take of them."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -7,8 +7,8 @@ import numpy as np
 from pydantic import Field
 
 from demo.plants.stranger_kernel import Links
+from rehearsal.robot.rigid_object import RigidObject
 from rehearsal.robot.scene import Friction, Scene
-from rehearsal.robot.thing import RigidObject
 from rehearsal.robot.touching import Contacts, ContactWorld, Discs
 from trunkline.model.arm.geometry import ChainGeometry
 
@@ -47,7 +47,7 @@ class Touch:
 
 
 def make_touch(
-    chain: ChainGeometry, links: Links, scene: Scene, thing: RigidObject, touch: Touch, rng: np.random.Generator
+    chain: ChainGeometry, links: Links, scene: Scene, object: RigidObject, touch: Touch, rng: np.random.Generator
 ) -> tuple[Discs, ContactWorld, Contacts]:
     """Discs, world and empty contacts; `rng` draws the friction, always as many numbers of it for the same scene.
 
@@ -55,7 +55,7 @@ def make_touch(
     l - (W + W') Δθ/4, W and W' its upper and lower widths. The disc's edge is half of that.
     """
     kind, half, edge, place = scene.shapes()
-    units, solids, shapes = chain.units, len(thing.kind), len(kind)
+    units, solids, shapes = chain.units, len(object.kind), len(kind)
     width = chain.widths * (1 + chain.ratio) / 2
     rim = chain.lengths - chain.joint_range * chain.widths * (1 + chain.ratio) / 4
     round_edge = np.minimum(np.maximum(rim, 0.1 * chain.lengths), width) / 2
@@ -64,22 +64,22 @@ def make_touch(
     masses = np.add.reduceat(links.masses, np.arange(0, len(links.masses), len(links.masses) // units))
     drawn = touch.scatter * rng.normal(size=1 + 2 * shapes)
     rough = touch.unit_scatter * rng.normal(size=units)
-    on_thing = touch.arm_object * np.maximum(1 + drawn[0] + rough, LOWEST)
+    on_object = touch.arm_object * np.maximum(1 + drawn[0] + rough, LOWEST)
     on_world = touch.arm_world * np.maximum(1 + drawn[1 : 1 + shapes] + rough[:, None], LOWEST)
     discs = Discs(
         link=links.hole_link, height=links.hole_height, radius=width / 2 - round_edge, edge=round_edge,
         hardness=touch.hardness * np.sqrt(share), stiffness=stiffness,
-        damping=2 * touch.damping_ratio * np.sqrt(stiffness * masses), loss=touch.loss, on_thing=on_thing,
+        damping=2 * touch.damping_ratio * np.sqrt(stiffness * masses), loss=touch.loss, on_object=on_object,
         on_world=on_world,
     )  # fmt: skip
     world = ContactWorld(
         kind=kind, half=half, edge=edge, place=place, hardness=touch.world_hardness, stiffness=touch.world_stiffness,
-        damping=2 * touch.world_damping_ratio * float(np.sqrt(touch.world_stiffness * thing.mass)),
+        damping=2 * touch.world_damping_ratio * float(np.sqrt(touch.world_stiffness * object.mass)),
         loss=touch.world_loss, friction=touch.object_world * np.maximum(1 + drawn[1 + shapes :], LOWEST),
     )  # fmt: skip
     contacts = Contacts(
-        thing=np.zeros((units, solids, 3)), world=np.zeros((units, shapes, 3)),
-        lying=np.zeros((len(thing.points), shapes, 3)), near=np.zeros((units, solids + shapes, 3)),
-        arm_thing=np.zeros((units, 3)), arm_world=np.zeros((units, shapes, 3)), thing_world=np.zeros((shapes, 3)),
+        object=np.zeros((units, solids, 3)), world=np.zeros((units, shapes, 3)),
+        lying=np.zeros((len(object.points), shapes, 3)), near=np.zeros((units, solids + shapes, 3)),
+        arm_object=np.zeros((units, 3)), arm_world=np.zeros((units, shapes, 3)), object_world=np.zeros((shapes, 3)),
     )  # fmt: skip
     return discs, world, contacts

@@ -1,7 +1,7 @@
-"""All contacts of a step: the arm with the thing and with the world, the thing with the world.
+"""All contacts of a step: the arm with the object and with the world, the object with the world.
 
 A unit of the arm touches as a flat disc with round edges, which lies in its middle: a point for each shape, of the
-thing as of the world, the nearest one, so that it slides and rolls without corners. The arm does not touch itself, nor
+object as of the world, the nearest one, so that it slides and rolls without corners. The arm does not touch itself, nor
 the Panda anything.
 """
 
@@ -11,8 +11,8 @@ import numpy as np
 
 from rehearsal.robot.compiled import kernel
 from rehearsal.robot.contact import touch
+from rehearsal.robot.rigid_object import rotation, spin_of, transposed
 from rehearsal.robot.shapes import distance, nearest
-from rehearsal.robot.thing import rotation, spin_of, transposed
 from trunkline.model.statics.vectors import cross, plus, turned
 
 
@@ -20,7 +20,7 @@ class Discs(NamedTuple):
     """Of U units. link (U,). height (U,): of the centre above the link's joint (negative), m. radius, edge (U,): m.
 
     hardness, stiffness, damping (U,): of contacts, N/m^1.5, N/m, N s/m. loss: s/m.
-    on_thing (U,), on_world (U, W): friction.
+    on_object (U,), on_world (U, W): friction.
     """
 
     link: np.ndarray
@@ -31,14 +31,14 @@ class Discs(NamedTuple):
     stiffness: np.ndarray
     damping: np.ndarray
     loss: float
-    on_thing: np.ndarray
+    on_object: np.ndarray
     on_world: np.ndarray
 
 
 class ContactWorld(NamedTuple):
     """W fixed shapes. kind (W,), half (W, 3) m, edge (W,) m, place (W, 3) m: `shapes.Shape`s that are not turned.
 
-    Contacts with the thing: hardness N/m^1.5, stiffness N/m, damping N s/m, loss s/m, friction (W,).
+    Contacts with the object: hardness N/m^1.5, stiffness N/m, damping N s/m, loss s/m, friction (W,).
     """
 
     kind: np.ndarray
@@ -55,24 +55,24 @@ class ContactWorld(NamedTuple):
 class Contacts(NamedTuple):
     """What contacts remember from step to step, and the forces of the last one, N, on the first named of the two.
 
-    thing (U, S, 3): the arm's bristles on the thing's shapes, in the thing's frame, which turns with what is held.
-    world (U, W, 3), lying (P, W, 3): the arm's and the thing's on the world. near (U, S + W, 3): where a disc was
-    nearest, from its centre, m, first to the thing's shapes, then to the world.
-    arm_thing (U, 3), arm_world (U, W, 3), thing_world (W, 3): forces, in the world.
+    object (U, S, 3): the arm's bristles on the object's shapes, in the object's frame, which turns with what is held.
+    world (U, W, 3), lying (P, W, 3): the arm's and the object's on the world. near (U, S + W, 3): where a disc was
+    nearest, from its centre, m, first to the object's shapes, then to the world.
+    arm_object (U, 3), arm_world (U, W, 3), object_world (W, 3): forces, in the world.
     """
 
-    thing: np.ndarray
+    object: np.ndarray
     world: np.ndarray
     lying: np.ndarray
     near: np.ndarray
-    arm_thing: np.ndarray
+    arm_object: np.ndarray
     arm_world: np.ndarray
-    thing_world: np.ndarray
+    object_world: np.ndarray
 
 
 @kernel
-def touch_all(h, discs, world, thing, motion, contacts, work, turn, place):
-    """Force and torque on the thing about its centre; forces on the arm's links go into work.pushed.
+def touch_all(h, discs, world, object, motion, contacts, work, turn, place):
+    """Force and torque on the object about its centre; forces on the arm's links go into work.pushed.
 
     Args:
         work: of the stranger's kernel; `moving` holds velocities against the world, in the arm's frame.
@@ -83,12 +83,12 @@ def touch_all(h, discs, world, thing, motion, contacts, work, turn, place):
     unpose = transposed(pose)
     centre = (motion.place[0], motion.place[1], motion.place[2])
     speed = (motion.speed[0], motion.speed[1], motion.speed[2])
-    spin = spin_of(thing, motion, pose)
-    shapes = len(thing.kind)
+    spin = spin_of(object, motion, pose)
+    shapes = len(object.kind)
     force, torque = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    contacts.arm_thing[:] = 0.0
+    contacts.arm_object[:] = 0.0
     contacts.arm_world[:] = 0.0
-    contacts.thing_world[:] = 0.0
+    contacts.object_world[:] = 0.0
     for u in range(len(discs.link)):
         i = discs.link[u]
         f = work.frames[i]
@@ -100,20 +100,20 @@ def touch_all(h, discs, world, thing, motion, contacts, work, turn, place):
         size = discs.radius[u] + discs.edge[u]
 
         for s in range(shapes):
-            out = _rows(thing.turn[s])
+            out = _rows(object.turn[s])
             within = transposed(out)
-            inside = turned(within, plus(turned(unpose, plus(disc, -1.0, centre)), -1.0, _row(thing.shift[s])))
-            away, _ = distance(thing.kind[s], thing.half[s], thing.edge[s], inside)
+            inside = turned(within, plus(turned(unpose, plus(disc, -1.0, centre)), -1.0, _row(object.shift[s])))
+            away, _ = distance(object.kind[s], object.half[s], object.edge[s], inside)
             if away < size:
                 near, away, gradient = nearest(
-                    thing.kind[s], thing.half[s], thing.edge[s], inside, turned(within, turned(unpose, axis)),
+                    object.kind[s], object.half[s], object.edge[s], inside, turned(within, turned(unpose, axis)),
                     discs.radius[u], turned(within, turned(unpose, _row(contacts.near[u, s]))),
                 )  # fmt: skip
                 near = turned(pose, turned(out, near))
                 _write(contacts.near[u, s], near)
             depth = discs.edge[u] - away
             if away >= size or depth <= 0:
-                contacts.thing[u, s] = 0.0
+                contacts.object[u, s] = 0.0
                 continue
             normal = turned(pose, turned(out, gradient))
             point = plus(plus(disc, 1.0, near), -(discs.edge[u] - 0.5 * depth), normal)
@@ -122,12 +122,12 @@ def touch_all(h, discs, world, thing, motion, contacts, work, turn, place):
             mine = turned(turn, plus(moving, 1.0, cross(turning, at)))
             velocity = plus(plus(mine, -1.0, speed), -1.0, cross(spin, lever))
             pushed, bristle = touch(
-                h, depth, normal, velocity, turned(pose, _row(contacts.thing[u, s])), discs.hardness[u], discs.loss,
-                discs.stiffness[u], discs.damping[u], discs.on_thing[u],
+                h, depth, normal, velocity, turned(pose, _row(contacts.object[u, s])), discs.hardness[u], discs.loss,
+                discs.stiffness[u], discs.damping[u], discs.on_object[u],
             )  # fmt: skip
-            _write(contacts.thing[u, s], turned(unpose, bristle))
+            _write(contacts.object[u, s], turned(unpose, bristle))
             for a in range(3):
-                contacts.arm_thing[u, a] += pushed[a]
+                contacts.arm_object[u, a] += pushed[a]
             _push(work.pushed[i], at, turned(back, pushed))
             force, torque = plus(force, -1.0, pushed), plus(torque, -1.0, cross(lever, pushed))
 
@@ -155,33 +155,33 @@ def touch_all(h, discs, world, thing, motion, contacts, work, turn, place):
             _write(contacts.arm_world[u, w], pushed)
             _push(work.pushed[i], at, turned(back, pushed))
 
-    lying, twisting = lie(h, world, thing, contacts, pose, centre, speed, spin)
+    lying, twisting = lie(h, world, object, contacts, pose, centre, speed, spin)
     return plus(force, 1.0, lying), plus(torque, 1.0, twisting)
 
 
 @kernel
-def lie(h, world, thing, contacts, pose, centre, speed, spin):
-    """Force and torque on the thing of what it lies on or runs into."""
+def lie(h, world, object, contacts, pose, centre, speed, spin):
+    """Force and torque on the object of what it lies on or runs into."""
     force, torque = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    for p in range(len(thing.points)):
-        lever = turned(pose, _row(thing.points[p]))
+    for p in range(len(object.points)):
+        lever = turned(pose, _row(object.points[p]))
         point = plus(centre, 1.0, lever)
         for w in range(len(world.kind)):
             away, normal = distance(
                 world.kind[w], world.half[w], world.edge[w], plus(point, -1.0, _row(world.place[w]))
             )
-            depth = thing.radius - away
+            depth = object.radius - away
             if depth <= 0:
                 contacts.lying[p, w] = 0.0
                 continue
-            arm = plus(lever, -(thing.radius - 0.5 * depth), normal)
+            arm = plus(lever, -(object.radius - 0.5 * depth), normal)
             pushed, bristle = touch(
                 h, depth, normal, plus(speed, 1.0, cross(spin, arm)), _row(contacts.lying[p, w]), world.hardness,
                 world.loss, world.stiffness, world.damping, world.friction[w],
             )  # fmt: skip
             _write(contacts.lying[p, w], bristle)
             for a in range(3):
-                contacts.thing_world[w, a] += pushed[a]
+                contacts.object_world[w, a] += pushed[a]
             force, torque = plus(force, 1.0, pushed), plus(torque, 1.0, cross(arm, pushed))
     return force, torque
 

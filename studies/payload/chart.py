@@ -127,23 +127,23 @@ def try_masses(arm: mujoco.MjSpec, chart: PayloadSettings, cell: Cell, wrap: flo
         InputError: the object does not fit between table and mount.
     """
     geometry = read_geometry(arm)
-    thing = GraspObject(cell.shape, cell.diameter, max(chart.height, cell.diameter), BEGIN, "plastic")
-    middle = object_in_base(geometry, cell.diameter, Grasp(wrap, chart.gap), cell.pull) - thing.grip
+    object = GraspObject(cell.shape, cell.diameter, max(chart.height, cell.diameter), BEGIN, "plastic")
+    middle = object_in_base(geometry, cell.diameter, Grasp(wrap, chart.gap), cell.pull) - object.grip
     hanging = cell.support == "hanging"
     quaternion, surfaces, hook = (LEVEL if hanging else UPRIGHT), {}, None
     if hanging:
         hook = [float(value) for value in middle + [0, 0, cell.diameter / 2 + HOOK_ABOVE]]
     else:
         if cell.shape == "basket":  # its bar is where the arm wraps it
-            top = middle[2] - thing.half_height
+            top = middle[2] - object.half_height
         else:  # the tip just above the table, the object beside it
             top = -geometry.length - chart.spread
-            middle[2] = top + thing.half_height
-            if middle[2] + thing.half_height > 0:
+            middle[2] = top + object.half_height
+            if middle[2] + object.half_height > 0:
                 raise InputError(f"height: found {chart.height} m, expected an object below the mount")
         surfaces = {TABLE: SupportSurface([0.0, 0.0, top], list(TABLE_SIZE), "wood")}
     world = WorldGeometry(None, surfaces, hook)
-    model = compose(arm, FixedMount("fixed"), world, Placed(thing, middle, quaternion, hanging)).compile()
+    model = compose(arm, FixedMount("fixed"), world, Placed(object, middle, quaternion, hanging)).compile()
     model.opt.timestep = chart.timestep
     draws = np.random.default_rng(chart.seed).normal(size=(chart.placements, 2)) * chart.spread
     poses = np.tile([*middle, *quaternion], (chart.placements, 1))

@@ -5,7 +5,7 @@ import multiprocessing
 import numpy as np
 
 from qualification.witness import HEAD, Watched, Witness
-from trunkline.ar.session.robot import HOLD_TIME, MODE, MODES, SERIAL
+from trunkline.ar.session.robot_process import HOLD_TIME, MODE, MODES, SERIAL
 
 TENDONS = 3
 

@@ -13,21 +13,21 @@ FORCE = (0.0, 0.0, 0.01)  # N
 def frame(
     now: float = 0.0,
     mode: str = "execute",
-    thing: dict | None = None,
+    object: dict | None = None,
     world: dict | None = None,
     lies: tuple = (),
     place: tuple = (0.0, 0.0, 0.0),
     units: np.ndarray | None = None,
     **truth,
 ) -> SessionFrame:
-    """thing, world: forces on units, by number, N. lies: forces on the object, of each surface. place: the object's, m.
-    units: centres (U, 3), m. truth: what else is so."""
+    """object, world: forces on units, by number, N. lies: forces on the object, of each surface. place: the object's,
+    m. units: centres (U, 3), m. truth: what else is so."""
     touched, struck = np.zeros((UNITS, 3)), np.zeros((UNITS, 2, 3))
-    for number, force in (thing or {}).items():
+    for number, force in (object or {}).items():
         touched[number] = force
     for number, force in (world or {}).items():
         struck[number, 0] = force
     so = {"hanging": False, "speed": np.zeros(3), "tip": np.zeros(3), **truth}
-    so |= {"arm_thing": touched, "arm_world": struck, "thing_world": np.array(lies or [(0.0, 0.0, 0.0)] * 2)}
+    so |= {"arm_object": touched, "arm_world": struck, "object_world": np.array(lies or [(0.0, 0.0, 0.0)] * 2)}
     centres = np.zeros((UNITS, 3)) if units is None else units
     return SessionFrame(now, mode, SimpleNamespace(**so), np.array(place), np.zeros(7), np.zeros(3), centres)  # type: ignore[arg-type]

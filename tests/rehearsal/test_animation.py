@@ -9,19 +9,19 @@ from matplotlib.image import imread
 
 from rehearsal.animation import _circle, _outlines, _projected, telling, write_gif
 from rehearsal.film import Shot, filmed
-from rehearsal.robot.scene import Object
+from rehearsal.robot.scene import SceneObject
 
-SPHERE = Object("sphere", 0.06, 0.06, 0.1, [0.0, 0.0, 0.0])
+SPHERE = SceneObject("sphere", 0.06, 0.06, 0.1, [0.0, 0.0, 0.0])
 
 
-def shot(now: float = 0.0, mode: str = "aim", thing: Object = SPHERE) -> Shot:
+def shot(now: float = 0.0, mode: str = "aim", object: SceneObject = SPHERE) -> Shot:
     heights = np.linspace(0.6, 0.1, 5)
     units = np.column_stack([np.full(5, 0.4), np.zeros(5), heights])
     ends = np.array([[0.4, 0.0, 0.6], [np.nan] * 3])
     return Shot(
         now, mode, np.zeros((9, 3)), np.array([0.4, 0.0, 0.62]), units, np.tile([0.0, 0.0, 1.0], (5, 1)),
         np.full(5, 0.02), np.array([[1.0, -0.2, 0.5], [1.0, 0.2, 0.5]]), ends, None, np.array([0.4, 0.1, 0.1]),
-        np.array([1.0, 0.0, 0.0, 0.0]), None, thing, [],
+        np.array([1.0, 0.0, 0.0, 0.0]), None, object, [],
     )  # fmt: skip
 
 
@@ -34,18 +34,18 @@ def test_the_telling_moment_is_the_end_of_an_execution_or_the_midst_of_following
 
 @pytest.mark.parametrize(("shape", "lines"), [("sphere", 3), ("cylinder", 6), ("box", 6), ("toy", 6)])
 def test_outlines_are_as_large_as_the_object(shape, lines):
-    thing = Object(shape, 0.06, 0.2, 0.1, [0.0, 0.0, 0.0])
-    outlines = _outlines(shot(thing=thing))
+    object = SceneObject(shape, 0.06, 0.2, 0.1, [0.0, 0.0, 0.0])
+    outlines = _outlines(shot(object=object))
     assert len(outlines) == lines
-    points = np.concatenate(outlines) - shot().thing
+    points = np.concatenate(outlines) - shot().centre
     half = [0.03, 0.03, 0.03 if shape == "sphere" else 0.1]
     np.testing.assert_allclose(points.max(axis=0), half, atol=1e-9)
     np.testing.assert_allclose(points.min(axis=0), np.negative(half), atol=1e-9)
 
 
 def test_a_basket_is_drawn_from_its_floor_to_its_bar():
-    basket = Object("basket", 0.03, 0.1, 0.1, [0.0, 0.0, 0.0])
-    points = np.concatenate(_outlines(shot(thing=basket))) - shot().thing
+    basket = SceneObject("basket", 0.03, 0.1, 0.1, [0.0, 0.0, 0.0])
+    points = np.concatenate(_outlines(shot(object=basket))) - shot().centre
     assert points[:, 2].min() == pytest.approx(-basket.half_height)
     assert points[:, 2].max() == pytest.approx(basket.grip[2] + 0.015)
 

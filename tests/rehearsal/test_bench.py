@@ -20,12 +20,12 @@ from rehearsal.operator.scripts import Ending
 from tests.rehearsal.frames import FORCE, TIP, UNITS, frame
 from tests.rehearsal.test_held import SCENE, handed, run
 
-THING = np.array([0.5, 0.1, 0.2])
+OBJECT = np.array([0.5, 0.1, 0.2])
 FREE = settings.free()
 
 
 def staged(judge, **more) -> Staged:
-    return Staged("touch", 3, None, iter(()), judge, "a thing", **more)  # type: ignore[arg-type]
+    return Staged("touch", 3, None, iter(()), judge, "an object", **more)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("ending", "cause", "success", "stated"), [
@@ -38,7 +38,7 @@ def staged(judge, **more) -> Staged:
 def test_a_run_succeeds_where_its_script_ended_and_its_judge_names_no_cause(ending, cause, success, stated):
     result = staged(lambda *arguments: cause).judged(ending, [], [], 4.5)
     assert (result.success, result.cause) == (success, stated)
-    assert (result.experiment, result.seed, result.seconds, result.object) == ("touch", 3, 4.5, "a thing")
+    assert (result.experiment, result.seed, result.seconds, result.object) == ("touch", 3, 4.5, "an object")
 
 
 @pytest.mark.parametrize("ended", [True, False])
@@ -63,7 +63,7 @@ class Nothing:
 
 def bench(session=None, judged=True) -> SimpleNamespace:
     return SimpleNamespace(
-        place=lambda rng: THING, operator=lambda rng: Nothing(), session=lambda *args: session, settings=FREE,
+        place=lambda rng: OBJECT, operator=lambda rng: Nothing(), session=lambda *args: session, settings=FREE,
         arm=SimpleNamespace(chain=SimpleNamespace(units=UNITS)), judged=judged,
         config=SimpleNamespace(core=SimpleNamespace(follow_delay=0.4)),
     )  # fmt: skip
@@ -77,7 +77,7 @@ def judged(stage_run: Staged, ending: Ending, frames: list, views: list | None =
     (UNITS - 1, True), (UNITS - FREE.tip_units, True), (UNITS - FREE.tip_units - 1, False),
 ])  # fmt: skip
 def test_a_reach_is_by_the_last_units_of_the_settings(unit, success):
-    frames = [frame(tip=THING), frame(thing={unit: FORCE}, tip=THING + [0.0, 0.0, 0.02])]
+    frames = [frame(tip=OBJECT), frame(object={unit: FORCE}, tip=OBJECT + [0.0, 0.0, 0.02])]
     ending = Ending(True, "", 2, aimed=0.01, previewed=0.02)
     result = judged(reach(bench(), 0), ending, frames)  # type: ignore[arg-type]
     assert result.success is success
@@ -86,7 +86,7 @@ def test_a_reach_is_by_the_last_units_of_the_settings(unit, success):
 
 @pytest.mark.parametrize(("aimed", "kind"), [(FREE.diameter / 2, "missed"), (0.51 * FREE.diameter, "aim")])
 def test_an_aim_beside_the_object_is_one_beyond_its_radius(aimed, kind):
-    result = judged(reach(bench(), 0), Ending(True, aimed=aimed), [frame(tip=THING)])  # type: ignore[arg-type]
+    result = judged(reach(bench(), 0), Ending(True, aimed=aimed), [frame(tip=OBJECT)])  # type: ignore[arg-type]
     assert result.cause.startswith(kind)
 
 
@@ -119,7 +119,7 @@ def test_following_may_be_interrupted_for_as_long_as_the_settings_say(seconds, s
 def stood(monkeypatch):
     """Grasps and hand-overs without a robot."""
     session = SimpleNamespace(prediction=None, robot=SimpleNamespace(scene=SCENE))
-    offered = SimpleNamespace(name="standing basket", thing=SimpleNamespace(position=[0.5, 0.0, 0.2]))
+    offered = SimpleNamespace(name="standing basket", object=SimpleNamespace(position=[0.5, 0.0, 0.2]))
     for module in (grasps, handles):
         monkeypatch.setattr(module, "offered", lambda *args: offered)
         monkeypatch.setattr(module, "session_of", lambda *args: session)
@@ -133,7 +133,7 @@ def test_a_grasp_is_judged_and_told_with_what_came(stood, frames, success, agree
 
 
 @pytest.mark.parametrize(
-    ("frames", "success", "agreed"), [(handed(), True, 1.0), (handed(thing={TIP: FORCE}), False, 0.0)]
+    ("frames", "success", "agreed"), [(handed(), True, 1.0), (handed(object={TIP: FORCE}), False, 0.0)]
 )
 def test_a_hand_over_is_judged_and_told_with_what_came(stood, frames, success, agreed):
     result = judged(handle(bench(), 0), Ending(True, plans=2, probability=0.8), frames)  # type: ignore[arg-type]

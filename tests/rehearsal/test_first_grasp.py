@@ -23,7 +23,7 @@ def test_a_hanging_cylinder_is_wrapped_lifted_and_held(trials):
     assert outcome.lifted > LIFT
     assert outcome.units >= 4
     assert outcome.slipped < 0.01
-    force = trial.robot.truth().arm_thing.sum(axis=0)
+    force = trial.robot.truth().arm_object.sum(axis=0)
     np.testing.assert_allclose(-force[2], trial.scene.object.mass * 9.80665, rtol=0.1)  # it bears all of the weight
     assert trial.robot.time > HOLD
 
@@ -33,7 +33,7 @@ def test_half_the_step_gives_the_same_grasp(trials):
     (whole, first), (half, again) = trials
     assert again.success == first.success
     assert again.units >= 4
-    assert np.linalg.norm(whole.robot.truth().thing - half.robot.truth().thing) < 0.02
+    assert np.linalg.norm(whole.robot.truth().object - half.robot.truth().object) < 0.02
 
 
 def test_a_basket_is_lifted_off_its_table_by_its_bar_and_held():
@@ -44,6 +44,6 @@ def test_a_basket_is_lifted_off_its_table_by_its_bar_and_held():
     assert outcome.lifted > LIFT
     assert outcome.slipped < 0.02
     truth = trial.robot.truth()
-    assert truth.grip[2] > truth.thing[2] + 0.15  # it hangs below its bar
-    np.testing.assert_allclose(-truth.arm_thing.sum(axis=0)[2], basket.mass * 9.80665, rtol=0.1)
-    np.testing.assert_array_equal(truth.thing_world, 0)
+    assert truth.grip[2] > truth.object[2] + 0.15  # it hangs below its bar
+    np.testing.assert_allclose(-truth.arm_object.sum(axis=0)[2], basket.mass * 9.80665, rtol=0.1)
+    np.testing.assert_array_equal(truth.object_world, 0)

@@ -12,7 +12,7 @@ from rehearsal.experiments.handle import BORNE, STILL, why_not
 from rehearsal.experiments.result import Result
 from rehearsal.first_grasp import LIFT, SLIP, holds
 from rehearsal.operator.scripts import Ending
-from rehearsal.robot.scene import Object, Scene, SupportSurface
+from rehearsal.robot.scene import Scene, SceneObject, SupportSurface
 from tests.rehearsal.frames import FORCE, UNITS, frame
 from trunkline.frames import STANDARD_GRAVITY
 
@@ -89,7 +89,7 @@ def test_a_grasp_is_lifted_and_held_by_the_arm_alone_without_slip(ending, frames
 
 def test_what_lies_before_it_is_lifted_does_not_count():
     frames = run()
-    frames[0].truth.thing_world = np.array(lying())
+    frames[0].truth.object_world = np.array(lying())
     assert failure(DONE, frames, S) == ""
 
 
@@ -115,7 +115,7 @@ def centres(**moved) -> np.ndarray:
     return places
 
 
-@pytest.mark.parametrize(("thing", "place", "units", "moved"), [
+@pytest.mark.parametrize(("object", "place", "units", "moved"), [
     (HOLD, (0.0, 0.0, 0.0), centres(), 0.0),
     (HOLD, (0.03, 0.0, 0.04), centres(), 0.05),
     (HOLD, (0.05, 0.0, 0.0), centres(u2=0.05), 0.0),
@@ -125,9 +125,9 @@ def centres(**moved) -> np.ndarray:
     ({}, (0.0, 0.0, 0.0), centres(), np.inf),
     (HOLD, (np.nan, 0.0, 0.0), centres(), np.nan),
 ])  # fmt: skip
-def test_how_far_it_moved_in_the_arm_is_against_the_units_that_held_it_before(thing, place, units, moved):
+def test_how_far_it_moved_in_the_arm_is_against_the_units_that_held_it_before(object, place, units, moved):
     after = frame(1.0, "aim", {0: FORCE}, place=place, units=units)  # which units touch it then does not count
-    assert in_arm(frame(0.0, "aim", thing), after) == pytest.approx(moved, nan_ok=True)
+    assert in_arm(frame(0.0, "aim", object), after) == pytest.approx(moved, nan_ok=True)
 
 
 @pytest.mark.parametrize(("modes", "first"), [
@@ -142,7 +142,7 @@ def test_a_grasp_is_over_in_the_first_frame_after_the_first_execution(modes, fir
 MASS = 0.2
 SCENE = Scene(
     -0.75,
-    Object("cylinder", 0.05, 0.1, MASS, [0.5, 0.0, 0.5], hanging=True),
+    SceneObject("cylinder", 0.05, 0.1, MASS, [0.5, 0.0, 0.5], hanging=True),
     {TABLE: SupportSurface([1.0, 0.0, -0.1], [0.5, 0.5, 0.03])},
     [0.5, 0.0, 0.9],
 )  # its names: the floor, the table, the hook
@@ -153,11 +153,11 @@ def borne(by_table: float = 2 * HALF, by_floor: float = 0.0) -> tuple:
     return ((0.0, 0.0, by_floor), (0.0, 0.0, by_table), (0.0, 0.0, 0.0))
 
 
-def handed(lies=None, speed=(0.0, 0.0, 0.0), thing=None, over=(1.0, 0.0, 0.0), second=True):
+def handed(lies=None, speed=(0.0, 0.0, 0.0), object=None, over=(1.0, 0.0, 0.0), second=True):
     """Frames of a grasp and of a hand-over, `over` which the object is brought."""
     place, mode = over, "execute" if second else "aim"
     bring = [frame(3.0, mode, HOLD, lies=borne(0), place=place), frame(4.0, mode, HOLD, lies=borne(0), place=(0, 0, 0))]
-    last = frame(5.0, "aim", thing or {}, lies=borne() if lies is None else lies, speed=np.array(speed), place=place)
+    last = frame(5.0, "aim", object or {}, lies=borne() if lies is None else lies, speed=np.array(speed), place=place)
     lifted = frame(1.0, "aim", HOLD, lies=borne(0), place=(0.0, 0.0, 1.0))
     return [frame(0.0, "execute", HOLD, lies=borne(0)), lifted, *bring, last]
 
@@ -190,9 +190,9 @@ NOWHERE = "slip: it was dropped before it was brought anywhere"
     (DONE, handed(speed=(np.nan, 0.0, 0.0)), STAYED),
     (DONE, handed(borne(0), speed=(STILL, 0.0, 0.0)), STAYED),
     # let go
-    (DONE, handed(thing={5: FORCE}), "stopped: the arm still touches it"),
-    (DONE, handed(thing={5: NAN}), "stopped: the arm still touches it"),
-    (DONE, handed(borne(0), thing={5: FORCE}), STAYED),
+    (DONE, handed(object={5: FORCE}), "stopped: the arm still touches it"),
+    (DONE, handed(object={5: NAN}), "stopped: the arm still touches it"),
+    (DONE, handed(borne(0), object={5: FORCE}), STAYED),
     # dropped: before a second plan, before the table, at its edge on both sides, along each axis
     (DONE, handed(borne(0), second=False), NOWHERE),
     (DONE, handed(borne(0), over=(0.5, 0.0, 0.0)), ON_ITS_WAY),

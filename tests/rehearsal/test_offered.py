@@ -36,24 +36,25 @@ def test_what_is_handed_over_stood_on_a_surface():
 
 
 def test_what_stands_does_so_on_its_stand_and_what_hangs_has_none(objects):
-    for object in objects:
-        thing = object.thing
-        assert thing.hanging == (object.stands is None)
-        if object.stands is not None:
-            np.testing.assert_allclose(thing.position, np.add(object.stands.top, [0, 0, thing.half_height]), atol=1e-12)
-            assert min(object.stands.size[:2]) > np.hypot(thing.basket.width, thing.basket.length)
+    for placed in objects:
+        object = placed.object
+        assert object.hanging == (placed.stands is None)
+        if placed.stands is not None:
+            above = np.add(placed.stands.top, [0, 0, object.half_height])
+            np.testing.assert_allclose(object.position, above, atol=1e-12)
+            assert min(placed.stands.size[:2]) > np.hypot(object.basket.width, object.basket.length)
 
 
 def test_what_is_gripped_is_level_across_the_way_of_the_arm_and_within_bounds(objects):
     s = settings.grasped()
-    for object in objects:
-        of, thing = s.shapes[object.thing.shape], object.thing
-        turn = Rotation.from_quat(thing.quaternion, scalar_first=True)
-        grip = np.array(thing.position) + turn.apply(thing.grip)
+    for placed in objects:
+        of, object = s.shapes[placed.object.shape], placed.object
+        turn = Rotation.from_quat(object.quaternion, scalar_first=True)
+        grip = np.array(object.position) + turn.apply(object.grip)
         assert of.low <= grip[2] <= of.high
         assert s.near <= np.hypot(*grip[:2]) <= s.far
-        assert of.thin <= thing.diameter <= of.wide
-        assert of.light <= thing.mass <= min(of.heavy, config().handling.heaviest(thing.shape, thing.diameter))
-        axis = turn.apply([0, 1, 0] if thing.shape == "basket" else [0, 0, 1])
-        assert abs(axis @ object.towards) < 1e-9
+        assert of.thin <= object.diameter <= of.wide
+        assert of.light <= object.mass <= min(of.heavy, config().handling.heaviest(object.shape, object.diameter))
+        axis = turn.apply([0, 1, 0] if object.shape == "basket" else [0, 0, 1])
+        assert abs(axis @ placed.towards) < 1e-9
         assert abs(axis[2]) < 1e-9

@@ -15,10 +15,10 @@ from trunkline.ar.session.messages import PredictionMessage
 
 RADIUS = 0.03
 NAN = (np.nan, 0.0, 0.0)
-FREE, TOUCHES = frame(), frame(thing={TIP: FORCE})
-SHAFT, WORLD = frame(thing={TIP - 1: FORCE}), frame(world={UNITS - 1: FORCE})
-BOTH = frame(thing={TIP - 1: FORCE, TIP: FORCE})
-WORLD_TOO = frame(thing={TIP: FORCE}, world={0: FORCE})
+FREE, TOUCHES = frame(), frame(object={TIP: FORCE})
+SHAFT, WORLD = frame(object={TIP - 1: FORCE}), frame(world={UNITS - 1: FORCE})
+BOTH = frame(object={TIP - 1: FORCE, TIP: FORCE})
+WORLD_TOO = frame(object={TIP: FORCE}, world={0: FORCE})
 
 
 def done(aimed: float = 0.0) -> Ending:
@@ -33,24 +33,24 @@ NAMELESS = Ending(False, "", aimed=0.0)
     # the tip's units, each, and all of them at once
     (done(), [FREE, TOUCHES], ""),
     (done(), [TOUCHES], ""),
-    (done(), [FREE, frame(thing={UNITS - 1: FORCE})], ""),
-    (done(), [FREE, frame(thing={TIP: FORCE, UNITS - 1: FORCE})], ""),
-    (done(), [FREE, frame(thing={TIP: (0.0, 0.0, -1e-12)})], ""),
-    (done(), [FREE, frame(thing={TIP: (1e-12, 0.0, 0.0)})], ""),
+    (done(), [FREE, frame(object={UNITS - 1: FORCE})], ""),
+    (done(), [FREE, frame(object={TIP: FORCE, UNITS - 1: FORCE})], ""),
+    (done(), [FREE, frame(object={TIP: (0.0, 0.0, -1e-12)})], ""),
+    (done(), [FREE, frame(object={TIP: (1e-12, 0.0, 0.0)})], ""),
     # what follows does not count
     (done(), [TOUCHES, SHAFT, WORLD], ""),
-    (done(), [TOUCHES, frame(thing={TIP: NAN})], ""),
+    (done(), [TOUCHES, frame(object={TIP: NAN})], ""),
     (done(aimed=1.0), [TOUCHES], ""),
     # another unit first, or at once
     (done(), [FREE, SHAFT], f"collision: unit {TIP} touched it first"),
     (done(), [SHAFT, TOUCHES], f"collision: unit {TIP} touched it first"),
-    (done(), [frame(thing={0: FORCE}), TOUCHES], "collision: unit 1 touched it first"),
+    (done(), [frame(object={0: FORCE}), TOUCHES], "collision: unit 1 touched it first"),
     (done(), [BOTH], f"collision: unit {TIP} touched it first"),
     # the world first, or at once
     (done(), [FREE, WORLD], "collision: the arm touched the world"),
     (done(), [WORLD, TOUCHES], "collision: the arm touched the world"),
     (done(), [WORLD_TOO], "collision: the arm touched the world"),
-    (done(), [frame(thing={0: FORCE}, world={0: FORCE})], "collision: the arm touched the world"),
+    (done(), [frame(object={0: FORCE}, world={0: FORCE})], "collision: the arm touched the world"),
     # a script that ended badly
     (STOPPED, [FREE, TOUCHES], "stopped: the robot is in fault"),
     (STOPPED, [FREE], "stopped: the robot is in fault"),
@@ -63,9 +63,9 @@ NAMELESS = Ending(False, "", aimed=0.0)
     (done(aimed=np.nextafter(RADIUS, 1)), [FREE], "aim: the tip target was beside the object"),
     (done(aimed=np.nan), [FREE], "aim: the tip target was beside the object"),
     # forces that are no numbers
-    (done(), [frame(thing={TIP: NAN})], "error: the force of a contact is no number"),
-    (done(), [frame(thing={TIP: FORCE}, world={0: NAN})], "error: the force of a contact is no number"),
-    (done(), [frame(thing={TIP: (np.inf, 0.0, 0.0)})], "error: the force of a contact is no number"),
+    (done(), [frame(object={TIP: NAN})], "error: the force of a contact is no number"),
+    (done(), [frame(object={TIP: FORCE}, world={0: NAN})], "error: the force of a contact is no number"),
+    (done(), [frame(object={TIP: (np.inf, 0.0, 0.0)})], "error: the force of a contact is no number"),
     # a robot that never moved
     (Ending(False, "aim: no preview came to the object"), [], "aim: no preview came to the object"),
     (Ending(False, "out of reach: none"), [], "out of reach: none"),

@@ -15,7 +15,7 @@ from trunkline.ar.teleop.messages import World
 
 RADIUS, ACCEPT = 0.03, 0.75
 PLANS = 3  # that the operator asks for before giving up
-THING = np.array([0.6, 0.1, 0.1])
+OBJECT = np.array([0.6, 0.1, 0.1])
 BESIDE = np.array([-0.1, 0.0, 0.4])
 RATE = 60.0  # Hz
 MIDDLE = np.zeros(3)
@@ -54,7 +54,7 @@ class Shown:
         self.hands = [RayHand(origin, REFERENCE, person, 0.15, rng) for origin in ORIGINS]
         self.operator = Operator(person, tuple(self.hands), np.array([0.1, 0.0, -0.4]), RADIUS, 0.03, rng)
         self.states, self.offers, self.tips, self.lifts = list(states), list(offers), list(tips), lifts
-        self.now, self.mode, self.thing, self.executed, self.plans = 0.0, "aim", THING.copy(), 0, 0
+        self.now, self.mode, self.object, self.executed, self.plans = 0.0, "aim", OBJECT.copy(), 0, 0
         self.before: set[str] = set()
         self.since = 0.0
 
@@ -72,15 +72,15 @@ class Shown:
         elif self.mode == "ready" and pressed & {"left grip", "left primary"}:
             self._to("aim")
         elif self.mode == "execute" and self.now > self.since + 0.5:
-            self.thing = self.thing + [0.0, 0.0, self.lifts]
+            self.object = self.object + [0.0, 0.0, self.lifts]
             self._to("aim")
         tip = SimpleNamespace(position=tuple(right.goal), reach="inside", offer=None)
         rigid = SimpleNamespace(position=tuple(left.goal), reach="inside", offer=None)
         targets = SimpleNamespace(tip=tip, rigid=rigid)
         intent = SimpleNamespace(mode=self.mode, notice="", targets=targets, rays=(tuple(left.goal), tuple(right.goal)))
-        view = View(self.now, intent, self.thing, right.goal, None, World("w"))  # type: ignore[arg-type]
+        view = View(self.now, intent, self.object, right.goal, None, World("w"))  # type: ignore[arg-type]
         if self.mode == "ready":
-            view.previewed, view.probability = self.thing + self._of(self.tips), self._of(self.states)
+            view.previewed, view.probability = self.object + self._of(self.tips), self._of(self.states)
             offered = self._of(self.offers)
             view.offer = None if offered is None else SimpleNamespace(probability=offered)  # type: ignore[assignment]
         return view

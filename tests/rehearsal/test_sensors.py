@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rehearsal.robot.kernel import COLUMNS, JOINTS, THING, TIP, TIP_AXES, WOUND
+from rehearsal.robot.kernel import COLUMNS, JOINTS, OBJECT, TIP, TIP_AXES, WOUND
 from rehearsal.robot.sensors import Instruments, Sensors
 from trunkline.frames import wxyz_from_rotation
 
@@ -19,7 +19,7 @@ def row() -> np.ndarray:
     """What the robot keeps of an instant."""
     values = np.arange(COLUMNS, dtype=float) / COLUMNS
     values[TIP_AXES] = TURN.as_matrix().ravel()
-    values[THING] = [0.5, 0.1, 0.2, *wxyz_from_rotation(TURN)]
+    values[OBJECT] = [0.5, 0.1, 0.2, *wxyz_from_rotation(TURN)]
     return values
 
 
@@ -38,17 +38,17 @@ def read(**sensors: float) -> dict[str, np.ndarray]:
         "joints": values("joints") - truth[JOINTS],
         "wound": values("wound") - truth[WOUND],
         "tip": back.apply(values("tip") - instruments.shift) - truth[TIP],
-        "thing": back.apply(values("thing") - instruments.shift) - truth[THING][:3],
+        "object": back.apply(values("object") - instruments.shift) - truth[OBJECT][:3],
         "tip_turn": turned("tip_quaternion"),
-        "thing_turn": turned("thing_quaternion"),
+        "object_turn": turned("object_quaternion"),
     }
 
 
 @pytest.mark.parametrize(("sensor", "set_to", "noisy"), [
     ("joint_noise", 1e-3, {"joints": 1e-3}),
     ("wound_noise_mm", 0.5, {"wound": 5e-4}),
-    ("position_noise_mm", 0.3, {"tip": 3e-4, "thing": 3e-4}),
-    ("orientation_noise_deg", 0.3, {"tip_turn": np.radians(0.3), "thing_turn": np.radians(0.3)}),
+    ("position_noise_mm", 0.3, {"tip": 3e-4, "object": 3e-4}),
+    ("orientation_noise_deg", 0.3, {"tip_turn": np.radians(0.3), "object_turn": np.radians(0.3)}),
     ("alignment_mm", 30.0, {}),
     ("alignment_deg", 20.0, {}),
 ])  # fmt: skip

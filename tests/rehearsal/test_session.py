@@ -17,7 +17,7 @@ from tests.ar.teleop.test_plan import BENT, LIMITS, NETWORK, OFFSET, START, STRA
 from tests.support.operator import PACKAGE, Everywhere, config
 from trunkline.ar.hybrid.rollout_batch import Stated
 from trunkline.ar.preview.grasp_preview import GraspPreviewer
-from trunkline.ar.session.robot import DEAD_MAN
+from trunkline.ar.session.robot_process import DEAD_MAN
 from trunkline.ar.teleop.executor import BRAKE
 from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.messages import ExecutorReport, World
@@ -27,7 +27,7 @@ from trunkline.ar.teleop.rigid_ik import RigidIK
 from trunkline.ar.teleop.trajectory import JOINTS, gentle
 from trunkline.errors import InputError
 
-THING = np.array([0.6, 0.1, 0.1])
+OBJECT = np.array([0.6, 0.1, 0.1])
 PREDICTION = SimpleNamespace(
     preview=SimpleNamespace(
         stated=Stated(np.zeros(1), np.zeros((1, 3)), np.zeros(1)), interval=None, probability=None, samples=()
@@ -62,8 +62,8 @@ class Sent:
     def readings(self):
         none = np.full(4, np.nan)
         return SimpleNamespace(
-            joints=self.joints[0], wound=np.zeros(3), tip=np.zeros(3), tip_quaternion=none, thing=none[:3],
-            thing_quaternion=none,
+            joints=self.joints[0], wound=np.zeros(3), tip=np.zeros(3), tip_quaternion=none, object=none[:3],
+            object_quaternion=none,
         )  # fmt: skip
 
     def links(self):
@@ -86,7 +86,7 @@ def session(off: list[float]) -> tuple[Session, Operator]:
     left, right = (RayHand(origin, REFERENCE, person, 0.15, rng) for origin in ORIGINS)
     operator = Operator(person, (left, right), BENT, 0.03, 0.03, rng)
     previewer = GraspPreviewer(None, {}, settings.previewing())  # type: ignore[arg-type]
-    made = Session(Arc(off), config(), Sent(), (left, right), World("world"), lambda now: THING, previewer)  # type: ignore[arg-type]
+    made = Session(Arc(off), config(), Sent(), (left, right), World("world"), lambda now: OBJECT, previewer)  # type: ignore[arg-type]
     return made, operator
 
 
@@ -103,7 +103,7 @@ def test_the_robot_moves_only_after_a_preview_on_the_object_was_confirmed(off):
     first = next(view.now for view in views if view.intent.motion != "hold")
     assert first == next(view.now for view in views if view.intent.mode == "execute")
     np.testing.assert_allclose(made.robot.joints[0], made.controller.plan.joints[-1], atol=1e-9)
-    assert np.linalg.norm(np.array(views[-1].intent.targets.tip.position) + [0.0, 0.0, beside] - THING) < 0.05
+    assert np.linalg.norm(np.array(views[-1].intent.targets.tip.position) + [0.0, 0.0, beside] - OBJECT) < 0.05
 
 
 def test_an_operator_without_a_preview_on_the_object_never_moves_the_robot():
@@ -119,8 +119,8 @@ def test_an_operator_without_a_preview_on_the_object_never_moves_the_robot():
 def test_following_moves_the_robot_until_the_path_is_over():
     made, operator = session([])
     begun = []
-    script = operator.follow(begin=begun.append, finished=lambda now: now > begun[0] + 2.0, place=lambda now: THING)
-    made.robot.truth = lambda: SimpleNamespace(tip=THING)
+    script = operator.follow(begin=begun.append, finished=lambda now: now > begun[0] + 2.0, place=lambda now: OBJECT)
+    made.robot.truth = lambda: SimpleNamespace(tip=OBJECT)
     ending, frames, views = rehearse(made, script)
     assert ending.done
     assert views[-1].intent.mode == "follow"
@@ -163,7 +163,7 @@ def test_tip_and_object_are_seen_with_the_whole_error_of_the_alignment(ran):
     turn, shift = made.robot.instruments.turn, made.robot.instruments.shift
     tip = turn.apply([0.5, 0.2, 0.4]) + shift
     np.testing.assert_allclose([view.tip for view in views], [tip] * len(views))
-    np.testing.assert_allclose([view.thing for view in views], [turn.apply(THING) + shift] * len(views))
+    np.testing.assert_allclose([view.object for view in views], [turn.apply(OBJECT) + shift] * len(views))
     assert len(made.tips) > 0
     np.testing.assert_allclose([place for _, place in made.tips], [tip] * len(made.tips))
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rehearsal.robot.scene import Object, Scene
+from rehearsal.robot.scene import Scene, SceneObject
 from rehearsal.robot.stand_in import TICK, StandInRobot
 from tests.rehearsal.arm import settings, stranger
 from trunkline.errors import InputError
 
 READY = np.array([0.0, -0.2, 0.0, -1.9, 0.0, 1.7, 0.785])
-SCENE = Scene(None, Object("cylinder", 0.05, 0.12, 0.1, [0.62, 0.05, 0.3], hanging=True), {}, [0.62, 0.05, 0.5])
+SCENE = Scene(None, SceneObject("cylinder", 0.05, 0.12, 0.1, [0.62, 0.05, 0.3], hanging=True), {}, [0.62, 0.05, 0.5])
 EXACT = {"joint_noise": 0.0, "wound_noise_mm": 0.0, "position_noise_mm": 0.0, "orientation_noise_deg": 0.0}
 
 
@@ -74,7 +74,7 @@ def wave(stand_in: StandInRobot) -> tuple[list, list]:
 
 def test_the_same_seed_gives_the_same_bytes_and_another_does_not():
     first, second, third = (wave(robot(seed))[0][-1] for seed in (1, 1, 2))
-    for name in ("joints", "wound", "tip", "tip_quaternion", "thing", "thing_quaternion"):
+    for name in ("joints", "wound", "tip", "tip_quaternion", "object", "object_quaternion"):
         assert getattr(first, name).tobytes() == getattr(second, name).tobytes()
         assert getattr(first, name).tobytes() != getattr(third, name).tobytes()
 
@@ -96,4 +96,4 @@ def test_half_the_step_moves_tip_and_object_by_little():
     whole, half = (wave(robot(substeps=substeps))[1] for substeps in (6, 12))
     moved = np.linalg.norm(whole[-1].tip - whole[0].tip)
     assert np.linalg.norm(whole[-1].tip - half[-1].tip) < 0.01 * moved
-    assert np.linalg.norm(whole[-1].thing - half[-1].thing) < 1e-4
+    assert np.linalg.norm(whole[-1].object - half[-1].object) < 1e-4

@@ -13,14 +13,15 @@ from trunkline.ar.hybrid.rollout_batch import joined
 from trunkline.ar.hybrid.rollouts import CommandTrajectory, rollouts
 from trunkline.ar.hybrid.uncertainty import GraspUncertainty, nominal_sample
 from trunkline.ar.preview.preview_twin import RobotModel, compose_twin
-from trunkline.ar.teleop.messages import Box, Thing, World
+from trunkline.ar.teleop.messages import Obstacle, World, WorldObject
 from trunkline.kinematics.panda.kinematics import mount_pose
 from trunkline.kinematics.panda.mounts import PandaRobot
 from trunkline.model.arm.spiral import spiral_chain
 
 READY = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])
-BASKET = Thing("the basket", "basket", 0.03, 0.06, 0.2, (0.5, 0.4, 0.05), support="standing")
-WORLD = World("w", (Box("floor", (-3, -3, -2), (3, 3, -0.75)), Box("stand", (0.4, 0.3, -0.03), (0.6, 0.5, 0.0))))
+BASKET = WorldObject("the basket", "basket", 0.03, 0.06, 0.2, (0.5, 0.4, 0.05), support="standing")
+STAND = Obstacle("stand", (0.4, 0.3, -0.03), (0.6, 0.5, 0.0))
+WORLD = World("w", (Obstacle("floor", (-3, -3, -2), (3, 3, -0.75)), STAND))
 
 
 @pytest.fixture(scope="module")
@@ -31,10 +32,10 @@ def world_model() -> RobotModel:
     return RobotModel(arm, GraspUncertainty(), robot)
 
 
-def composed(world_model: RobotModel, thing: Thing, lean: Rotation, left=None):
+def composed(world_model: RobotModel, object: WorldObject, lean: Rotation, left=None):
     arm = world_model.arm.copy().compile()
     straight = arm.tendon_length0[arm.actuator_trnid[:, 0]]
-    return compose_twin(world_model, WORLD, thing, READY, straight, settings.previewing(), lean, left), straight
+    return compose_twin(world_model, WORLD, object, READY, straight, settings.previewing(), lean, left), straight
 
 
 def tip_of(twin, world_model: RobotModel) -> np.ndarray:
@@ -61,11 +62,11 @@ def test_what_stands_stays_where_it_is_seen(world_model, high):
     """On a board that the client takes for higher or lower than it is; its bar seen not quite level."""
     x, y, _ = BASKET.position
     turn = Rotation.from_euler("zx", [0.3, 0.005]).as_quat(scalar_first=True)
-    thing = replace(BASKET, position=(x, y, BASKET.position[2] + high), quaternion=tuple(map(float, turn)))
-    twin, straight = composed(world_model, thing, Rotation.identity())
+    object = replace(BASKET, position=(x, y, BASKET.position[2] + high), quaternion=tuple(map(float, turn)))
+    twin, straight = composed(world_model, object, Rotation.identity())
     way = CommandTrajectory(0.1, np.tile(READY, (6, 1)), np.tile(straight, (6, 1)))
     motion = joined(list(rollouts(twin, way, nominal_sample())))
-    assert np.abs(motion.object[0, :, :3] - thing.position).max() < 1e-3
+    assert np.abs(motion.object[0, :, :3] - object.position).max() < 1e-3
     upright = Rotation.from_quat(motion.object[0, -1, 3:], scalar_first=True).as_matrix()[2, 2]
     assert upright > 1 - 1e-5
 

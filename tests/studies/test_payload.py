@@ -57,7 +57,7 @@ def test_a_table_sinks_along_gravity(model):
 
 
 def tried(dropped=0.0, further=0.0) -> Tried:
-    """A grasp of which the thing came `dropped` m down and `further` m from the arm since it was let go in row 2."""
+    """A grasp of which the object came `dropped` m down and `further` m from the arm since it was let go in row 2."""
     path, distance = np.zeros((1, 5, 3)), np.full((1, 5), 0.03)
     path[0, -1, 2], distance[0, -1] = -dropped, 0.03 + further
     path[0, :2], distance[0, :2] = 1.0, 1.0  # before it was let go: nobody asks

@@ -29,7 +29,7 @@ from trunkline.ar.session.previewer import (
     PreviewBegun,
     PreviewPiece,
 )
-from trunkline.ar.session.robot import RobotState
+from trunkline.ar.session.robot_process import RobotState
 from trunkline.ar.session.server import Composition, Server
 from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.teleop.core import Teleoperation

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from trunkline.ar.teleop.config import TeleoperationConfig
 from trunkline.ar.teleop.core import Teleoperation
-from trunkline.ar.teleop.messages import Box, Controller, Input, Pose, World
+from trunkline.ar.teleop.messages import Controller, Input, Obstacle, Pose, World
 from trunkline.ar.teleop.reach import Reading
 from trunkline.ar.teleop.recorder import Recorder
 from trunkline.frames import wxyz_from_rotation
@@ -61,4 +61,4 @@ class Operator(Recorder):
         super().__init__(Teleoperation(settings, reach or Everywhere(), PACKAGE, 0.05), core_input, DT)
 
 
-TABLE = Box("the table", (-2.0, -2.0, -1.0), (2.0, 2.0, 0.0))
+TABLE = Obstacle("the table", (-2.0, -2.0, -1.0), (2.0, 2.0, 0.0))

@@ -23,7 +23,7 @@ from trunkline.ar.preview.contents import network_of
 from trunkline.ar.preview.package import read_package
 from trunkline.ar.session.registration import after, expected_error, fit, inverse, pose_of, residuals, tilt
 from trunkline.ar.teleop.alignment import Aligned, wrist_of
-from trunkline.ar.teleop.messages import Box, Thing, World
+from trunkline.ar.teleop.messages import Obstacle, World, WorldObject
 from trunkline.ar.teleop.reach import MapReach
 from trunkline.ar.teleop.targets import bring, place
 from trunkline.ar.teleop.tendons import Network, bend
@@ -195,7 +195,7 @@ def more(files: dict[str, bytes]) -> dict[str, list]:
         "frames": [a_frame(rng) for _ in range(20)],
         "fit": [a_fit(rng, count) for count in (3, 3, 4, 6, 12) for _ in range(4)],
         "bend": bends(files, rng),
-        "things": [of_things(core, files, rng, in_arm) for in_arm in (False, True) for _ in range(8)],
+        "things": [of_objects(core, files, rng, in_arm) for in_arm in (False, True) for _ in range(8)],
         "reach": reaches(files, rng),
         "refusals": refusals(files),
     }
@@ -269,28 +269,28 @@ def reaches(files: dict[str, bytes], rng: np.random.Generator) -> list[dict]:
     return cases
 
 
-def of_things(core, files: dict[str, bytes], rng: np.random.Generator, in_arm: bool) -> dict:
-    """Targets where a thing is near: one that hangs is marked, one that is held is brought along."""
+def of_objects(core, files: dict[str, bytes], rng: np.random.Generator, in_arm: bool) -> dict:
+    """Targets where an object is near: one that hangs is marked, one that is held is brought along."""
     joints = tuple(float(angle) for angle in robot_of(files).ready)
     rigid, pointing, last = tuple(rng.uniform([0.3, -0.3, 0.3], [0.6, 0.3, 0.6]).tolist()), (0.0, 0.0, -1.0), None
     tip = add(rigid, tuple(rng.uniform([-0.2, -0.2, -0.4], [0.2, 0.2, -0.2]).tolist()))
     away = tuple(rng.uniform(-0.06, 0.06, 3).tolist())
     shapes = [("sphere", away), ("basket", add(away, (0.0, 0.0, -0.25)))]
     support = "held" if in_arm else "hanging"
-    things = tuple(
-        Thing(shape, shape, 0.03, 0.1, 0.2, add(tip, off), tuple(Rotation.random(random_state=number).as_quat()),
+    objects = tuple(
+        WorldObject(shape, shape, 0.03, 0.1, 0.2, add(tip, off), tuple(Rotation.random(random_state=number).as_quat()),
               support, Basket(0.1, 0.2, 0.25))
         for number, (shape, off) in enumerate(shapes)
     )  # fmt: skip
-    boxes = (Box("the shelf", add(tip, (-0.05,) * 3), add(tip, (0.0, 0.05, 0.05))),)
-    world, last = World("world", boxes, things), Aligned(0.0, 0, 0.0)
+    boxes = (Obstacle("the shelf", add(tip, (-0.05,) * 3), add(tip, (0.0, 0.05, 0.05))),)
+    world, last = World("world", boxes, objects), Aligned(0.0, 0, 0.0)
     wrist = wrist_of(joints, core.mount_offset)
     if in_arm:
-        result = bring(things[0], rigid, pointing, False, wrist, 1, world, core.reach)
+        result = bring(objects[0], rigid, pointing, False, wrist, 1, world, core.reach)
     else:
         result = place(rigid, tip, pointing, False, wrist, last, world, core.reach, core.settings)
     question = {"rigid": rigid, "tip": tip, "pointing": pointing, "joints": joints, "last": last._asdict(),
-                "boxes": [asdict(box) for box in boxes], "things": [asdict(thing) for thing in things]}  # fmt: skip
+                "boxes": [asdict(box) for box in boxes], "things": [asdict(object) for object in objects]}  # fmt: skip
     return case(question, TARGETS.dump_python(result, mode="json"))
 
 

@@ -8,7 +8,7 @@ from tests.ar.teleop.test_plan import START, STRAIGHT
 from tests.support.operator import PACKAGE, Operator
 from trunkline.ar.session.log_format import SIMULATED, LogFormat, Subject
 from trunkline.ar.session.log_writer import LogWriter
-from trunkline.ar.session.robot import RobotState
+from trunkline.ar.session.robot_process import RobotState
 from trunkline.ar.teleop.messages import (
     ExecutorReport,
     Intent,
@@ -16,8 +16,8 @@ from trunkline.ar.teleop.messages import (
     Request,
     Target,
     Targets,
-    Thing,
     World,
+    WorldObject,
 )
 
 ZERO = 1_700_000_000 * 10**9
@@ -26,11 +26,11 @@ PLACE = (0.0, 0.0, -0.1)  # m, of the tip in the arm's last body
 JOINTS = tuple(f"joint_{n}" for n in range(1, 8))
 TENDONS = ("tendon_1", "tendon_2", "tendon_3")
 SUBJECT = Subject(("base", "unit_01"), JOINTS, TENDONS, STRAIGHT, ("unit_01", PLACE))
-CUP = Thing("cup", "cylinder", 0.05, 0.1, 0.1, (0.7, 0.1, 0.2))
+CUP = WorldObject("cup", "cylinder", 0.05, 0.1, 0.1, (0.7, 0.1, 0.2))
 
 
-def targets(x: float, thing: str = "") -> Targets:
-    return Targets(Target((x, 0.1, 0.5)), Target((x, 0.1, 0.1)), (0.0, 0.0, -1.0), 0.25, 0, 0.0, thing=thing)
+def targets(x: float, object: str = "") -> Targets:
+    return Targets(Target((x, 0.1, 0.5)), Target((x, 0.1, 0.1)), (0.0, 0.0, -1.0), 0.25, 0, 0.0, object=object)
 
 
 def sent(at: float) -> tuple[np.ndarray, np.ndarray]:

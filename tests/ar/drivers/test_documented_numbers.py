@@ -12,6 +12,7 @@ from trunkline.ar.drivers import (
     driver_client,
     driver_host,
     gm6020,
+    hardware_robot,
     motors,
     ros_arm,
     setpoint_filter,
@@ -20,10 +21,9 @@ from trunkline.ar.drivers import (
     watchdog,
     winch,
 )
-from trunkline.ar.drivers import robot as machine
 from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.ar.drivers.winch import WinchSettings
-from trunkline.ar.session import auth, client, clock, follow, lease, log_writer, real, robot, server
+from trunkline.ar.session import auth, client, clock, follow, hardware_process, lease, log_writer, robot_process, server
 from trunkline.ar.session.settings import SessionConfig as Live
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.executor import BRAKE
@@ -38,24 +38,24 @@ ms, mm, Hz = 1e-3, 1e-3, 1.0
 FASTEST_CROSSOVER = next(part.le for part in WinchSettings.__annotations__["crossover"].__metadata__[0].metadata
                          if hasattr(part, "le"))  # fmt: skip
 PLANNED = TELEOP.motors.share * VELOCITY[1]  # rad/s
-DELAYED = machine.LEAD + (machine.SMOOTH - 1) * driver.TICK  # s that limbs are behind a plan
+DELAYED = hardware_robot.LEAD + (hardware_robot.SMOOTH - 1) * driver.TICK  # s that limbs are behind a plan
 
 # In the order of the page: a sentence with each figure in brackets, and what the code has, in the sentence's own units.
 # A row of a sentence that stands there twice holds both.
 FIGURES = {
     PAGE: [
-        (r"every ms it sends both limbs their setpoints for (30) ms later", [machine.LEAD / ms]),
-        (r"without a permit for (80) ms it slows", [robot.DEAD_MAN / ms]),
+        (r"every ms it sends both limbs their setpoints for (30) ms later", [hardware_robot.LEAD / ms]),
+        (r"without a permit for (80) ms it slows", [robot_process.DEAD_MAN / ms]),
         (r"run out \((30) ms\), do not come \((50) ms\) or are played late \((0\.3) s\)",
-         [machine.LEAD / ms, watchdog.SILENT / ms, setpoint_filter.BEHIND]),
+         [hardware_robot.LEAD / ms, watchdog.SILENT / ms, setpoint_filter.BEHIND]),
         (r"plays their setpoints, (1000) times a second", [1 / driver.TICK]),
         (r"or it is late itself \((50) ms\): the cables", [watchdog.SILENT / ms]),
         (r"A motor silent for (20) ms: no current", [motors.SILENT / ms]),
         (r"or it is late itself \((50) ms\), a point", [watchdog.SILENT / ms]),
-        (r"late by less than the (30) ms has no other effect", [machine.LEAD / ms]),
-        (r"again (30) ms ahead", [machine.LEAD / ms]),
+        (r"late by less than the (30) ms has no other effect", [hardware_robot.LEAD / ms]),
+        (r"again (30) ms ahead", [hardware_robot.LEAD / ms]),
         (r"silent for (0\.1) s, or ends, is a fault of the robot", [driver_client.SILENT]),
-        (r"no permit for (80) ms", [robot.DEAD_MAN / ms]),
+        (r"no permit for (80) ms", [robot_process.DEAD_MAN / ms]),
         (r"where the process is gone, for (0\.2) s, then no current", [driver_host.SETTLES]),
         (r"a joint (0\.05) rad off", [SET.arm.astray]),
         (r"a motor silent for (20) ms, too hot, or a cable (20) mm off", [motors.SILENT / ms, SET.motors.astray / mm]),
@@ -64,7 +64,7 @@ FIGURES = {
          [round(PLANNED, 2), round(PLANNED / (time_scaling.SHARE * ACCELERATION[1]), 2)]),
         (r"min\(1 / (0\.1) s, \((0\.95) a", [BRAKE, time_scaling.SHARE]),
         (r"is (39) ms behind that: (30) ms ahead of time, and two means over (10) ms",
-         [DELAYED / ms, machine.LEAD / ms, machine.SMOOTH * driver.TICK / ms]),
+         [DELAYED / ms, hardware_robot.LEAD / ms, hardware_robot.SMOOTH * driver.TICK / ms]),
         (r"Every (5) ms the robot's process moves towards", [time_scaling.STRIDE / ms]),
         (r"±(16384) = ±(3) A; feedback 0x204", [gm6020.FULL, gm6020.MOST_AMPERES]),
         (r"falls to 1 at (8) Hz: below", [SET.motors.reel.crossover / Hz]),
@@ -75,9 +75,9 @@ FIGURES = {
         (r"comes back to the plan within (0\.1) s with the least", [setpoint_filter.BRIDGED]),
         (r"one point every (10) ms", [ros_arm.PERIOD / ms]),
         (r"(0\.2) s of silence, or a joint (0\.1) rad off", [ros_arm.SILENT, SET.ros.astray]),
-        (r"at most (30) ms of the way ahead", [machine.LEAD / ms]),
+        (r"at most (30) ms of the way ahead", [hardware_robot.LEAD / ms]),
         (r"to within the (0\.1) rad", [SET.ros.astray]),
-        (r"is sent (0\.15) s behind", [real.DELAY]),
+        (r"is sent (0\.15) s behind", [hardware_process.DELAY]),
         (r"the motion begins (0\.5) s later", [CORE.delay]),
         (r"the next input, then (0\.1) s of braking", [BRAKE]),
         (r"(0\.12) s of silence \(`silence`\), (0\.1) s of a lost controller",
@@ -85,10 +85,10 @@ FIGURES = {
         (r"(0\.25) s, by its stamp or there and back", [clock.LATEST]),
         (r"sends nothing for (1) s", [lease.SILENCE]),
         (r"at once, or (1) s", [lease.SILENCE]),
-        (r"along the plan \| (0\.08) s \|", [robot.DEAD_MAN]),
-        (r"its process ends \| (0\.08) s \|", [robot.DEAD_MAN]),
+        (r"along the plan \| (0\.08) s \|", [robot_process.DEAD_MAN]),
+        (r"its process ends \| (0\.08) s \|", [robot_process.DEAD_MAN]),
         (r"the same as a stop \| (1) s \|", [follow.SILENT]),
-        (r"permits nothing \| (0\.15) s \|", [robot.STALE]),
+        (r"permits nothing \| (0\.15) s \|", [robot_process.STALE]),
         (r"as soon as a write fails; (1) s in which nothing", [LIVE.journal.period + log_writer.LATE]),
         (r"A token of (128) bits", [8 * auth.TOKEN_BYTES]),
         (r"valid for (2) minutes and (5) tries", [auth.CODE_SECONDS / 60, auth.CODE_TRIES]),

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 
 from tests.support.motors import TICK, homed, motor_settings
-from trunkline.ar.drivers import robot as machines
-from trunkline.ar.drivers import ros_arm
+from trunkline.ar.drivers import hardware_robot, ros_arm
 from trunkline.ar.drivers.driver import CONNECTING
 from trunkline.ar.drivers.gm6020 import MOST_AMPERES, Feedback, command_frames, commanded
+from trunkline.ar.drivers.hardware_robot import LEAD, HardwareRobot
 from trunkline.ar.drivers.motors import PRESENT, MotorGroup
 from trunkline.ar.drivers.motors import SILENT as UNHEARD
-from trunkline.ar.drivers.robot import LEAD, HardwareRobot
 from trunkline.ar.drivers.ros_arm import RosArm
 from trunkline.ar.drivers.setpoint_filter import ROUNDING
 from trunkline.ar.drivers.settings import ExecutionConfig
@@ -272,7 +271,8 @@ def test_a_fault_of_either_driver_is_the_robots_and_has_its_name(arm, motors, fa
 def waits(monkeypatch):
     """What is done while a machine waits for its limbs, one after the other."""
     done = []
-    monkeypatch.setattr(machines, "time", SimpleNamespace(sleep=lambda seconds: done.pop(0)(), monotonic=lambda: 100.0))
+    clock = SimpleNamespace(sleep=lambda seconds: done.pop(0)(), monotonic=lambda: 100.0)
+    monkeypatch.setattr(hardware_robot, "time", clock)
     return done
 
 

@@ -10,17 +10,17 @@ from trunkline.ar.hybrid.objects import GRIP, GraspObject, object_geoms
 from trunkline.ar.hybrid.worlds import SupportSurface, WorldGeometry
 from trunkline.frames import STANDARD_GRAVITY
 
-BASKET = GraspObject("basket", 0.03, 0.06, 0.2, "plastic", Basket(0.12, 0.16, 0.22))
+BASKET = GraspObject("basket", 0.03, 0.06, 0.2, "plastic", basket=Basket(0.12, 0.16, 0.22))
 TOP = [0.0, 0.0, 0.3]
 
 
-def world(thing: GraspObject, height: float, hook: str | None = None) -> mujoco.MjModel:
+def world(object: GraspObject, height: float, hook: str | None = None) -> mujoco.MjModel:
     spec = mujoco.MjSpec()
     spec.option.timestep, spec.option.integrator = 1 / 480, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.gravity = [0, 0, -STANDARD_GRAVITY]
     make_holding(spec)
     WorldGeometry(None, {"table": SupportSurface(TOP, [0.4, 0.4, 0.03], "wood")}, [0.0, 0.0, 1.2]).add_to(spec)
-    thing.add_to(spec, np.array([0.0, 0.0, height]), hook=hook)
+    object.add_to(spec, np.array([0.0, 0.0, height]), hook=hook)
     return spec.compile()
 
 
@@ -88,12 +88,12 @@ def test_rocking_on_an_edge_it_gains_no_energy():
 
 @pytest.mark.parametrize("shape", ["cylinder", "box", "sphere", "toy"])
 def test_other_objects_are_one_geom_wrapped_in_its_middle(shape):
-    thing = GraspObject(shape, 0.06, 0.1, 0.1, "plastic")
-    model = world(thing, 1.0)
+    object = GraspObject(shape, 0.06, 0.1, 0.1, "plastic")
+    model = world(object, 1.0)
     assert [model.geom(number).name for number in object_geoms(model)] == ["object_geom"]
-    np.testing.assert_array_equal(thing.grip, 0)
+    np.testing.assert_array_equal(object.grip, 0)
 
 
 def test_a_bar_that_touches_its_box_is_refused_by_name():
     with pytest.raises(ValueError, match=r"basket.rise: found 0.1 m, expected at least the bar's diameter, 0.2 m"):
-        GraspObject("basket", 0.2, 0.06, 0.2, "plastic", Basket(rise=0.1))
+        GraspObject("basket", 0.2, 0.06, 0.2, "plastic", basket=Basket(rise=0.1))

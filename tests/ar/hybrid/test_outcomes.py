@@ -1,4 +1,4 @@
-"""Things that rest on a board, and things that do not."""
+"""Objects that rest on a board, and objects that do not."""
 
 import mujoco
 import numpy as np
@@ -8,7 +8,7 @@ from trunkline.ar.hybrid.outcomes import LAST, STILL, RestCriterion
 from trunkline.ar.hybrid.rollouts import Piece
 
 TIME = np.linspace(0.0, 4.0, 81)
-# a thing that slides up to a unit of the arm, 0.1 m above
+# an object that slides up to a unit of the arm, 0.1 m above
 MODEL = mujoco.MjModel.from_xml_string("""
 <mujoco><worldbody>
   <geom size="0.02" pos="0 0 0.1" contype="2" conaffinity="10"/>

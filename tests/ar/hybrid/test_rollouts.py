@@ -136,10 +136,10 @@ def test_the_panda_stands_where_the_plan_says_and_follows_it(small):
 @pytest.fixture(scope="module")
 def grasping(small) -> tuple[ComposedTwin, CommandTrajectory]:
     """A cylinder that hangs beside the arm until it is let go."""
-    thing = GraspObject("cylinder", 0.03, 0.1, 0.02, "plastic")
+    object = GraspObject("cylinder", 0.03, 0.1, 0.02, "plastic")
     at, level = np.array([0.035, 0.0, -0.15]), (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0)
     world = WorldGeometry(None, {}, [0.035, 0.0, 0.0])
-    spec = compose(small, FixedMount("fixed"), world, Placed(thing, at, level, True))
+    spec = compose(small, FixedMount("fixed"), world, Placed(object, at, level, True))
     return ComposedTwin(spec.compile(), small.compile()), way_of(small.compile(), let_go=0.25)
 
 
@@ -174,9 +174,9 @@ def test_the_objects_place_and_friction_are_each_futures_own(grasping):
 @pytest.fixture(scope="module")
 def incline(small) -> tuple[ComposedTwin, CommandTrajectory]:
     """A box on a table, far from the arm, in a gravity so tilted that it slides if μ is less than believed."""
-    thing, top = GraspObject("box", 0.05, 0.03, 0.1, "plastic"), [0.0, 0.0, -0.5]
+    object, top = GraspObject("box", 0.05, 0.03, 0.1, "plastic"), [0.0, 0.0, -0.5]
     world = WorldGeometry(None, {"table": SupportSurface(top, [2.0, 2.0, 0.03], "wood")}, None)
-    spec = compose(small, FixedMount("fixed"), world, Placed(thing, np.array(top) + [0, 0, 0.015]))
+    spec = compose(small, FixedMount("fixed"), world, Placed(object, np.array(top) + [0, 0, 0.015]))
     model, angle = spec.compile(), np.arctan(TPU_ON["plastic"])
     model.opt.gravity[:] = STANDARD_GRAVITY * np.array([np.sin(angle), 0, -np.cos(angle)])
     return ComposedTwin(model, small.compile()), way_of(small.compile())
@@ -212,9 +212,9 @@ def contacts(model: mujoco.MjModel, geom: str, other: str) -> int:
 
 
 def test_a_unit_touches_what_hangs_in_one_point_and_a_table_bears_in_several(small):
-    thing = GraspObject("cylinder", 0.05, 0.03, 0.1, "plastic")
+    object = GraspObject("cylinder", 0.05, 0.03, 0.1, "plastic")
     world = WorldGeometry(None, {"table": SupportSurface([0.0, 0.0, -0.5], [2.0, 2.0, 0.03], "wood")}, None)
-    model = compose(small, FixedMount("fixed"), world, Placed(thing, np.array([0, 0, -0.4851]))).compile()
+    model = compose(small, FixedMount("fixed"), world, Placed(object, np.array([0, 0, -0.4851]))).compile()
     hung, stands = eased(model, True), eased(model, False)
     assert contacts(hung, "object_geom", "table") == 1 < 3 <= contacts(stands, "object_geom", "table")
     assert stands.opt.impratio == hung.opt.impratio < model.opt.impratio

@@ -12,12 +12,12 @@ from trunkline.ar.hybrid.uncertainty import GraspUncertainty
 from trunkline.ar.preview import grasp_preview
 from trunkline.ar.preview.grasp_preview import GraspPreviewer
 from trunkline.ar.session.settings import SessionConfig
-from trunkline.ar.teleop.messages import Thing, World
+from trunkline.ar.teleop.messages import World, WorldObject
 from trunkline.ar.teleop.plan import Plan
 from trunkline.pipeline.config import PROJECT, load_folder
 
 SETTINGS = replace(load_folder(SessionConfig, PROJECT / "conf/live").preview, sure=0.9, assistant=2, hold=1.0)
-CUP = Thing("the cup", "cylinder", 0.05, 0.1, 0.1, (0.6, 0.0, 0.2))
+CUP = WorldObject("the cup", "cylinder", 0.05, 0.1, 0.1, (0.6, 0.0, 0.2))
 MOUNT = (0.55, 0.0, 0.5)
 PLACES = np.array([[-0.04, 0.0, 0.32], [-0.06, 0.0, 0.3], [-0.03, 0.0, 0.3]])  # of the mount about the cup, m
 ROWS, STEP = 301, 0.01
@@ -60,7 +60,7 @@ def grasped(monkeypatch, probability, shares=(0.0, 0.0, 0.0), **settings):
     tried, grip = Tried(monkeypatch, probability, shares), Grip()
     robot_model = SimpleNamespace(uncertainty=GraspUncertainty(), lean=lambda hangs: None)
     made = GraspPreviewer(robot_model, {"hanging": grip}, replace(SETTINGS, **settings))
-    asked = replace(targets(MOUNT, CUP.position), thing=CUP.name)
+    asked = replace(targets(MOUNT, CUP.position), object=CUP.name)
     return list(made.grasp(PLAN, asked, CUP, World("world", (), (CUP,)), None, 7)), tried, grip
 
 
@@ -83,7 +83,7 @@ def test_only_what_holds_more_surely_is_offered(monkeypatch, probability, shares
     if place is None:
         assert last.offer is None
     else:
-        assert last.offer.thing == CUP.name
+        assert last.offer.object == CUP.name
         assert last.offer.probability == shares[place]
         assert last.offer.rigid == pytest.approx(tuple(np.array(CUP.position) + PLACES[place]))
         assert last.offer.pointing == (0.0, 0.0, -1.0)

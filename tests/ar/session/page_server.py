@@ -46,14 +46,14 @@ from trunkline.ar.session.previewer import (
     PreviewBegun,
     PreviewPiece,
 )
-from trunkline.ar.session.robot import RobotState
+from trunkline.ar.session.robot_process import RobotState
 from trunkline.ar.session.server import Composition, Server
 from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.teleop.alignment import base_quaternion
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.executor import SimulatedRobot
 from trunkline.ar.teleop.following import Following, sought
-from trunkline.ar.teleop.messages import Box, ExecutorReport, PlanReport, Targets, Thing
+from trunkline.ar.teleop.messages import ExecutorReport, Obstacle, PlanReport, Targets, WorldObject
 from trunkline.ar.teleop.planner import Planner
 from trunkline.ar.teleop.reach_message import Reading
 from trunkline.ar.teleop.rigid_ik import RigidIK
@@ -68,8 +68,8 @@ TICK = 0.005  # s
 PATIENCE = 5.0  # s for which a client may be silent
 CENTRE, REACH = (0.0, 0.0, 0.333), 0.85  # m, of the ball in which the mount can be
 AROUND, ALONG = 32, 10
-TABLE = Box("the table", (0.35, -0.5, -0.05), (0.95, 0.5, -0.02))
-CUP = Thing("the cup", "cylinder", 0.05, 0.12, 0.1, (0.65, 0.3, 0.04), support="standing")
+TABLE = Obstacle("the table", (0.35, -0.5, -0.05), (0.95, 0.5, -0.02))
+CUP = WorldObject("the cup", "cylinder", 0.05, 0.12, 0.1, (0.65, 0.3, 0.04), support="standing")
 
 
 class Balls:

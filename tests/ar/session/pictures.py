@@ -23,9 +23,9 @@ from PIL import Image
 
 from qualification.browser import Page, browsing
 from trunkline.ar.preview.package import only_package
-from trunkline.ar.session import lease, robot
+from trunkline.ar.session import lease, robot_process
 from trunkline.ar.session.previewer import Answer, FollowRequest, Order, Previewer
-from trunkline.ar.session.session import Address, opened
+from trunkline.ar.session.serving import Address, opened
 from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.messages import Mode
@@ -193,7 +193,7 @@ async def session(package: Path) -> dict[Mode, bytes]:
     config, teleop = load_folder(SessionConfig, PROJECT / "conf/live"), load_folder(Teleop, PROJECT / "conf/teleop")
     safety = replace(teleop.core.safety, silence=SILENCE, plan_wait=PATIENCE)
     teleop = replace(teleop, core=replace(teleop.core, safety=safety))
-    lease.SILENCE, robot.STALE = SILENCE, STALE
+    lease.SILENCE, robot_process.STALE = SILENCE, STALE
     with tempfile.TemporaryDirectory() as logs:
         config = replace(config, journal=replace(config.journal, folder=logs))
         async with opened(package, ADDRESS, lambda line: None, config=config, teleop=teleop) as (server, made):

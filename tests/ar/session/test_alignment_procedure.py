@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.ar.session.test_session import asked, grips
+from tests.ar.session.test_serving import asked, grips
 from tests.ar.teleop.test_plan import START
 from tests.ar.teleop.test_plan import TIP as TARGET
 from tests.support.live import Hands, controlling, hand, laid, live

@@ -20,16 +20,17 @@ from trunkline.ar.session.controller_input import controllers
 from trunkline.ar.session.follow import SILENT
 from trunkline.ar.session.log_writer import LogWriter
 from trunkline.ar.session.previewer import InlinePreviewer, PlanAnswer, PredictionAnswer, PreviewBegun, PreviewPiece
-from trunkline.ar.session.robot import RobotState
+from trunkline.ar.session.robot_process import RobotState
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.executor import FOLLOWS, SimulatedRobot
-from trunkline.ar.teleop.messages import Box, Controller, ExecutorReport, Intent, PlanReport, Pose
+from trunkline.ar.teleop.messages import Controller, ExecutorReport, Intent, Obstacle, PlanReport, Pose
 from trunkline.ar.teleop.plan import Plan
 
 DT, IDENTITY = 1 / 72, (1.0, 0.0, 0.0, 0.0)
 BASE = Pose((0.0, 0.0, 0.0), IDENTITY)
 UP = np.array([0.0, 0.0, 0.6])  # from a ray's end to the hand
 DIGEST = "d" * 64
+CUBE = Obstacle("b", (9.0,) * 3, (9.1,) * 3)
 NOTHING = np.full(7, np.nan)
 TRACKED = ("left_tracked", "right_tracked", "visible")
 
@@ -503,7 +504,7 @@ WAYS = {
                           "robot: it is not sure; stopped"),
     "the log is full": (lambda s: setattr(s.controller.log_writer, "fault", "log: full"), "stopped",
                         "robot: log: full; stopped"),
-    "the world changed": (lambda s: setattr(s.controller, "world", make_world((Box("b", (9.0,) * 3, (9.1,) * 3),))),
+    "the world changed": (lambda s: setattr(s.controller, "world", make_world((CUBE,))),
                           "hold",
                           "world changed; the plan is void"),
     "it rested by itself": (rested, "stopped", "robot: it has come to rest by itself; stopped"),

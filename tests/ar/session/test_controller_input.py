@@ -17,11 +17,11 @@ from trunkline.ar.session.controller_input import (
     stops,
 )
 from trunkline.ar.session.previewer import Order, _held_object
-from trunkline.ar.teleop.messages import Thing
+from trunkline.ar.teleop.messages import WorldObject
 
 NEAR = 1e-6
 BOTH = ("left_tracked", "right_tracked", "visible")
-CUP = Thing("the cup", "cylinder", 0.05, 0.1, 0.1, (0.6, 0.0, 0.2))
+CUP = WorldObject("the cup", "cylinder", 0.05, 0.1, 0.1, (0.6, 0.0, 0.2))
 
 
 def row(**values):
@@ -83,7 +83,7 @@ def test_what_is_no_pose_is_left_for_the_core_to_refuse_and_touches_nothing(name
     [("held", True, True), ("held", False, False), ("hanging", True, False), ("standing", True, False)],
 )
 def test_a_thing_is_brought_where_it_is_meant_and_in_the_arm(support, named, is_held):
-    thing = Thing("the cup", "cylinder", 0.05, 0.1, 0.1, CUP.position, support=support)
-    targets = SimpleNamespace(thing="the cup" if named else "")
-    order = Order(SimpleNamespace(targets=targets), make_world((), (thing,)), np.zeros(7), np.zeros(3))
+    object = WorldObject("the cup", "cylinder", 0.05, 0.1, 0.1, CUP.position, support=support)
+    targets = SimpleNamespace(object="the cup" if named else "")
+    order = Order(SimpleNamespace(targets=targets), make_world((), (object,)), np.zeros(7), np.zeros(3))
     assert (_held_object(order) is not None) == is_held

@@ -7,7 +7,7 @@ from tests.ar.session.test_log import SUBJECT, Written
 from tests.ar.teleop.test_plan import START, STRAIGHT
 from trunkline.ar.session.decimation import AFTER, BEFORE, SELDOM, STILL, LogDecimation
 from trunkline.ar.session.log_format import JOINTS_SENT, POSES
-from trunkline.ar.session.robot import RobotState
+from trunkline.ar.session.robot_process import RobotState
 from trunkline.recordings.logs.joint_stream import joint_stream
 from trunkline.recordings.logs.log import read_log
 
@@ -20,7 +20,7 @@ def at(time, noise, speed):
     """It rests but for noise, moves at once at `speed`, m/s, and rests again."""
     poses = np.tile([0.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0], (3, 1))
     poses[:, 0] = speed * np.clip(time - MOVES, 0.0, STOPS - MOVES)
-    poses[0] = np.nan  # a thing that is not there
+    poses[0] = np.nan  # an object that is not there
     return RobotState(time, 0.0, START, STRAIGHT, NOTHING, poses + noise, NOTHING, None)
 
 
@@ -64,7 +64,7 @@ def test_what_is_sent_moves_a_robot_however_little_and_what_appears_does():
         for robot in rests:
             resting.take(robot, robot.time)
         last = rests[-1]
-        fields = {name: getattr(last, name) for name in ("joints", "commands", "thing", "bodies", "measured")} | change
+        fields = {name: getattr(last, name) for name in ("joints", "commands", "object", "bodies", "measured")} | change
         rows = resting.take(RobotState(MOVES, 0.0, **fields), MOVES)
         assert bool(rows and rows[-1][0].time == MOVES) == bool(change), change
 

@@ -8,7 +8,7 @@ from contextlib import suppress
 import pytest
 from aiohttp import WSServerHandshakeError
 
-from tests.ar.session.test_session import asked, executing, grips
+from tests.ar.session.test_serving import asked, executing, grips
 from tests.ar.teleop.test_plan import MOUNT, TIP
 from tests.support.live import TOKEN, Hands, controlling, hand, laid
 from trunkline.ar.session.auth import CODE_SECONDS, HEADERS, Origins, PairingCode

@@ -18,8 +18,8 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 from mcap_ros2.decoder import DecoderFactory
 
-from tests.ar.session.test_robot import simulation
-from tests.ar.session.test_session import asked, executing, grips
+from tests.ar.session.test_robot_process import simulation
+from tests.ar.session.test_serving import asked, executing, grips
 from tests.ar.teleop.test_plan import MOUNT, OFFSET, START, STRAIGHT, TIP
 from tests.support.disks import filling, full, stuck
 from tests.support.live import BODIES, RATE, controlling, hand, laid, patient
@@ -36,7 +36,7 @@ from trunkline.ar.session.hardware import hardware_of
 from trunkline.ar.session.log_format import EVENTS, POSES, TWIN, LogFormat, Subject
 from trunkline.ar.session.log_reader import read_session_log
 from trunkline.ar.session.log_writer import LogWriter, LogWriterProcess, new_path
-from trunkline.ar.session.robot import RobotState
+from trunkline.ar.session.robot_process import RobotState
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.messages import Input, Pose, from_json, to_json
 from trunkline.errors import InputError

@@ -9,12 +9,11 @@ from multiprocessing.context import SpawnContext
 import numpy as np
 import pytest
 
-from tests.ar.session.test_robot import Still
+from tests.ar.session.test_robot_process import Still
 from tests.ar.teleop.test_plan import START, STRAIGHT
 from tests.support.operator import PACKAGE, config
-from trunkline.ar.session import robot as robot_module
-from trunkline.ar.session import simulated
-from trunkline.ar.session.robot import (
+from trunkline.ar.session import robot_process, simulated
+from trunkline.ar.session.robot_process import (
     DEAD_MAN,
     HOLD_TIME,
     LOOKS,
@@ -248,7 +247,7 @@ class There:
 @pytest.fixture
 def clock(monkeypatch):
     made = Clock()
-    monkeypatch.setattr(robot_module, "time", made)
+    monkeypatch.setattr(robot_process, "time", made)
     return made
 
 
@@ -365,4 +364,4 @@ def test_a_process_is_ended_once_its_robot_rests_or_has_not_for_too_long(robot, 
     robot.close()
     assert robot.channel.asked[STOPS] == 1
     assert robot._process.ended
-    assert clock.now - BEGINS == pytest.approx(0.1 if comes_to_rest else robot_module.RESTING, abs=2 * LOOKS)
+    assert clock.now - BEGINS == pytest.approx(0.1 if comes_to_rest else robot_process.RESTING, abs=2 * LOOKS)

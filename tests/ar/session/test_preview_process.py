@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tests.ar.session.test_robot import simulation
+from tests.ar.session.test_robot_process import simulation
 from tests.ar.teleop.test_plan import LIMITS, MOUNT, NETWORK, OFFSET, TIP, request
 from tests.support.operator import config
 from tests.support.small_arm import small_spec
@@ -32,7 +32,7 @@ from trunkline.ar.session.previewer import (
 )
 from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.teleop.grasping import Grasping
-from trunkline.ar.teleop.messages import Box, Target, Thing
+from trunkline.ar.teleop.messages import Obstacle, Target, WorldObject
 from trunkline.ar.teleop.object_shapes import below_grip
 from trunkline.ar.teleop.planner import Planner
 from trunkline.ar.teleop.rigid_ik import RigidIK
@@ -59,11 +59,11 @@ def made() -> PreviewPlanner:
     return PreviewPlanner(planner, GraspPreviewer(robot_model, grips, replace(live.preview, futures=FUTURES)), s.bodies)
 
 
-def order(serial=1, thing="", tip=TIP) -> Order:
+def order(serial=1, object="", tip=TIP) -> Order:
     s, asked = simulation(), request(MOUNT, tip)
-    things = (Thing(thing, "cylinder", 0.045, 0.12, 0.1, TIP),) if thing else ()
-    targets = replace(asked.targets, thing=thing)
-    return Order(replace(asked, serial=serial, targets=targets), make_world((), things), s.joints, s.commands)
+    objects = (WorldObject(object, "cylinder", 0.045, 0.12, 0.1, TIP),) if object else ()
+    targets = replace(asked.targets, object=object)
+    return Order(replace(asked, serial=serial, targets=targets), make_world((), objects), s.joints, s.commands)
 
 
 def test_a_plan_then_its_preview_in_pieces_then_the_batch():
@@ -114,10 +114,10 @@ def test_what_is_held_is_seen_in_the_arm_and_brought_to_rest_or_not():
     """As the grasp before it left it; without one, nobody knows how the arm holds it."""
     made_once, grasped = made(), order(8, "the cylinder")
     list(made_once.answers(grasped))
-    held_object = replace(grasped.world.things[0], support="held")
+    held_object = replace(grasped.world.objects[0], support="held")
     lower, tip = ((x, y, z - 0.2) for x, y, z in (MOUNT, TIP))
     targets = replace(grasped.request.targets, rigid=Target(lower), tip=Target(tip))
-    floor = Box("the floor", (-3.0, -3.0, -1.0), (3.0, 3.0, tip[2] - below_grip(held_object) - 0.02))
+    floor = Obstacle("the floor", (-3.0, -3.0, -1.0), (3.0, 3.0, tip[2] - below_grip(held_object) - 0.02))
     planner = made_once.planner
     plan = planner.plan(grasped.request, grasped.world, grasped.joints, grasped.commands)
     brought = Order(

@@ -15,13 +15,13 @@ from trunkline.ar.session.log_format import LogFormat
 from trunkline.ar.session.log_reader import read_session_log
 from trunkline.ar.session.log_writer import LogWriter
 from trunkline.ar.session.preview_validation import Execution, _end, _grasped, _holds, executions, lines, main
-from trunkline.ar.session.robot import RobotState
-from trunkline.ar.teleop.messages import ExecutorReport, Intent, Thing
+from trunkline.ar.session.robot_process import RobotState
+from trunkline.ar.teleop.messages import ExecutorReport, Intent, WorldObject
 from trunkline.kinematics.panda.kinematics import joint_frames, mount_pose
 
 DIGEST, BEGIN, DELAY, OFF, LASTS, STEP = "d" * 64, 100.0, 0.04, 0.002, 2.0, 0.02
 OFF_JOINT = 0.003 * np.eye(7)[3]  # rad, by which a real robot is elsewhere than previewed: across its way
-CUP = Thing("the cup", "cylinder", 0.05, 0.1, 0.1, (0.6, 0.0, 0.2))
+CUP = WorldObject("the cup", "cylinder", 0.05, 0.1, 0.1, (0.6, 0.0, 0.2))
 
 
 def place(time):
@@ -87,8 +87,8 @@ def recorded(path, probability=0.8, grasped=True, end=None, spread=0.01, measure
         if end is None:
             log_writer.event("robot", robot=ExecutorReport("done", DIGEST))
             if grasped:
-                thing = Thing("the cup", "cylinder", 0.05, 0.1, 0.1, (0.6, 0.0, 0.4), support="held")
-                log_writer.event("world", world=make_world((), (thing,)))
+                object = WorldObject("the cup", "cylinder", 0.05, 0.1, 0.1, (0.6, 0.0, 0.4), support="held")
+                log_writer.event("world", world=make_world((), (object,)))
         log_writer.settle()
         log_writer.book.finish()
     return path

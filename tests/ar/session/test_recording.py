@@ -13,7 +13,7 @@ from tests.ar.teleop.test_plan import START, STRAIGHT
 from tests.support.operator import Operator
 from trunkline.ar.session import binary, recording
 from trunkline.ar.session.log_reader import read_session_log
-from trunkline.ar.session.robot import RobotState
+from trunkline.ar.session.robot_process import RobotState
 from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT
 

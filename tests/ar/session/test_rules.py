@@ -1,4 +1,4 @@
-"""Clock, lease, outbox and certificate by themselves: their rules, for every order in which things may come."""
+"""Clock, lease, outbox and certificate by themselves: their rules, for every order in which objects may come."""
 
 import asyncio
 import ssl
@@ -13,7 +13,7 @@ from tests.support.links import clock_error
 from trunkline.ar.session.__main__ import parsed
 from trunkline.ar.session.auth import CODE_SECONDS, CODE_TRIES, PairingCode
 from trunkline.ar.session.clock import FORWARD, JUMP, LATEST, PINGS, ClientClock
-from trunkline.ar.session.lease import SILENCE, Control
+from trunkline.ar.session.lease import SILENCE, ControlLease
 from trunkline.ar.session.outbox import MOST_MESSAGES, WINDOW, Outbox
 from trunkline.ar.session.tls import fingerprint, make_certificate, tls_context
 from trunkline.errors import InputError
@@ -93,11 +93,11 @@ def test_before_a_round_is_over_no_input_counts():
 @pytest.mark.parametrize(("silent", "ends"), [(SILENCE - NEAR, False), (SILENCE + NEAR, True)])
 def test_a_lease_ends_by_its_holders_silence_alone(silent, ends):
     """Counted from its last input, or from when the lease began; of nobody's nothing ends."""
-    control = Control()
+    control = ControlLease()
     assert not control.silent(1e9)
     control.ask("a", 100.0)
     assert control.silent(100.0 + silent) == ends
-    control = Control()
+    control = ControlLease()
     control.ask("a", 90.0)
     assert control.hear("a", 100.0)
     assert not control.hear("b", 105.0)
@@ -131,7 +131,7 @@ STEP = st.tuples(
 
 @given(st.lists(STEP, max_size=40))
 def test_one_controls_and_none_without_having_asked_or_been_given_it(steps):
-    control, now, entitled = Control(), 0.0, set()
+    control, now, entitled = ControlLease(), 0.0, set()
     for action, client, other in steps:
         before = control.holder
         if action == "ask":

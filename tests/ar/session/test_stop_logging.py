@@ -10,7 +10,7 @@ from tests.ar.session.test_controller import DIGEST, PACKAGE, STRAIGHT, ToldRobo
 from tests.ar.session.test_permits import FOLLOWING, LIMITS, Played, plan_of
 from trunkline.ar.session import messages
 from trunkline.ar.session.previewer import FollowAnswer, PlanAnswer, PredictionAnswer, PreviewBegun, PreviewPiece
-from trunkline.ar.session.robot import DEAD_MAN, HOLD_TIME, MODE, MODES, READY, SERIAL, STOPS, Goal
+from trunkline.ar.session.robot_process import DEAD_MAN, HOLD_TIME, MODE, MODES, READY, SERIAL, STOPS, Goal
 from trunkline.ar.teleop.executor import FOLLOWS
 from trunkline.ar.teleop.messages import ExecutorReport, PlanReport
 from trunkline.ar.teleop.plan import Plan

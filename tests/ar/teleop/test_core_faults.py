@@ -6,7 +6,7 @@ import pytest
 
 from tests.support.operator import TABLE, Operator
 from trunkline.ar.teleop.core import WATCHING
-from trunkline.ar.teleop.messages import Box, World
+from trunkline.ar.teleop.messages import Obstacle, World
 from trunkline.ar.teleop.recorder import FAULTS
 from trunkline.ar.teleop.transitions import MODES
 
@@ -134,7 +134,7 @@ def test_targets_in_a_table_are_named_and_no_plan_is_asked_for():
     operator = Operator()
     operator.wait(0.5, world=World("table", (TABLE,)))
     intent = operator.wait(0.3, left={"grip": True}, right={"grip": True, "position": (0.3, -1.05, 0.0)})
-    assert (intent.targets.tip.reach, intent.targets.tip.solid) == ("blocked", "the table")
+    assert (intent.targets.tip.reach, intent.targets.tip.obstacle) == ("blocked", "the table")
     intent = operator.step(right={"trigger": True})
     assert (intent.mode, intent.request) == ("aim", None)
     assert intent.notice == "tip target is inside the table"
@@ -161,7 +161,7 @@ def test_a_target_around_which_a_solid_comes_just_before_the_trigger_is_no_targe
     operator = Operator()
     operator.wait(0.5)
     x, y, z = operator.wait(0.3, left={"grip": True}, right={"grip": True}).targets.tip.position
-    table = Box("the table", (x - 0.1, y - 0.1, z - 0.1), (x + 0.1, y + 0.1, z + 0.1))
+    table = Obstacle("the table", (x - 0.1, y - 0.1, z - 0.1), (x + 0.1, y + 0.1, z + 0.1))
     operator.step(world=World("a table was moved there", (table,)))
     intent = operator.step(right={"trigger": True})
     assert intent.mode == "aim"

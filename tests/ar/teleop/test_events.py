@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from tests.support.operator import REFERENCE, Operator, config
-from trunkline.ar.teleop.events import answered, changed_since, happened, refusal, takes_offer
+from trunkline.ar.teleop.events import answered, changed_since, detect_events, refusal, takes_offer
 from trunkline.ar.teleop.messages import (
     Controller,
     ExecutorReport,
@@ -27,7 +27,7 @@ from trunkline.ar.teleop.vectors import DOWN
 
 SETTINGS, PACKAGE, WORLD = config().core, "a" * 64, World("world")
 NEAR, FORWARD = 1e-6, (1.0, 0.0, 0.0, 0.0)
-TARGETS = Targets(Target((0.5, 0.0, 0.5)), Target((0.6, 0.0, 0.2)), DOWN, 0.0, 0, 0.0, thing="the cup")
+TARGETS = Targets(Target((0.5, 0.0, 0.5)), Target((0.6, 0.0, 0.2)), DOWN, 0.0, 0, 0.0, object="the cup")
 REQUEST = Request(3, TARGETS, "world", PACKAGE)
 ENDS = ((0.5, 0.0, 0.5), (0.6, 0.0, 0.2))
 GRIPPING = Hand(0.6, buttons=("grip",), gripped_at=ENDS[0])
@@ -127,7 +127,7 @@ def test_a_plan_is_executed_by_the_preview_of_it_alone(mode, shown):
         (replace(PRESSED, buttons=("primary", "grip")), OFFER, True, False),
         (replace(PRESSED, pressed=()), OFFER, True, False),
         (PRESSED, None, True, False),
-        (PRESSED, replace(OFFER, thing="the box"), True, False),
+        (PRESSED, replace(OFFER, object="the box"), True, False),
         (PRESSED, OFFER, False, False),
     ],
 )
@@ -159,7 +159,7 @@ def test_what_is_a_plan(report, answer, reason):
     message, waits = heard(plan=report), state("plan", waited=0.0)
     assert answered(waits, message) == answer
     assert refusal(waits, message, SETTINGS) == reason
-    events, _ = happened(waits, message, TARGETS, ENDS, SETTINGS)
+    events, _ = detect_events(waits, message, TARGETS, ENDS, SETTINGS)
     assert events["planned"] == (answer and not reason)
     assert events["refused"] == bool(reason)
 
@@ -173,7 +173,7 @@ def test_a_plan_that_does_not_come_is_refused_after_a_while(late, mode, refused)
 
 
 def event(name: str, before: TeleoperationState, message: Input, targets=TARGETS) -> bool:
-    return happened(before, message, targets, ENDS, SETTINGS)[0][name]
+    return detect_events(before, message, targets, ENDS, SETTINGS)[0][name]
 
 
 RUNS = {"mode": "execute", "running": True}
@@ -255,7 +255,7 @@ NEEDED = "both targets are needed: hold a grip to set each"
 )
 def test_what_was_asked_for_in_vain_is_said_as_one_aims_and_only_then(mode, button, hand, targets, notice):
     before = state(mode, left=hand, right=replace(OPEN, pressed=(button,)), pinned=None, stamp=100.0, waited=0.0)
-    _, line = happened(before, heard(), targets, ENDS, SETTINGS)
+    _, line = detect_events(before, heard(), targets, ENDS, SETTINGS)
     usual = {"grips let go; holding", "robot: no reason given; stopped"}
     assert line == (notice if mode == "aim" else "") or (mode != "aim" and line in usual)
 
@@ -277,4 +277,4 @@ def test_what_was_asked_for_in_vain_is_said_as_one_aims_and_only_then(mode, butt
 )  # fmt: skip
 def test_what_is_said_of_what_happened(mode, fields, changes, notice):
     changes = {name: value for name, value in changes.items() if name != "mode"}
-    assert happened(state(mode, **changes), heard(**fields), TARGETS, ENDS, SETTINGS)[1] == notice
+    assert detect_events(state(mode, **changes), heard(**fields), TARGETS, ENDS, SETTINGS)[1] == notice

@@ -8,7 +8,7 @@ import pytest
 
 from tests.ar.teleop.test_plan import BENT, LIMITS, NETWORK, OFFSET, START, STRAIGHT, WORLD, targets
 from trunkline.ar.teleop.following import KNOT, Follower, Following, sought
-from trunkline.ar.teleop.messages import Box, World
+from trunkline.ar.teleop.messages import Obstacle, World
 from trunkline.ar.teleop.planner import Planner
 from trunkline.ar.teleop.rigid_ik import RigidIK
 from trunkline.kinematics.panda.collision import clearance
@@ -104,7 +104,7 @@ def test_refused_targets_leave_it_at_the_last_and_are_said():
 
 
 def test_targets_that_lead_into_a_solid_are_refused():
-    shelf = World("world", (Box("the shelf", (0.4, 0.2, 0.4), (0.6, 0.4, 0.6)),))
+    shelf = World("world", (Obstacle("the shelf", (0.4, 0.2, 0.4), (0.6, 0.4, 0.6)),))
     _, follower = follow(lambda now: 0.0, 0.5)
     assert hear(follower, 1.0, at(0.05), shelf) == ""
     refused = hear(follower, 2.0, at(0.3), shelf)

@@ -1,5 +1,6 @@
-"""Things: the tip target marks them, the plan grasps them or brings them elsewhere, and what forbids it has a name."""
+"""Objects: the tip target marks them, the plan grasps them or brings them elsewhere, and what forbids it has a name."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -10,16 +11,16 @@ from tests.support.operator import DT, PACKAGE, Operator, config
 from trunkline.ar.hybrid.grasp_poses import SideGrip
 from trunkline.ar.teleop.grasping import Grasping, _require_ground
 from trunkline.ar.teleop.messages import (
-    Box,
     Input,
     Intent,
+    Obstacle,
     Offer,
     PlanReport,
     Request,
     Target,
     Targets,
-    Thing,
     World,
+    WorldObject,
     from_json,
     to_json,
 )
@@ -36,7 +37,7 @@ from trunkline.model.arm.spiral import spiral_chain
 GEOMETRY = spiral_chain(length=LENGTH, base_width=0.080, tip_width=0.012, units=24)
 GRIP, BY_THE_BAR = SideGrip(config().hanging, GEOMETRY), SideGrip(config().basket, GEOMETRY)
 HANDLING = config().handling
-BALL = Thing("the ball", "cylinder", 0.05, 0.05, 0.1, (0.55, 0.1, 0.15))
+BALL = WorldObject("the ball", "cylinder", 0.05, 0.05, 0.1, (0.55, 0.1, 0.15))
 
 
 @pytest.fixture(scope="module")
@@ -46,12 +47,12 @@ def planner():
     return Planner(rigid, NETWORK, STRAIGHT, LIMITS, OFFSET, step=0.01, grasping=grasping)
 
 
-def world(thing: Thing, *boxes: Box) -> World:
-    return World("world", boxes, (thing,))
+def world(object: WorldObject, *boxes: Obstacle) -> World:
+    return World("world", boxes, (object,))
 
 
-def request(thing: Thing, rigid, tip=None, heading=0.0) -> Request:
-    targets = Targets(Target(rigid), Target(tip or thing.position), DOWN, heading, 0, 0.0, thing=thing.name)
+def request(object: WorldObject, rigid, tip=None, heading=0.0) -> Request:
+    targets = Targets(Target(rigid), Target(tip or object.position), DOWN, heading, 0, 0.0, object=object.name)
     return Request(1, targets, "world", PACKAGE)
 
 
@@ -101,15 +102,15 @@ def test_an_arm_before_the_object_pulls_the_other_cables(planner):
     np.testing.assert_allclose(STRAIGHT - plan.commands[-1], [loose, pull, pull], atol=1e-9)
 
 
-BASKET = Thing("the basket", "basket", 0.03, 0.06, 0.2, (0.55, 0.1, -0.03), support="standing")
+BASKET = WorldObject("the basket", "basket", 0.03, 0.06, 0.2, (0.55, 0.1, -0.03), support="standing")
 
 
 def test_a_basket_is_gripped_by_its_bar_wherever_it_is(planner):
     grip = grip_of(BASKET)
     assert grip[:2] == BASKET.position[:2]
     mount = (0.49, 0.1, grip[2] + 0.36)
-    for thing in (BASKET, replace(BASKET, support="hanging")):
-        plan = planner.plan(request(thing, mount, grip), world(thing), START, STRAIGHT)
+    for object in (BASKET, replace(BASKET, support="hanging")):
+        plan = planner.plan(request(object, mount, grip), world(object), START, STRAIGHT)
         at = mount_pose(plan.joints[[dict(plan.phases)["curl"]]], OFFSET)[0][0]
         np.testing.assert_allclose(at, mount, atol=1e-3)
         pull, loose = config().basket.pull, -config().basket.loose
@@ -126,7 +127,7 @@ def test_a_basket_that_is_let_go_must_be_near_the_board_with_its_box(planner):
         planner.plan(request(basket, MOUNT, far), rooms, START, STRAIGHT)
 
 
-TABLE = Box("the table", (0.3, -0.4, -0.4), (0.7, 0.0, 0.1))
+TABLE = Obstacle("the table", (0.3, -0.4, -0.4), (0.7, 0.0, 0.1))
 
 
 def test_what_is_held_is_brought_down_and_let_go(planner):
@@ -155,9 +156,9 @@ REFUSED = {
 
 @pytest.mark.parametrize("reason", REFUSED)
 def test_what_forbids_it_has_a_name(planner, reason):
-    thing, mount, tip = REFUSED[reason]
+    object, mount, tip = REFUSED[reason]
     with pytest.raises(InputError, match=reason):
-        planner.plan(request(thing, mount, tip), world(thing, TABLE), START, STRAIGHT)
+        planner.plan(request(object, mount, tip), world(object, TABLE), START, STRAIGHT)
 
 
 def test_a_planner_without_a_grip_says_so(planner):
@@ -165,26 +166,26 @@ def test_a_planner_without_a_grip_says_so(planner):
         replace(planner, grasping=None).plan(request(BALL, MOUNT), world(BALL), START, STRAIGHT)
 
 
-def aiming(thing: Thing | None = None) -> Operator:
-    """Both targets set; the tip target is 4 cm beside the thing, if there is one."""
+def aiming(object: WorldObject | None = None) -> Operator:
+    """Both targets set; the tip target is 4 cm beside the object, if there is one."""
     operator = Operator()
     operator.wait(0.5)
     intent = operator.wait(0.3, left={"grip": True}, right={"grip": True})
-    if thing is not None:
+    if object is not None:
         x, y, z = intent.targets.tip.position
-        operator.wait(0.2, world=World("things", (), (replace(thing, position=(x + 0.04, y, z)),)))
+        operator.wait(0.2, world=World("objects", (), (replace(object, position=(x + 0.04, y, z)),)))
     return operator
 
 
-def test_a_tip_target_near_a_thing_marks_it():
+def test_a_tip_target_near_an_object_marks_it():
     operator = aiming(BALL)
     targets = operator.intents[-1].targets
-    assert targets.thing == BALL.name
-    assert targets.tip.position == operator.message.world.things[0].position
-    far = replace(operator.message.world.things[0], position=(9.0, 9.0, 9.0))
+    assert targets.object == BALL.name
+    assert targets.tip.position == operator.message.world.objects[0].position
+    far = replace(operator.message.world.objects[0], position=(9.0, 9.0, 9.0))
     targets = operator.step(world=World("elsewhere", (), (far,))).targets
-    assert targets.thing == ""
-    assert aiming().intents[-1].targets.thing == ""
+    assert targets.object == ""
+    assert aiming().intents[-1].targets.object == ""
 
 
 def test_a_tip_target_near_a_bar_marks_the_basket_and_goes_to_the_bar():
@@ -193,9 +194,9 @@ def test_a_tip_target_near_a_bar_marks_the_basket_and_goes_to_the_bar():
     dx, dy, dz = subtract(grip_of(BASKET), BASKET.position)
     near, beside = ((x + gap - dx, y - dy, z - dz) for gap in (0.04, 0.4))
     targets = operator.step(world=World("bar", (), (replace(BASKET, position=near),))).targets
-    assert targets.thing == BASKET.name
+    assert targets.object == BASKET.name
     np.testing.assert_allclose(targets.tip.position, (x + 0.04, y, z), atol=1e-9)
-    assert operator.step(world=World("far", (), (replace(BASKET, position=beside),))).targets.thing == ""
+    assert operator.step(world=World("far", (), (replace(BASKET, position=beside),))).targets.object == ""
 
 
 def ready(operator: Operator) -> None:
@@ -226,7 +227,7 @@ def test_an_offer_is_shown_and_taken_only_if_the_user_does():
     assert intent.request.targets.better is None
 
 
-def test_an_offer_for_another_thing_is_none():
+def test_an_offer_for_another_object_is_none():
     operator = aiming(BALL)
     ready(operator)
     operator.step(offer=Offer("another", (0.5, 0.1, 0.5), (0.0, 0.0, -1.0), 0.9))
@@ -235,13 +236,13 @@ def test_an_offer_for_another_thing_is_none():
     assert operator.step(left={"primary": True}).mode == "ready"
 
 
-def test_with_a_thing_in_the_arm_the_tip_target_is_where_it_will_be():
+def test_with_an_object_in_the_arm_the_tip_target_is_where_it_will_be():
     operator = Operator()
     operator.wait(0.5)
     ball = replace(BALL, support="held", position=(0.35, 0.05, 0.1))
     operator.wait(0.3, left={"grip": True}, world=World("held", (), (ball,)))
     targets = operator.intents[-1].targets
-    assert targets.thing == BALL.name
+    assert targets.object == BALL.name
     assert targets.turned == 0.0
     mount = mount_pose(np.array([operator.message.joints]), OFFSET)[0][0]
     along = np.linalg.norm(np.array(ball.position) - mount)
@@ -249,7 +250,7 @@ def test_with_a_thing_in_the_arm_the_tip_target_is_where_it_will_be():
     assert targets.tip.position[2] - targets.rigid.position[2] == pytest.approx(ball.position[2] - mount[2], abs=1e-6)
 
 
-def test_messages_with_things_are_read_back_and_replayed():
+def test_messages_with_objects_are_read_back_and_replayed():
     operator = aiming(BALL)
     ready(operator)
     operator.step(offer=Offer(BALL.name, (0.5, 0.1, 0.5), (0.0, 0.0, -1.0), 0.9))
@@ -259,6 +260,16 @@ def test_messages_with_things_are_read_back_and_replayed():
         assert from_json(Intent, to_json(intent)) == intent
         state, again = operator.core.step(state, from_json(Input, to_json(message)), DT)
         assert to_json(again) == to_json(intent)
+
+
+def test_clients_in_other_languages_read_the_keys_that_they_know():
+    operator = aiming(BALL)
+    ready(operator)
+    intent = operator.step(offer=Offer(BALL.name, (0.5, 0.1, 0.5), (0.0, 0.0, -1.0), 0.9))
+    sent, answer = (json.loads(to_json(message)) for message in (operator.inputs[-1], intent))
+    assert set(sent["world"]) == {"digest", "boxes", "things"}
+    assert (sent["offer"]["thing"], answer["targets"]["thing"]) == (BALL.name, BALL.name)
+    assert answer["targets"]["tip"]["solid"] == ""
 
 
 # --- borders
@@ -281,9 +292,9 @@ def test_what_is_heavier_than_the_chart_has_is_not_grasped(planner, row, beyond)
     """Between its rows, too, for each shape."""
     shape, diameter, most = row
     assert HANDLING.heaviest(shape, diameter) == pytest.approx(most)
-    thing = replace(BALL, shape=shape, diameter=diameter, mass=HANDLING.heaviest(shape, diameter) + beyond)
-    asked = Targets(Target(MOUNT), Target(thing.position), DOWN, 0.0, 0, 0.0, thing="the ball")
-    message = refused(lambda: planner.grasping.grasp(asked, thing, START))
+    object = replace(BALL, shape=shape, diameter=diameter, mass=HANDLING.heaviest(shape, diameter) + beyond)
+    asked = Targets(Target(MOUNT), Target(object.position), DOWN, 0.0, 0, 0.0, object="the ball")
+    message = refused(lambda: planner.grasping.grasp(asked, object, START))
     assert message.startswith("payload: the ball weighs ") == (beyond > 0)
 
 
@@ -298,7 +309,7 @@ def test_of_what_the_chart_does_not_have_nothing_is_grasped(shape, diameter):
 def test_a_thing_is_let_go_no_higher_than_it_may_fall(gap, start):
     place = (0.5, 0.1, 0.3)
     top = place[2] - below_grip(BALL) - (HANDLING.beneath + gap if gap else 0.0)
-    floor = Box("the floor", (-3.0, -3.0, -1.0), (3.0, 3.0, top))
+    floor = Obstacle("the floor", (-3.0, -3.0, -1.0), (3.0, 3.0, top))
     message = refused(lambda: _require_ground(BALL, place, World("world", (floor,)), HANDLING.beneath))
     assert message.startswith(start)
     assert bool(message) == bool(start)
@@ -306,7 +317,7 @@ def test_a_thing_is_let_go_no_higher_than_it_may_fall(gap, start):
 
 def test_a_thing_is_not_let_go_over_nothing_or_within_a_solid():
     place = (0.5, 0.1, 0.3)
-    for boxes in ((), (Box("the floor", (-3.0, -3.0, -1.0), (3.0, 3.0, place[2] - below_grip(BALL) + NEAR)),)):
+    for boxes in ((), (Obstacle("the floor", (-3.0, -3.0, -1.0), (3.0, 3.0, place[2] - below_grip(BALL) + NEAR)),)):
         message = refused(lambda boxes=boxes: _require_ground(BALL, place, World("world", boxes), HANDLING.beneath))
         assert message.startswith("release: found nothing between the ball and what is beneath it")
 

@@ -1,18 +1,18 @@
-"""Where things are gripped, how far they reach down, and what is beneath a place."""
+"""Where objects are gripped, how far they reach down, and what is beneath a place."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from trunkline.ar.hybrid.objects import GraspObject as Shaped
-from trunkline.ar.teleop.messages import Box, Quaternion, Thing, World
+from trunkline.ar.hybrid.objects import ObjectShape
+from trunkline.ar.teleop.messages import Obstacle, Quaternion, World, WorldObject
 from trunkline.ar.teleop.object_shapes import below_grip, beneath, grip_of, way_of_grasping
 
-BASKET = Thing("basket", "basket", 0.03, 0.06, 0.2, (0.5, 0.1, 0.2))
+BASKET = WorldObject("basket", "basket", 0.03, 0.06, 0.2, (0.5, 0.1, 0.2))
 LEVEL: Quaternion = (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0)
 OVER: Quaternion = (0.0, 1.0, 0.0, 0.0)  # half a turn about x
-SHAPED = Shaped("basket", 0.03, 0.06, 0.2, "plastic")
+SHAPED = ObjectShape("basket", 0.03, 0.06, 0.2)
 
 
 def test_a_baskets_grip_is_its_bar_as_in_the_twin():
@@ -26,7 +26,7 @@ def test_what_is_not_a_basket_is_gripped_in_its_centre():
     assert grip_of(ball) == ball.position
 
 
-def test_how_far_things_reach_down():
+def test_how_far_objects_reach_down():
     upright = SHAPED.half_height + SHAPED.grip[2]
     assert below_grip(BASKET) == pytest.approx(upright)
     assert below_grip(replace(BASKET, quaternion=OVER)) == pytest.approx(0.015)  # the bar is lowest
@@ -48,7 +48,7 @@ def test_ways_of_grasping():
 
 
 def test_the_highest_solid_beneath_a_place():
-    floor, table = Box("floor", (-3, -3, -2), (3, 3, -1)), Box("table", (0, 0, -0.1), (1, 1, 0))
+    floor, table = Obstacle("floor", (-3, -3, -2), (3, 3, -1)), Obstacle("table", (0, 0, -0.1), (1, 1, 0))
     world = World("w", (floor, table))
     assert beneath((0.5, 0.5, 0.1), world) == table
     assert beneath((0.5, 0.5, -0.05), world) == floor

@@ -8,7 +8,7 @@ import pytest
 
 from tests.support.operator import READY_JOINTS, config
 from trunkline.ar.teleop.executor import SimulatedRobot
-from trunkline.ar.teleop.messages import Box, Request, Target, Targets, World
+from trunkline.ar.teleop.messages import Obstacle, Request, Target, Targets, World
 from trunkline.ar.teleop.planner import Planner
 from trunkline.ar.teleop.rigid_ik import RigidIK
 from trunkline.ar.teleop.shaping import mode_shaper
@@ -130,7 +130,7 @@ def test_a_pose_in_which_the_robot_touches_itself_is_refused(planner):
 
 
 def test_a_solid_in_the_way_is_named(planner):
-    wall = World("world", (Box("the shelf", (0.2, 0.15, 0.2), (0.9, 0.2, 0.9)),))
+    wall = World("world", (Obstacle("the shelf", (0.2, 0.15, 0.2), (0.9, 0.2, 0.9)),))
     behind = request((0.4, 0.35, 0.5), (0.4 + float(BENT[0]), 0.35, 0.5 + float(BENT[2])))
     planner.plan(behind, WORLD, START, STRAIGHT)
     with pytest.raises(InputError, match="world: (joint .|mount) of the rigid robot would come into the shelf after"):

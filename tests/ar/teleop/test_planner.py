@@ -8,7 +8,7 @@ import pytest
 
 from tests.support.operator import READY_JOINTS, config
 from trunkline.ar.teleop.grasping import Leg
-from trunkline.ar.teleop.messages import Request, Target, Targets, Thing, World
+from trunkline.ar.teleop.messages import Request, Target, Targets, World, WorldObject
 from trunkline.ar.teleop.planner import Planner
 from trunkline.ar.teleop.rigid_ik import RigidIK
 from trunkline.ar.teleop.shaping import mode_shaper, shaped
@@ -20,7 +20,7 @@ STEP, START, STRAIGHT = 0.005, np.array(READY_JOINTS), np.full(3, 0.5)
 LIMITS, SHAPER = limits_of(config().motors), mode_shaper(0.6, 0.03, "zvd")
 GRAVITY, OTHER = np.array([0.0, 0.0, -1.0]), np.array([0.6, 0.0, -0.8])
 THERE, PULLED, MORE = START + 0.05, np.array([0.48, 0.5, 0.51]), np.array([0.47, 0.5, 0.53])
-CUP = World("world", things=(Thing("cup", "cylinder", 0.08, 0.1, 0.05, (0.5, 0.0, 0.25)),))
+CUP = World("world", objects=(WorldObject("cup", "cylinder", 0.08, 0.1, 0.05, (0.5, 0.0, 0.25)),))
 
 
 @dataclass
@@ -30,7 +30,7 @@ class Made:
     legs: list[Leg]
     beside: list[float] = field(default_factory=list)
 
-    def grasp(self, targets, thing, joints, beside):
+    def grasp(self, targets, object, joints, beside):
         self.beside.append(beside)
         return self.legs
 
@@ -41,7 +41,7 @@ def plan():
         nothing = Network(lambda poses: {}, 8)
         planner = Planner(RigidIK(0.05), nothing, STRAIGHT, LIMITS, 0.05, step=STEP, shaper=shaper)
         planner = replace(planner, grasping=Made(list(legs)))
-        targets = Targets(Target((0.5, 0.0, 0.6)), Target((0.5, 0.0, 0.25)), DOWN, 0.0, 0, 0.0, thing="cup")
+        targets = Targets(Target((0.5, 0.0, 0.6)), Target((0.5, 0.0, 0.25)), DOWN, 0.0, 0, 0.0, object="cup")
         made = planner.plan(Request(1, targets, CUP.digest, "a" * 64), CUP, START, STRAIGHT, **more)
         return made, planner.grasping
 

@@ -1,4 +1,4 @@
-"""Targets: what forbids that a plan is asked for them, which thing they mark, what they stand in, how far they tilt."""
+"""Targets: what forbids to ask for a plan, which object they mark, what they stand in, how far they tilt."""
 
 import math
 from dataclasses import replace
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.support.operator import config
-from trunkline.ar.teleop.messages import Box, Offer, Target, Targets, Thing, World
+from trunkline.ar.teleop.messages import Obstacle, Offer, Target, Targets, World, WorldObject
 from trunkline.ar.teleop.reach_message import Reading
 from trunkline.ar.teleop.settings import Orientation
 from trunkline.ar.teleop.targets import _target, marked, offered, tilted, why_not
@@ -16,7 +16,7 @@ from trunkline.ar.teleop.vectors import DOWN
 NEAR = 1e-6
 INSIDE = Target((0.5, 0.0, 0.5), "inside")
 OUTSIDE, OFFERED = replace(INSIDE, reach="outside", outside_by=0.0321), (0.4, 0.0, 0.5)
-BLOCKED, UNKNOWN = replace(INSIDE, reach="blocked", solid="the table"), replace(INSIDE, reach="unknown")
+BLOCKED, UNKNOWN = replace(INSIDE, reach="blocked", obstacle="the table"), replace(INSIDE, reach="unknown")
 TAKES = "; primary button takes the nearest point that is within"
 
 
@@ -45,14 +45,14 @@ def test_why_no_plan_can_be_asked_for(targets, reason):
 
 
 def cup(name, x):
-    return Thing(name, "cylinder", 0.05, 0.1, 0.1, (x, 0.0, 0.0))
+    return WorldObject(name, "cylinder", 0.05, 0.1, 0.1, (x, 0.0, 0.0))
 
 
 WITHIN = config().core.mark
 
 
 @pytest.mark.parametrize(
-    ("things", "name"),
+    ("objects", "name"),
     [
         ((), None),
         ((cup("a", WITHIN - NEAR),), "a"),
@@ -63,21 +63,21 @@ WITHIN = config().core.mark
         ((cup("a", WITHIN + NEAR), cup("b", 0.05)), "b"),
     ],
 )
-def test_the_nearest_thing_within_reach_of_the_tip_target_is_marked(things, name):
-    thing = marked((0.0, 0.0, 0.0), World("world", (), things), WITHIN)
-    assert (thing.name if thing else None) == name
+def test_the_nearest_object_within_reach_of_the_tip_target_is_marked(objects, name):
+    object = marked((0.0, 0.0, 0.0), World("world", (), objects), WITHIN)
+    assert (object.name if object else None) == name
 
 
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize(("side", "sign"), [("low", -1), ("high", 1)])
 def test_a_target_in_a_solid_is_blocked_wherever_a_map_has_it(axis, side, sign):
-    box = Box("the table", (-1.0, -2.0, -3.0), (1.0, 2.0, 3.0))
+    box = Obstacle("the table", (-1.0, -2.0, -3.0), (1.0, 2.0, 3.0))
     place = [0.0, 0.0, 0.0]
     for beyond, reach in ((-NEAR, "blocked"), (0.0, "blocked"), (NEAR, "inside")):
         place[axis] = getattr(box, side)[axis] + sign * beyond
         target = _target(tuple(place), Reading("inside"), World("world", (box,)))
         assert target.reach == reach
-        assert target.solid == ("the table" if reach == "blocked" else "")
+        assert target.obstacle == ("the table" if reach == "blocked" else "")
 
 
 def test_what_a_map_says_is_kept_where_nothing_is():
@@ -85,10 +85,10 @@ def test_what_a_map_says_is_kept_where_nothing_is():
     assert _target((5.0, 0.0, 0.0), reading, World("world")) == Target((5.0, 0.0, 0.0), *reading)
 
 
-@pytest.mark.parametrize(("thing", "taken"), [("the cup", True), ("", False), ("the box", False)])
-def test_an_offer_is_for_the_thing_that_is_marked(thing, taken):
+@pytest.mark.parametrize(("object", "taken"), [("the cup", True), ("", False), ("the box", False)])
+def test_an_offer_is_for_the_object_that_is_marked(object, taken):
     offer = Offer("the cup", (0.0, 0.0, 0.0), DOWN, 0.9)
-    asked = replace(targets(), thing=thing)
+    asked = replace(targets(), object=object)
     assert offered(asked, offer).better == (offer if taken else None)
     assert offered(asked, None) is asked
 

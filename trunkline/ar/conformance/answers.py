@@ -10,7 +10,7 @@ from pydantic import TypeAdapter
 
 from trunkline.ar.teleop.alignment import Aligned, align, wrist_of
 from trunkline.ar.teleop.core import Teleoperation
-from trunkline.ar.teleop.messages import Box, Targets, World
+from trunkline.ar.teleop.messages import Obstacle, Targets, World
 from trunkline.ar.teleop.reach import MapReach
 from trunkline.ar.teleop.settings import Teleop
 from trunkline.ar.teleop.targets import place
@@ -48,7 +48,7 @@ class Answers:
     def targets(self, rigid, tip, pointing, joints, last, boxes) -> Case:
         """Both targets as `place` has them in a world of `boxes`."""
         wrist = wrist_of(tuple(joints), self.core.mount_offset)
-        world = World("world", tuple(Box(box["name"], tuple(box["low"]), tuple(box["high"])) for box in boxes))
+        world = World("world", tuple(Obstacle(box["name"], tuple(box["low"]), tuple(box["high"])) for box in boxes))
         targets = place(
             tuple(rigid), tuple(tip), tuple(pointing), False, wrist, Aligned(**last), world, self.core.reach,
             self.core.settings,

@@ -8,7 +8,7 @@ import numpy as np
 
 from trunkline.ar.conformance.answers import Answers, Case
 from trunkline.ar.teleop.alignment import Aligned
-from trunkline.ar.teleop.messages import Box, Joints
+from trunkline.ar.teleop.messages import Joints, Obstacle
 from trunkline.ar.teleop.vectors import (
     DOWN,
     Vector,
@@ -100,7 +100,7 @@ def _offered(ask: Callable[..., Case], name: str, cases: list[Case]) -> list[Cas
 
 
 def _targets(joints: Joints, rigid: Vector, tip: Vector, rng: np.random.Generator) -> list[Case]:
-    """The arm near both targets, turned to several sides with them, some in a solid."""
+    """The arm near both targets, turned to several sides with them, some in an obstacle."""
     cases = []
     for number in range(MANY):
         pointing = _pointing(TILTS[number % 4], rng)
@@ -108,9 +108,9 @@ def _targets(joints: Joints, rigid: Vector, tip: Vector, rng: np.random.Generato
         mount = add(rigid, _vector(rng.normal(scale=0.05, size=3)))
         end = add(add(mount, away), _vector(rng.normal(scale=0.02, size=3)))
         x, y, z = (mount, end, (9.0, 9.0, 9.0))[number % 3]
-        box = Box("the table", (x - 0.05, y - 0.05, z - 0.05), (x + 0.05, y + 0.05, z + 0.05))
+        obstacle = Obstacle("the table", (x - 0.05, y - 0.05, z - 0.05), (x + 0.05, y + 0.05, z + 0.05))
         cases.append({"rigid": mount, "tip": end, "pointing": pointing, "joints": joints, "last": FIRST._asdict(),
-                      "boxes": [asdict(box)]})  # fmt: skip
+                      "boxes": [asdict(obstacle)]})  # fmt: skip
     return cases
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from trunkline.ar.teleop.core import Teleoperation
-from trunkline.ar.teleop.messages import Box, Controller, Input, Joints, Pose, World
+from trunkline.ar.teleop.messages import Controller, Input, Joints, Obstacle, Pose, World
 from trunkline.ar.teleop.recorder import AIMS, FAULTS, Recorder
 from trunkline.ar.teleop.settings import Teleop
 from trunkline.ar.teleop.transitions import TRANSITIONS
@@ -86,7 +86,7 @@ def _unheard(recorder: Recorder, fault: Callable[[Recorder], object]) -> None:
 
 
 def _reach(recorder: Recorder) -> None:
-    """The end effector tilted, so that gravity turns; a ray that grows too long; an offer taken; a solid in the way."""
+    """The end effector tilted, so that gravity turns; a ray too long; an offer taken; an obstacle in the way."""
     rigid, tip = _hands(recorder.core.settings)
     recorder.to("aim")
     recorder.wait(AIMS, left={"grip": True}, right={"grip": True})
@@ -101,8 +101,8 @@ def _reach(recorder: Recorder) -> None:
     targets = recorder.step(**_of(tip, primary=False)).targets
     assert targets is not None
     x, y, z = targets.tip.position
-    box = Box("the table", (x - 0.1, y - 0.1, z - 0.1), (x + 0.1, y + 0.1, z + 0.1))
-    recorder.wait(0.3, world=World("another", (box,)))
+    obstacle = Obstacle("the table", (x - 0.1, y - 0.1, z - 0.1), (x + 0.1, y + 0.1, z + 0.1))
+    recorder.wait(0.3, world=World("another", (obstacle,)))
     recorder.step(**_of(tip, trigger=True))
     recorder.step(world=World("world"), **_of(tip, trigger=False))
     recorder.step(**_of(tip, trigger=True))

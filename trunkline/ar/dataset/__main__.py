@@ -29,7 +29,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="of the dataset; it must not exist")
     parser.add_argument("--fps", type=int, default=30, help="frames a second")
     parser.add_argument("--task", default="", metavar="WORDS", help="instead of what the targets say")
-    parser.add_argument("--all", action="store_true", help="with what was stopped, failed or did not hold its thing")
+    parser.add_argument("--all", action="store_true", help="with what was stopped, failed or did not hold its object")
     parser.add_argument(
         "--aiming", action="store_true", help="with how the user came to it; the robot stands meanwhile"
     )

@@ -8,7 +8,7 @@ import numpy as np
 
 from trunkline.ar.dataset.recording import RecordedStep, SessionRecording
 from trunkline.ar.session.preview_validation import Execution, executions
-from trunkline.ar.teleop.messages import Targets, Thing, Vector
+from trunkline.ar.teleop.messages import Targets, Vector, WorldObject
 from trunkline.errors import InputError
 
 LEADING = ("aim", "plan", "preview", "ready", "delay")  # modes in which a user leads up to an execution
@@ -144,14 +144,14 @@ def _wanted(step: RecordedStep, planned: Targets | None) -> Targets:
 
 
 def _goal(targets: Targets, step: RecordedStep) -> list[float]:
-    thing = _thing(targets, step)
-    thing_pose = [0.0, 0.0, 0.0, 0.0] if thing is None else [1.0, *thing.position]
-    return [*targets.rigid.position, *targets.tip.position, *targets.pointing, targets.heading, *thing_pose]
+    object = _object(targets, step)
+    object_pose = [0.0, 0.0, 0.0, 0.0] if object is None else [1.0, *object.position]
+    return [*targets.rigid.position, *targets.tip.position, *targets.pointing, targets.heading, *object_pose]
 
 
-def _thing(targets: Targets, step: RecordedStep) -> Thing | None:
+def _object(targets: Targets, step: RecordedStep) -> WorldObject | None:
     """What is to be grasped or brought, where it is believed to be."""
-    return next((thing for thing in step.message.world.things if thing.name == targets.thing), None)
+    return next((object for object in step.message.world.objects if object.name == targets.object), None)
 
 
 def _rays(rays: tuple[Vector | None, Vector | None]) -> list[float]:
@@ -159,9 +159,9 @@ def _rays(rays: tuple[Vector | None, Vector | None]) -> list[float]:
 
 
 def _task(targets: Targets, step: RecordedStep, followed: bool) -> str:
-    thing = _thing(targets, step)
+    object = _object(targets, step)
     if followed:
-        return f"carry the {thing.shape} along with the hands" if thing else "follow the hands with mount and tip"
-    if thing is None:
+        return f"carry the {object.shape} along with the hands" if object else "follow the hands with mount and tip"
+    if object is None:
         return "bring the mount and the soft arm's tip to their targets"
-    return f"bring the {thing.shape} to the target" if thing.support == "held" else f"grasp the {thing.shape}"
+    return f"bring the {object.shape} to the target" if object.support == "held" else f"grasp the {object.shape}"

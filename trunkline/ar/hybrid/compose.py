@@ -43,7 +43,7 @@ class Placed:
         hanging: whether it hangs from the world's hook.
     """
 
-    thing: GraspObject
+    object: GraspObject
     position: np.ndarray
     quaternion: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
     hanging: bool = False
@@ -93,7 +93,7 @@ def compose(
     if placed is not None:
         if placed.hanging and (world is None or world.hook is None):
             raise InputError("world.hook: found none, expected one for an object that hangs")
-        placed.thing.add_to(
+        placed.object.add_to(
             spec, np.asarray(placed.position, dtype=float), placed.quaternion, "hook_end" if placed.hanging else None
         )
     return spec

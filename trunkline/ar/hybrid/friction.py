@@ -1,4 +1,4 @@
-"""Friction coefficients of the printed arm on what it holds, and how contacts are made to hold things.
+"""Friction coefficients of the printed arm on what it holds, and how contacts are made to hold objects.
 
 Polyurethane has no one coefficient: it falls with hardness (Gallagher Corporation, Polyurethane Design Guide,
 "Coefficient of friction"). Moulded TPU of Shore 55D begins to slide on smooth steel at 0.42, on coarse steel at 0.33;

@@ -60,7 +60,7 @@ class Grip(Protocol):
 class SideSettings:
     """grasp: the grasp frame. pull: m, of the cables that close; the motors' force ends it sooner. loose: m, by which
     the others are paid out. sink: m, by which the mount goes down meanwhile, as a coil that closes rises, so that what
-    supports a thing bears it until the end. rise: m, by which the mount rises as the arm opens again, to let it go.
+    supports an object bears it until the end. rise: m, by which the mount rises as the arm opens again, to let it go.
     aside: m, from which the mount comes. along, beside: m, places that the
     assistant tries about the grasp frame, along the arm and away from the object."""
 

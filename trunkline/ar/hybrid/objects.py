@@ -5,7 +5,7 @@ whose contacts give way four times as slowly: it does not change its shape. A ba
 the arm wraps the bar: see `trunkline/ar/hybrid/basket.py`.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import product
 from typing import Annotated, Literal
 
@@ -33,8 +33,8 @@ GRIP = "object_grip"  # the site in the middle of what the arm wraps
 
 
 @dataclass
-class GraspObject:
-    """An object.
+class ObjectShape:
+    """What an object is like.
 
     Attributes:
         diameter: m; of a box or toy, its width along x and y; of a basket, its bar's.
@@ -47,8 +47,7 @@ class GraspObject:
     diameter: Annotated[float, Field(ge=0.005, le=0.5)]
     height: Annotated[float, Field(ge=0.005, le=1)]
     mass: Annotated[float, Field(gt=0, le=20)]
-    material: Material
-    basket: Basket = Basket()
+    basket: Basket = field(default=Basket(), kw_only=True)
 
     def __post_init__(self):
         if self.shape == "basket":
@@ -70,6 +69,13 @@ class GraspObject:
     def parts(self) -> dict[str, Part]:
         """Of a basket, by their names."""
         return parts_of(self.basket, self.diameter, self.height)
+
+
+@dataclass
+class GraspObject(ObjectShape):
+    """An object in a composed model, and the material of its surface."""
+
+    material: Material
 
     def add_to(
         self, spec: mujoco.MjSpec, position: np.ndarray, quaternion=(1, 0, 0, 0), hook: str | None = None
@@ -134,13 +140,13 @@ def object_geoms(model: mujoco.MjModel) -> np.ndarray:
 
 def touched(model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
     """Whether the arm touches the object, in each pose of a composed model. Shapes (B, nq) to (B,)."""
-    thing, arm = object_geoms(model), np.flatnonzero(model.geom_contype & ARM)
+    object, arm = object_geoms(model), np.flatnonzero(model.geom_contype & ARM)
     data, touching = mujoco.MjData(model), np.zeros(len(qpos), dtype=bool)
     for row in np.flatnonzero(np.isfinite(qpos).all(axis=1)):
         data.qpos[:] = qpos[row]
         mujoco.mj_fwdPosition(model, data)
         pairs = data.contact.geom[data.contact.dist <= 0]
-        touching[row] = (np.isin(pairs, thing).any(axis=1) & np.isin(pairs, arm).any(axis=1)).any()
+        touching[row] = (np.isin(pairs, object).any(axis=1) & np.isin(pairs, arm).any(axis=1)).any()
     return touching
 
 

@@ -262,11 +262,11 @@ def _piece(twin: ComposedTwin, batch: Batch, time: np.ndarray, recorded: dict[st
     model = twin.model
     tip, mount = model.site("tip").id, model.body("base").id
     count, number = recorded["qpos"].shape[:2]
-    thing = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "object")
+    object = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "object")
     pose, away = np.full((count, number, 7), np.nan), np.full((count, number), np.nan)
     grip = pose[:, :, :3]
-    if thing >= 0:
-        pose = np.concatenate([recorded["xpos"][:, :, thing], recorded["xquat"][:, :, thing]], axis=2)
+    if object >= 0:
+        pose = np.concatenate([recorded["xpos"][:, :, object], recorded["xquat"][:, :, object]], axis=2)
         sites = recorded["site_xpos"]
         grip = sites[:, :, model.site(GRIP).id]
         gaps = sites[:, :, twin.centers] - grip[:, :, None]

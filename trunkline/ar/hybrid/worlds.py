@@ -13,14 +13,14 @@ from trunkline.model.arm.contact_geometry import WORLD
 Metres = Annotated[float, Field(ge=-10, le=10)]
 Size = Annotated[float, Field(gt=0, le=10)]
 Material = Literal["wood", "plastic", "paper", "fabric", "slippery"]
-HOOK_RADIUS, HOOK_LENGTH = 0.004, 0.3  # m, of the rod at whose lower end things hang
+HOOK_RADIUS, HOOK_LENGTH = 0.004, 0.3  # m, of the rod at whose lower end objects hang
 RGBA = {"wood": (0.72, 0.55, 0.36, 1), "plastic": (0.75, 0.77, 0.8, 1), "paper": (0.95, 0.93, 0.88, 1),
         "fabric": (0.35, 0.5, 0.65, 1), "slippery": (0.85, 0.85, 0.9, 1)}  # fmt: skip
 
 
 @dataclass
 class SupportSurface:
-    """A level board on which things stand. top: the middle of its upper side, m. size: along x, y and z, m."""
+    """A level board on which objects stand. top: the middle of its upper side, m. size: along x, y and z, m."""
 
     top: Annotated[list[Metres], Field(min_length=3, max_length=3)]
     size: Annotated[list[Size], Field(min_length=3, max_length=3)]
@@ -29,7 +29,7 @@ class SupportSurface:
 
 @dataclass
 class WorldGeometry:
-    """floor: its height, m, or null. surfaces: by name. hook: where things hang, m, or null."""
+    """floor: its height, m, or null. surfaces: by name. hook: where objects hang, m, or null."""
 
     floor: Metres | None
     surfaces: dict[str, SupportSurface]

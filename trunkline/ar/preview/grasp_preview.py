@@ -1,7 +1,7 @@
 """What a client shows of a plan for a grasp or a hand-over before it is confirmed: a preview, and perhaps an offer.
 
 Futures of a grasp begin where the approach ends: until then nothing is touched. Those of a hand-over begin with the arm
-and the thing as the nominal preview of its grasp left them, and end when the arm is gone.
+and the object as the nominal preview of its grasp left them, and end when the arm is gone.
 """
 
 from collections.abc import Callable, Iterator
@@ -18,7 +18,7 @@ from trunkline.ar.hybrid.uncertainty import Contact
 from trunkline.ar.preview.preview_twin import RobotModel, compose_twin
 from trunkline.ar.preview.settings import Previewing
 from trunkline.ar.teleop.alignment import base_quaternion
-from trunkline.ar.teleop.messages import Offer, Targets, Thing, World
+from trunkline.ar.teleop.messages import Offer, Targets, World, WorldObject
 from trunkline.ar.teleop.object_shapes import beneath, grip_of, way_of_grasping
 from trunkline.ar.teleop.plan import Plan
 from trunkline.frames import rotation_from_wxyz
@@ -54,7 +54,7 @@ class GraspPreviewer:
         self,
         plan: Plan,
         targets: Targets,
-        thing: Thing,
+        object: WorldObject,
         world: World,
         hangs: np.ndarray | None,
         seed: int,
@@ -69,21 +69,21 @@ class GraspPreviewer:
         """
         s, trajectory, begins = self.settings, *self.trajectory_from(plan, "curl")
         lean = self.robot_model.lean(hangs)
-        twin = compose_twin(self.robot_model, world, thing, trajectory.joints[0], trajectory.commands[0], s, lean)
+        twin = compose_twin(self.robot_model, world, object, trajectory.joints[0], trajectory.commands[0], s, lean)
         holding = Holding(trajectory.duration - s.hold, s.sag, s.slip, s.lifted)
         prediction = PlanPrediction(
             preview(twin, trajectory, self.robot_model.uncertainty, holding, s.futures, seed, go_on=go_on), begins
         )
         yield prediction
         if prediction.probability < s.sure and s.assistant:
-            offer = self._offer(twin, trajectory, holding, targets, thing, prediction.probability, seed, go_on)
+            offer = self._offer(twin, trajectory, holding, targets, object, prediction.probability, seed, go_on)
             yield replace(prediction, offer=offer)
 
     def bring(
         self,
         plan: Plan,
         targets: Targets,
-        thing: Thing,
+        object: WorldObject,
         world: World,
         hangs: np.ndarray | None,
         before: PlanPrediction,
@@ -93,11 +93,11 @@ class GraspPreviewer:
         """Futures of a plan to bring what is held elsewhere: whether it rests there.
 
         Args:
-            before: of the grasp. What is not known of the thing's place is none of a thing in the arm.
+            before: of the grasp. What is not known of the object's place is none of an object in the arm.
             go_on: as `preview`.
         """
         s, trajectory, begins = self.settings, *self.trajectory_from(plan, "transfer")
-        twin = self.carrying(thing, world, trajectory, hangs, before)
+        twin = self.carrying(object, world, trajectory, hangs, before)
         uncertainty = replace(
             self.robot_model.uncertainty, contact=Contact(self.robot_model.uncertainty.contact.friction, NOWHERE, 0.0)
         )
@@ -125,16 +125,16 @@ class GraspPreviewer:
 
     def carrying(
         self,
-        thing: Thing,
+        object: WorldObject,
         world: World,
         trajectory: CommandTrajectory,
         hangs: np.ndarray | None,
         before: PlanPrediction,
     ) -> ComposedTwin:
-        """The twin with the thing in its arm, as the nominal preview of its grasp left both."""
+        """The twin with the object in its arm, as the nominal preview of its grasp left both."""
         lean, pose = self.robot_model.lean(hangs), before.preview.nominal.qpos[0, -1]
         return compose_twin(
-            self.robot_model, world, thing, trajectory.joints[0], trajectory.commands[0], self.settings, lean, pose
+            self.robot_model, world, object, trajectory.joints[0], trajectory.commands[0], self.settings, lean, pose
         )
 
     def trajectory_from(self, plan: Plan, first: str) -> tuple[CommandTrajectory, float]:
@@ -151,14 +151,14 @@ class GraspPreviewer:
         trajectory: CommandTrajectory,
         holding: Holding,
         targets: Targets,
-        thing: Thing,
+        object: WorldObject,
         probability: float,
         seed: int,
         go_on: Callable[[], None],
     ) -> Offer | None:
-        s, centre = self.settings, np.array(grip_of(thing))
+        s, centre = self.settings, np.array(grip_of(object))
         mount = np.array(targets.rigid.position) - centre
-        places = self.grips[way_of_grasping(thing)].near(_rotation(targets), mount, thing.diameter)
+        places = self.grips[way_of_grasping(object)].near(_rotation(targets), mount, object.diameter)
         shares = try_places(
             twin, trajectory, self.robot_model.uncertainty, holding, places - mount, s.assistant, seed + 1, go_on
         )
@@ -166,7 +166,7 @@ class GraspPreviewer:
         if shares[chosen] <= probability:
             return None
         x, y, z = (float(value) for value in centre + places[chosen])
-        return Offer(thing.name, (x, y, z), targets.pointing, float(shares[chosen]))
+        return Offer(object.name, (x, y, z), targets.pointing, float(shares[chosen]))
 
 
 def _rotation(targets: Targets) -> np.ndarray:

@@ -59,7 +59,7 @@ class Package:
         )  # fmt: skip
 
     def grips(self, config: TeleoperationConfig) -> dict[str, Grip]:
-        """The ways of grasping things, by their names."""
+        """The ways of grasping objects, by their names."""
         return {"hanging": SideGrip(config.hanging, self.geometry), "basket": SideGrip(config.basket, self.geometry)}
 
     @cached_property

@@ -1,4 +1,4 @@
-"""The twin that plans are tried on: the identified arm on the Panda, the world as the client believes it, the thing."""
+"""The twin that plans are tried on: the identified arm on the Panda, the world as the client believes it, an object."""
 
 from dataclasses import dataclass, replace
 
@@ -7,14 +7,14 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from trunkline.ar.hybrid.compose import Placed, compose, panda_joints
-from trunkline.ar.hybrid.objects import GraspObject as Shaped
+from trunkline.ar.hybrid.objects import GraspObject
 from trunkline.ar.hybrid.rollouts import ComposedTwin
 from trunkline.ar.hybrid.string import hang
 from trunkline.ar.hybrid.uncertainty import Contact, GraspUncertainty
 from trunkline.ar.hybrid.worlds import SupportSurface
 from trunkline.ar.hybrid.worlds import WorldGeometry as Room
 from trunkline.ar.preview.settings import Previewing
-from trunkline.ar.teleop.messages import Box, Thing, World
+from trunkline.ar.teleop.messages import Obstacle, World, WorldObject
 from trunkline.ar.teleop.vectors import Quaternion, unit
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY, wxyz_from_rotation
@@ -69,30 +69,31 @@ def robot_model_of(settings: Previewing, files: dict[str, bytes]) -> RobotModel:
 def compose_twin(
     robot_model: RobotModel,
     world: World,
-    thing: Thing | None,
+    object: WorldObject | None,
     joints: np.ndarray,
     commands: np.ndarray,
     settings: Previewing,
     lean: Rotation | None = None,
     left: np.ndarray | None = None,
 ) -> ComposedTwin:
-    """The twin at rest at `joints` (7,), rad, its motors at `commands` (K,), m, beside a thing that hangs or stands;
-    `lean` is how its arm is turned on its mount, None where nobody has seen that. With a thing in the arm all is as an
-    earlier preview `left` it: the pose (nq,) at its end, of a model with a string or without."""
+    """The twin at rest at `joints` (7,), rad, its motors at `commands` (K,), m, beside an object that hangs or stands;
+    `lean` is how its arm is turned on its mount, None where nobody has seen that. With an object in the arm all is as
+    an earlier preview `left` it: the pose (nq,) at its end, of a model with a string or without."""
     robot = replace(robot_model.robot, ready=joints.tolist())
-    boards, placed = {box.name: _surface(box) for box in world.boxes}, None
-    if thing is not None:
-        place, turn = np.array(thing.position), thing.quaternion
-        shaped = Shaped(thing.shape, thing.diameter, thing.height, thing.mass, settings.material, thing.basket)
-        if thing.support == "standing":
+    boards, placed = {obstacle.name: _surface(obstacle) for obstacle in world.obstacles}, None
+    if object is not None:
+        place, turn = np.array(object.position), object.quaternion
+        sizes = object.shape, object.diameter, object.height, object.mass
+        shaped = GraspObject(*sizes, settings.material, basket=object.basket)
+        if object.support == "standing":
             turn = _upright(turn)
             _stand(place, shaped.half_height, list(boards.values()))
         placed = Placed(shaped, place, turn)
     spec = compose(robot_model.arm, robot, Room(None, boards, None), placed)
     lean = lean or Rotation.identity()
     spec.body("base").quat = wxyz_from_rotation(lean)
-    if thing is not None and thing.support == "hanging":
-        hang(spec, np.array(thing.position), thing.diameter / 2, settings.string)
+    if object is not None and object.support == "hanging":
+        hang(spec, np.array(object.position), object.diameter / 2, settings.string)
     twin = ComposedTwin(spec.compile(), robot_model.arm.copy().compile()).stepped(settings.step)
     if left is None:
         return at_rest(twin, joints, commands, robot.mount_offset, lean)
@@ -142,6 +143,6 @@ def _stand(place: np.ndarray, half_height: float, surfaces: list[SupportSurface]
         highest.top[2] = float(place[2] - half_height)
 
 
-def _surface(box: Box) -> SupportSurface:
-    low, high = np.array(box.low), np.array(box.high)
+def _surface(obstacle: Obstacle) -> SupportSurface:
+    low, high = np.array(obstacle.low), np.array(obstacle.high)
     return SupportSurface([*((low + high) / 2)[:2].tolist(), float(high[2])], (high - low).tolist(), "wood")

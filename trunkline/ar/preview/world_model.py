@@ -1,4 +1,4 @@
-"""The world as a client believes it, after what it sees: where things are, and what holds them after a plan."""
+"""The world as a client believes it, after what it sees: where objects are, and what holds them after a plan."""
 
 import hashlib
 from collections.abc import Collection
@@ -6,29 +6,29 @@ from dataclasses import replace
 
 import numpy as np
 
-from trunkline.ar.teleop.messages import Box, Thing, World
+from trunkline.ar.teleop.messages import Obstacle, World, WorldObject
 
-MOVED = 0.005  # m by which a thing must be seen elsewhere than believed
+MOVED = 0.005  # m by which an object must be seen elsewhere than believed
 
 
-def make_world(boxes: tuple[Box, ...], things: tuple[Thing, ...] = ()) -> World:
+def make_world(obstacles: tuple[Obstacle, ...], objects: tuple[WorldObject, ...] = ()) -> World:
     """With its digest."""
-    return World(hashlib.sha256(repr((boxes, things)).encode()).hexdigest(), boxes, things)
+    return World(hashlib.sha256(repr((obstacles, objects)).encode()).hexdigest(), obstacles, objects)
 
 
 def update_world(world: World, pose: np.ndarray, phases: Collection[str], lift: float) -> World:
-    """The world with its one thing seen at `pose` (7,), NaN where nothing is seen.
+    """The world with its one object seen at `pose` (7,), NaN where nothing is seen.
 
     Args:
         phases: of a plan that has just been run to its end, none else. lift: m by which a grasp lifts.
     """
-    if len(world.things) != 1 or not np.isfinite(pose).all():
+    if len(world.objects) != 1 or not np.isfinite(pose).all():
         return world
-    thing = world.things[0]
+    object = world.objects[0]
     x, y, z, a, b, c, d = (float(value) for value in pose)
-    lifted = z - thing.position[2] > lift / 2
-    support = "standing" if "release" in phases else "held" if "lift" in phases and lifted else thing.support
-    if support == thing.support and np.linalg.norm(pose[:3] - thing.position) <= MOVED:
+    lifted = z - object.position[2] > lift / 2
+    support = "standing" if "release" in phases else "held" if "lift" in phases and lifted else object.support
+    if support == object.support and np.linalg.norm(pose[:3] - object.position) <= MOVED:
         return world
-    now = replace(thing, position=(x, y, z), quaternion=(a, b, c, d), support=support)
-    return make_world(world.boxes, (now,))
+    now = replace(object, position=(x, y, z), quaternion=(a, b, c, d), support=support)
+    return make_world(world.obstacles, (now,))

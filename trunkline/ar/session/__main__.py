@@ -82,7 +82,7 @@ def main(arguments: list[str]) -> int:
     options = parsed(arguments)
     names = names_of(options.host)
     context = context_of(options, names)
-    from trunkline.ar.session.session import serve  # not above: its processes import this file too, and want none of it
+    from trunkline.ar.session.serving import serve  # not above: its processes import this file too, and want none of it
 
     try:
         asyncio.run(serve(options, names, context))

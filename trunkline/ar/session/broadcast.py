@@ -5,7 +5,7 @@ import numpy as np
 from trunkline.ar.session import binary, messages
 from trunkline.ar.session.controller import SessionController
 from trunkline.ar.session.previewer import PreviewPiece
-from trunkline.ar.session.robot import STALE
+from trunkline.ar.session.robot_process import STALE
 from trunkline.ar.session.scene import Shells
 from trunkline.ar.teleop.alignment import base_quaternion
 from trunkline.ar.teleop.vectors import DOWN, conjugate, rotate

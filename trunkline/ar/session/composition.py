@@ -15,13 +15,13 @@ from trunkline.ar.session.hardware import Hardware
 from trunkline.ar.session.log_format import SIMULATED, Subject
 from trunkline.ar.session.log_writer import LogWriterProcess, new_path
 from trunkline.ar.session.preview_process import PreviewProcess
-from trunkline.ar.session.robot import RobotProcess
+from trunkline.ar.session.robot_process import RobotProcess
 from trunkline.ar.session.scene import Shells, scene
 from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.session.simulated import Simulation
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.core import Teleoperation
-from trunkline.ar.teleop.messages import Box
+from trunkline.ar.teleop.messages import Obstacle
 from trunkline.ar.teleop.rigid_ik import RigidIK
 from trunkline.ar.teleop.trajectory import limits_of
 from trunkline.ar.teleop.vectors import DOWN
@@ -31,7 +31,7 @@ from trunkline.unity import unpacked
 from trunkline.version import __version__
 
 SEARCH = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])  # rad, where the search for the ready pose begins
-BELOW, AROUND = 1.0, 3.0  # m, of the floor as a solid
+BELOW, AROUND = 1.0, 3.0  # m, of the floor as an obstacle
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def make(
     package = read_package(path)
     joints = RigidIK(teleop.mount_offset).solve(SEARCH, config.ready, DOWN, 0.0)
     simulation, maps = simulation_of(package, teleop, config, joints), unpacked.maps_of(package.files)
-    world = make_world(solids(config), () if config.thing is None else (config.thing,))
+    world = make_world(obstacles(config), () if config.object is None else (config.object,))
     setup = path.resolve(), teleop, config.preview, simulation.bodies, world
     previewer = PreviewProcess(preview_process.run, setup)  # first: it takes longest until it is ready
     drawing = scene(simulation.twin.model, simulation.bodies, maps, package.geometry.length)
@@ -94,7 +94,7 @@ def subject_of(simulation: Simulation, hardware: Hardware | None = None) -> Subj
 def robot_of(simulation: Simulation, hardware: Hardware | None) -> RobotProcess:
     """The simulated robot's process, or the real one's."""
     if hardware is not None:
-        from trunkline.ar.session.real import RealRobot  # with what hardware needs installed
+        from trunkline.ar.session.hardware_process import RealRobot  # with what hardware needs installed
 
         return RealRobot(hardware, simulation)
     tendons, bodies = len(simulation.commands), len(simulation.bodies)
@@ -104,14 +104,14 @@ def robot_of(simulation: Simulation, hardware: Hardware | None) -> RobotProcess:
 def simulation_of(package: Package, teleop: Teleop, config: SessionConfig, joints: np.ndarray) -> Simulation:
     """The simulated robot, at rest at `joints` (7,), rad, with its arm straight."""
     robot_model = robot_model_of(config.preview, package.files)
-    world = make_world(solids(config))
-    twin = compose_twin(robot_model, world, config.thing, joints, package.straight, config.preview)
+    world = make_world(obstacles(config))
+    twin = compose_twin(robot_model, world, config.object, joints, package.straight, config.preview)
     limits = limits_of(teleop.motors, package.rate_limit, len(package.straight))
     bodies, offset = drawn_bodies(twin.model), teleop.mount_offset
     return Simulation(twin, joints, package.straight, bodies, limits, package.digest, offset)
 
 
-def solids(config: SessionConfig) -> tuple[Box, ...]:
-    """What stands around the robot: the floor, and the boxes."""
-    floor = Box("the floor", (-AROUND, -AROUND, config.floor - BELOW), (AROUND, AROUND, config.floor))
-    return floor, *config.boxes
+def obstacles(config: SessionConfig) -> tuple[Obstacle, ...]:
+    """What stands around the robot: the floor, and the other obstacles."""
+    floor = Obstacle("the floor", (-AROUND, -AROUND, config.floor - BELOW), (AROUND, AROUND, config.floor))
+    return floor, *config.obstacles

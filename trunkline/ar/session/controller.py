@@ -26,7 +26,7 @@ from trunkline.ar.session.previewer import (
     Previewer,
     PreviewPiece,
 )
-from trunkline.ar.session.robot import RobotState
+from trunkline.ar.session.robot_process import RobotState
 from trunkline.ar.session.ui_text import next_action, next_key
 from trunkline.ar.teleop.alignment import base_quaternion
 from trunkline.ar.teleop.core import Teleoperation
@@ -73,7 +73,7 @@ class HandInput:
 
 
 class SessionController:
-    """One robot, one core. `lift`: m by which a thing is lifted by a grasp. `log_writer`: of the session.
+    """One robot, one core. `lift`: m by which an object is lifted by a grasp. `log_writer`: of the session.
     `period`: s, of the arm's slowest vibration mode."""
 
     def __init__(
@@ -318,7 +318,7 @@ class SessionController:
         phases = tuple(name for name, _ in self.plan.phases) if done and self.plan is not None else ()
         if done:
             self._believed = executor.digest
-        self.world = update_world(self.world, robot_state.thing, phases, self.lift)
+        self.world = update_world(self.world, robot_state.object, phases, self.lift)
 
     # --- what is told
 

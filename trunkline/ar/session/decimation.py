@@ -4,12 +4,12 @@ from collections import deque
 
 import numpy as np
 
-from trunkline.ar.session.robot import RobotState
+from trunkline.ar.session.robot_process import RobotState
 
 SELDOM = 0.25  # s between two that are kept then
 AFTER = 10.0  # s of rest that are kept whole: shapes at rest are identified from them
 BEFORE = 0.3  # s before a motion that are kept whole, so that a spline through all of it bends only there
-STILL = 3e-4  # m, rad, of quaternions: what nothing moves by within SELDOM; a thing bounces on its string by 1.7e-4
+STILL = 3e-4  # m, rad, of quaternions: what nothing moves by within SELDOM; an object bounces on its string by 1.7e-4
 NOWHERE = -1e3  # in place of what is not seen: it has moved once it is
 
 

@@ -10,7 +10,7 @@ SILENCE = 1.0  # s
 
 
 @dataclass
-class Control:
+class ControlLease:
     """`holder`: a client's id, "" for nobody. `asking`: who wants it, in their order. `heard`: s of the last input, or
     of when the lease began."""
 

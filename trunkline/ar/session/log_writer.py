@@ -11,6 +11,8 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from dataclasses import is_dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -39,7 +41,7 @@ from trunkline.ar.session.log_format import (
     new_file,
     run,
 )
-from trunkline.ar.session.robot import RobotState
+from trunkline.ar.session.robot_process import RobotState
 from trunkline.ar.teleop import messages
 from trunkline.ar.teleop.messages import Input, Intent, Pose
 from trunkline.errors import InputError
@@ -117,7 +119,18 @@ class LogWriter:
     def event(self, kind: str, **fields: object) -> None:
         """Anything else, by the name of its `kind`; fields are what JSON can hold, or dataclasses."""
         now = self.now()
-        self.keep(Record(EVENTS, now, now, _EVENT.dump_json({"event": kind, "time": now} | fields)))
+        plain = {name: _plain(value) for name, value in fields.items()}
+        self.keep(Record(EVENTS, now, now, _EVENT.dump_json({"event": kind, "time": now} | plain)))
+
+
+def _plain(value: object) -> object:
+    """A dataclass with the keys that it has as JSON, a value of any other type as it is."""
+    return _adapter(type(value)).dump_python(value) if is_dataclass(value) else value
+
+
+@cache
+def _adapter(kind: type) -> TypeAdapter:
+    return TypeAdapter(kind)
 
 
 class LogWriterProcess(LogWriter):

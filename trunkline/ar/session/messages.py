@@ -255,7 +255,7 @@ class PredictionMessage:
 
 @dataclass(frozen=True)
 class WorldMessage:
-    """The world as it is believed: solids and things."""
+    """The world as it is believed: obstacles and objects."""
 
     world: World
     type: Literal["world"] = "world"

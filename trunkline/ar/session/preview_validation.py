@@ -163,7 +163,7 @@ def _grasped(before: list[dict], later: list[dict]) -> bool:
 
 def _holds(events: list[dict]) -> bool:
     world = next((event["world"] for event in reversed(events) if event["event"] == "world"), {"things": []})
-    return any(thing["support"] == "held" for thing in world["things"])
+    return any(object["support"] == "held" for object in world["things"])
 
 
 def lines(results: list[Execution]) -> list[str]:

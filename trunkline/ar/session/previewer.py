@@ -24,7 +24,7 @@ from trunkline.ar.session import messages
 from trunkline.ar.session.bodies import BodyPoses
 from trunkline.ar.teleop.config import TeleoperationConfig
 from trunkline.ar.teleop.following import sought
-from trunkline.ar.teleop.messages import PlanReport, Request, Targets, Thing, World
+from trunkline.ar.teleop.messages import PlanReport, Request, Targets, World, WorldObject
 from trunkline.ar.teleop.plan import Plan
 from trunkline.ar.teleop.planner import Planner
 from trunkline.errors import InputError
@@ -125,7 +125,7 @@ class PreviewPlanner:
         self.robot_model, self.previewing = foresight.robot_model, foresight.settings
         self.prediction: PlanPrediction | None = None
         self._composed: tuple[tuple, ComposedTwin | None] = ((), None)
-        self._grasped: PlanPrediction | None = None  # the last grasp: of a thing that is held, the one that was run
+        self._grasped: PlanPrediction | None = None  # the last grasp: of an object that is held, the one that was run
 
     @classmethod
     def of(
@@ -192,14 +192,14 @@ class PreviewPlanner:
             return self.foresight.carrying(held_object, order.world, way, order.hangs, self._grasped)
         return self._twin(order.world, _beside(order), way.joints[0], way.commands[0])
 
-    def _twin(self, world: World, thing: Thing | None, joints: np.ndarray, commands: np.ndarray) -> ComposedTwin:
+    def _twin(self, world: World, object: WorldObject | None, joints: np.ndarray, commands: np.ndarray) -> ComposedTwin:
         """The last one where nothing has changed: to compile another takes longer than a piece of a preview."""
         composed, twin = self._composed
-        if twin is not None and composed == (world.boxes, thing):
+        if twin is not None and composed == (world.obstacles, object):
             twin = at_rest(twin, joints, commands, self.robot_model.robot.mount_offset)
         else:
-            twin = compose_twin(self.robot_model, world, thing, joints, commands, self.previewing)
-        self._composed = (world.boxes, thing), twin
+            twin = compose_twin(self.robot_model, world, object, joints, commands, self.previewing)
+        self._composed = (world.obstacles, object), twin
         return twin
 
     def _shown(
@@ -228,9 +228,9 @@ class PreviewPlanner:
         go_on: Callable[[], None],
     ) -> Iterator[PlanPrediction]:
         targets, serial = order.request.targets, order.request.serial
-        thing, held_object = order.world.thing(targets.thing) if targets.thing else None, _held_object(order)
-        if thing is not None and held_object is None:
-            for prediction in self.foresight.grasp(plan, targets, thing, order.world, order.hangs, serial, go_on):
+        object, held_object = order.world.object(targets.object) if targets.object else None, _held_object(order)
+        if object is not None and held_object is None:
+            for prediction in self.foresight.grasp(plan, targets, object, order.world, order.hangs, serial, go_on):
                 self._grasped = prediction
                 yield prediction
         elif held_object is not None and self._grasped is not None:
@@ -286,15 +286,15 @@ def prediction_message(digest: str, prediction: PlanPrediction) -> messages.Pred
     )  # fmt: skip
 
 
-def _beside(order: Order) -> Thing | None:
-    """What the twin may touch: one thing, the one that is meant, else any; none that the arm holds."""
-    things = [thing for thing in order.world.things if thing.support != "held"]
-    meant = [thing for thing in things if thing.name == order.request.targets.thing]
-    return (meant or things or [None])[0]
+def _beside(order: Order) -> WorldObject | None:
+    """What the twin may touch: one object, the one that is meant, else any; none that the arm holds."""
+    objects = [object for object in order.world.objects if object.support != "held"]
+    meant = [object for object in objects if object.name == order.request.targets.object]
+    return (meant or objects or [None])[0]
 
 
-def _held_object(order: Order) -> Thing | None:
-    """The thing that is brought elsewhere, None where none is."""
-    name = order.request.targets.thing
-    thing = order.world.thing(name) if name else None
-    return thing if thing is not None and thing.support == "held" else None
+def _held_object(order: Order) -> WorldObject | None:
+    """The object that is brought elsewhere, None where none is."""
+    name = order.request.targets.object
+    object = order.world.object(name) if name else None
+    return object if object is not None and object.support == "held" else None

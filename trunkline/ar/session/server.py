@@ -23,10 +23,10 @@ from trunkline.ar.session.client import PER_SECOND, Client, end
 from trunkline.ar.session.controller import SessionController
 from trunkline.ar.session.controller_input import controller_pose
 from trunkline.ar.session.gc_policy import GCPolicy
-from trunkline.ar.session.lease import Control
+from trunkline.ar.session.lease import ControlLease
 from trunkline.ar.session.previewer import PredictionAnswer, PreviewBegun, PreviewPiece
 from trunkline.ar.session.registration import mark_at
-from trunkline.ar.session.robot import next_report_time
+from trunkline.ar.session.robot_process import next_report_time
 from trunkline.ar.session.routes import Routes
 from trunkline.ar.session.scene import Shells
 from trunkline.ar.session.settings import AlignmentSettings
@@ -65,7 +65,7 @@ class Server:
 
     def __init__(self, composition: Composition, now: Callable[[], float] = time.monotonic) -> None:
         self.composition, self.controller, self.now = composition, composition.controller, now
-        self.control, self.code = Control(), PairingCode()
+        self.lease, self.code = ControlLease(), PairingCode()
         self.clients: dict[str, Client] = {}
         self._procedures: dict[str, AlignmentProcedure] = {}  # of clients that may come again
         self.broadcast = Broadcast(composition.controller, composition.shells)
@@ -180,7 +180,7 @@ class Server:
             say(messages.tell(client.procedure.progress()))
         say(messages.tell(messages.WorldMessage(controller.world)))
         if controller.intent is not None:
-            say(messages.tell(controller.state_message(self.control.holder)))
+            say(messages.tell(controller.state_message(self.lease.holder)))
             if controller.preview is not None and controller.intent.mode in PREVIEWED:
                 say(messages.tell(controller.preview))
                 for shown in controller.pieces:
@@ -231,7 +231,7 @@ class Server:
         client.stopping = stops and received.kind == "input"
 
     def _input(self, client: Client, received: binary.Received, now: float) -> None:
-        if client.id != self.control.holder:
+        if client.id != self.lease.holder:
             self._refuse(client, "input: you do not control; ask for it")
             return
         reason = client.clock.fault(received.stamp, now)
@@ -239,7 +239,7 @@ class Server:
         if reason:
             self._refuse(client, reason)
         else:
-            self.control.hear(client.id, now)
+            self.lease.hear(client.id, now)
             self._keep_hands(client, received)
             self._touch(client, received)
             pressed = controller_input.buttons(received)
@@ -255,7 +255,7 @@ class Server:
                 self.controller.log_writer.headset(name, at, pose, client.space == "base")
 
     def _keep_view(self, client: Client, received: binary.Received) -> None:
-        offset = client.clock.offset if client.id == self.control.holder else None
+        offset = client.clock.offset if client.id == self.lease.holder else None
         if offset is not None and "tracked" in received.flags and received.view is not None:
             self.controller.log_writer.headset("view", received.stamp + offset, received.view, client.space == "base")
 
@@ -281,7 +281,7 @@ class Server:
         elif isinstance(message, messages.AlignmentByEye | messages.TouchRequest | messages.AnchorPose):
             self._align(client, message)
         elif isinstance(message, messages.PreviewShown):
-            reason = "shown: you do not control" if client.id != self.control.holder else ""
+            reason = "shown: you do not control" if client.id != self.lease.holder else ""
             if reason := reason or self.controller.shown(message.digest, now):
                 self._refuse(client, reason)
         else:
@@ -315,7 +315,7 @@ class Server:
         """The core, the client and the log hear what has changed."""
         assert client.procedure is not None
         now = client.procedure.progress()
-        if client.id == self.control.holder:
+        if client.id == self.lease.holder:
             self.controller.align(client.alignment, client.unfit)
         if now == before:
             return
@@ -336,14 +336,14 @@ class Server:
         asyncio.get_running_loop().run_in_executor(None, anchors.save).add_done_callback(saved)
 
     def _lease(self, client: Client, wish: messages.LeaseRequest, now: float) -> None:
-        before = self.control.holder
+        before = self.lease.holder
         if wish.action == "ask":
-            self.control.ask(client.id, now)
+            self.lease.ask(client.id, now)
         elif wish.action == "release":
-            self.control.release(client.id, now)
+            self.lease.release(client.id, now)
         elif wish.to not in self.clients:
             self._refuse(client, f"lease: found no client {wish.to!r}")
-        elif not self.control.give(client.id, wish.to, now):
+        elif not self.lease.give(client.id, wish.to, now):
             self._refuse(client, "lease: you do not control")
         self._passed(before)
         self._tell_lease()
@@ -352,8 +352,8 @@ class Server:
         if self.clients.get(client.id) is not client:
             return
         del self.clients[client.id]
-        before = self.control.holder
-        self.control.release(client.id, self.now())
+        before = self.lease.holder
+        self.lease.release(client.id, self.now())
         self._passed(before)
         self.composition.log(f"{client.id} left, {len(self.clients)} here")
         self.controller.log_writer.event("left", client=client.id)
@@ -361,7 +361,7 @@ class Server:
 
     def _passed(self, before: str) -> None:
         """The robot holds whenever somebody else controls."""
-        holder = self.control.holder
+        holder = self.lease.holder
         if holder == before:
             return
         self.composition.log(f"{holder or 'nobody'} controls")
@@ -414,8 +414,8 @@ class Server:
 
     def tick(self, now: float, dt: float) -> None:
         """A step of the core, and what all see of it."""
-        before = self.control.holder
-        if self.control.silent(now):
+        before = self.lease.holder
+        if self.lease.silent(now):
             self.composition.log(f"{before} was silent")
             self._passed(before)
             self._tell_lease()
@@ -446,7 +446,7 @@ class Server:
     def _show(self, now: float) -> None:
         """The robot, its reach and the state to all."""
         frame, shell = self.broadcast.robot(now), self.broadcast.new_shell(now)
-        state = self.broadcast.new_state(now, self.control.holder)
+        state = self.broadcast.new_state(now, self.lease.holder)
         text = messages.tell(state) if state is not None else ""
         for client in self.clients.values():
             client.outbox.show("robot", frame)
@@ -457,7 +457,7 @@ class Server:
 
     def _tell_lease(self) -> None:
         people = tuple(messages.Person(client.id, client.name) for client in self.clients.values())
-        self._tell(messages.Lease(self.control.holder, tuple(self.control.asking), people))
+        self._tell(messages.Lease(self.lease.holder, tuple(self.lease.asking), people))
 
     def _tell(self, answer: messages.ServerMessage) -> None:
         text = messages.tell(answer)

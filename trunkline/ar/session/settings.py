@@ -1,14 +1,17 @@
 """All settings of conf/live/config.yaml."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field
 
 from trunkline.ar.preview.settings import Previewing
-from trunkline.ar.teleop.messages import Box, Thing
-from trunkline.settings import settings
+from trunkline.ar.teleop.messages import Obstacle, WorldObject
+from trunkline.pipeline.config import PROJECT, compose_settings, validated
+from trunkline.settings import rename_keys, settings
 
+RENAMED = {"boxes": "obstacles", "thing": "object"}  # keys of the release before
 Metres = Annotated[float, Field(ge=-5, le=5)]
 
 
@@ -39,14 +42,25 @@ class AlignmentSettings:
 
 @settings
 class SessionConfig:
-    """rate: Hz. ready: of the mount at first, m. floor: its height, m. boxes: solids that stand there,
-    upright. thing: what may be grasped, or None."""
+    """rate: Hz. ready: of the mount at first, m. floor: its height, m. obstacles: that stand there. object: what
+    may be grasped, or None."""
 
     rate: Annotated[float, Field(ge=20, le=240)]
     ready: Annotated[tuple[Metres, Metres, Metres], Field()]
     floor: Metres
-    boxes: tuple[Box, ...]
-    thing: Thing | None
+    obstacles: tuple[Obstacle, ...]
+    object: WorldObject | None
     journal: LogSettings
     alignment: AlignmentSettings
     preview: Previewing
+
+
+def read_session_config(folder: Path = PROJECT / "conf/live") -> SessionConfig:
+    """The settings of a folder, also under the names of the release before.
+
+    Raises:
+        InputError: one line that names the folder and key, what was found and what was expected.
+    """
+    values = compose_settings(folder, {}, str(folder))
+    rename_keys(values, RENAMED, str(folder))
+    return validated(SessionConfig, values, folder)

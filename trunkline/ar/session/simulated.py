@@ -22,7 +22,7 @@ from trunkline.ar.hybrid.compose import panda_joints
 from trunkline.ar.hybrid.rollouts import ComposedTwin
 from trunkline.ar.hybrid.torques import servo_commands
 from trunkline.ar.session.bodies import BodyPoses
-from trunkline.ar.session.robot import DEAD_MAN, MODES, PERMIT, PERMITTED, STOPS, TELLS, Goal, RobotChannel
+from trunkline.ar.session.robot_process import DEAD_MAN, MODES, PERMIT, PERMITTED, STOPS, TELLS, Goal, RobotChannel
 from trunkline.ar.teleop.executor import FOLLOWS, SimulatedRobot
 from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.plan import Plan
@@ -75,7 +75,7 @@ class TwinPlant:
             off.mjDSBL_CONTACT | off.mjDSBL_FRICTIONLOSS | off.mjDSBL_EQUALITY | off.mjDSBL_LIMIT
         )
         self._data = mujoco.MjData(self._bare)
-        self._poses, self._thing = BodyPoses(model, simulation.bodies), BodyPoses(model, ("object",))
+        self._poses, self._object = BodyPoses(model, simulation.bodies), BodyPoses(model, ("object",))
         self._last = np.tile(simulation.joints, (2, 1))
         controls = np.zeros((1, model.nu))
         controls[:, self._motors] = self._commands = simulation.commands
@@ -109,9 +109,9 @@ class TwinPlant:
         """Of the bodies, (N, 7)."""
         return self._poses.of(self.batch.bind("qpos")[0])
 
-    def thing(self) -> np.ndarray:
+    def object(self) -> np.ndarray:
         """Of what may be grasped, (7,); NaN where there is none."""
-        return self._thing.of(self.batch.bind("qpos")[0])[0]
+        return self._object.of(self.batch.bind("qpos")[0])[0]
 
     def measured(self) -> np.ndarray:
         """The Panda's joints, rad (7,)."""
@@ -144,7 +144,7 @@ class MovingPlant(Protocol):
     @property
     def fault(self) -> str: ...
     def poses(self) -> np.ndarray: ...
-    def thing(self) -> np.ndarray: ...
+    def object(self) -> np.ndarray: ...
     def measured(self) -> np.ndarray: ...
     def lengths(self) -> np.ndarray: ...
 
@@ -192,7 +192,7 @@ class Loop:
         self.fault = self.fault or state.fault
         mode = "fault" if self.fault else state.mode
         head = [now, MODES.index(mode), self.serial, self.hold_time, 1.0]
-        poses = [self.plant.thing(), self.plant.poses().ravel()]
+        poses = [self.plant.object(), self.plant.poses().ravel()]
         axes = [self.robot.joints, self.robot.commands, self.plant.measured(), self.plant.lengths()]
         self.channel.tell(np.concatenate([head, *axes, *poses]), self.fault)
 

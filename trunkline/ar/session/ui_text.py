@@ -74,7 +74,7 @@ def _next(device: InputDevice, mode: Mode, targets: Targets | None, holder: str,
     if targets.rigid.reach == "outside" or targets.tip.reach == "outside":
         return f"bring the target within reach, or press {device.offered} for the point that is offered"
     if targets.rigid.reach == "blocked" or targets.tip.reach == "blocked":
-        return "bring the target out of the solid"
-    if targets.thing:
-        return f"{device.asks} to ask for a plan for {targets.thing}"
+        return "bring the target out of the obstacle"
+    if targets.object:
+        return f"{device.asks} to ask for a plan for {targets.object}"
     return device.modes[mode]

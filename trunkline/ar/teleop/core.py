@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass, replace
 
 from trunkline.ar.teleop.alignment import Aligned, wrist_of
-from trunkline.ar.teleop.events import Ends, happened, looked_back, stopped_by
+from trunkline.ar.teleop.events import Ends, detect_events, looked_back, stopped_by
 from trunkline.ar.teleop.headset_loss import silence_fault
 from trunkline.ar.teleop.input_validation import clock_fault, fault_of, setting_fault, swapped
 from trunkline.ar.teleop.messages import Input, Intent, Motion, Pose, Request, Targets
@@ -64,7 +64,7 @@ class Teleoperation:
         targets = self._targets(state, message)
         if targets is not None:
             state = self._remembered(state, targets)
-        events, notice = happened(state, message, targets, ends, self.settings)
+        events, notice = detect_events(state, message, targets, ends, self.settings)
         events["confirm"] = events["confirm"] and not unheard
         state, intent = self._after(state, message, events, notice, targets, dt, ends)
         return state, replace(intent, notice=unheard or intent.notice)

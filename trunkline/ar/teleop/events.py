@@ -15,7 +15,7 @@ def stopped_by(message: Input) -> bool:
     return message.left.secondary or message.right.secondary
 
 
-def happened(
+def detect_events(
     state: TeleoperationState, message: Input, targets: Targets | None, ends: Ends, settings: Teleop
 ) -> tuple[dict[Event, bool], str]:
     """Of a sound step; `targets` are the present ones, `ends` those of the rays."""
@@ -85,7 +85,7 @@ def refusal(state: TeleoperationState, message: Input, settings: Teleop) -> str:
 def takes_offer(state: TeleoperationState, message: Input, settings: Teleop) -> bool:
     """Whether the assistant's offer for the plan that is shown is taken: the rigid hand's primary, its grip let go."""
     hand, pinned = state.hands[("left", "right").index(settings.rigid_hand)], state.pinned
-    mine = pinned is not None and message.offer is not None and message.offer.thing == pinned.request.targets.thing
+    mine = pinned is not None and message.offer is not None and message.offer.object == pinned.request.targets.object
     return mine and "primary" in hand.pressed and not hand.grips
 
 

@@ -18,8 +18,8 @@ import numpy as np
 import ruckig
 
 from trunkline.ar.teleop.messages import Targets, World
-from trunkline.ar.teleop.obstacles import refuse
 from trunkline.ar.teleop.plan import Plan
+from trunkline.ar.teleop.plan_checks import check_plan
 from trunkline.ar.teleop.planner import Planner
 from trunkline.ar.teleop.trajectory import JOINTS, MotionLimits
 from trunkline.errors import InputError
@@ -39,7 +39,7 @@ def sought(
         return None, ""
     try:
         there, commands = planner.goal(targets, joints)
-        refuse(Plan(KNOT, there[None], commands[None], (), "", ""), world, planner.mount_offset, planner.chain)
+        check_plan(Plan(KNOT, there[None], commands[None], (), "", ""), world, planner.mount_offset, planner.chain)
     except InputError as error:
         return None, str(error)
     return np.append(there, commands), ""

@@ -9,7 +9,7 @@ from pydantic import Field
 from trunkline.ar.hybrid.grasp_poses import GraspPose, Grip
 from trunkline.ar.hybrid.objects import Shape
 from trunkline.ar.teleop.alignment import base_quaternion
-from trunkline.ar.teleop.messages import Targets, Thing, World
+from trunkline.ar.teleop.messages import Targets, World, WorldObject
 from trunkline.ar.teleop.object_shapes import below_grip, beneath, grip_of, way_of_grasping
 from trunkline.ar.teleop.rigid_ik import RigidIK
 from trunkline.ar.teleop.vectors import DOWN, Vector, conjugate, rotate
@@ -25,12 +25,12 @@ Mass = Annotated[float, Field(ge=0, le=20)]
 
 @dataclass
 class Handling:
-    """How things are grasped and brought elsewhere.
+    """How objects are grasped and brought elsewhere.
 
     close: s, at least, for the cables to close. calm: s for which all waits before it and after it.
     lift: m. carry: m/s, of the mount with something in the arm, on the average. above: m over its place from which a
-    thing comes down. open: s, at least, in which the arm opens while the mount rises. beneath: m, at most, that a
-    thing may fall as it is let go. payload: of each shape, rows of diameter, m, and the heaviest mass, kg, that is
+    object comes down. open: s, at least, in which the arm opens while the mount rises. beneath: m, at most, that a
+    object may fall as it is let go. payload: of each shape, rows of diameter, m, and the heaviest mass, kg, that is
     grasped, linear between.
     """
 
@@ -85,27 +85,27 @@ class Grasping:
     grips: dict[str, Grip]
     handling: Handling
 
-    def grasp(self, targets: Targets, thing: Thing, joints: np.ndarray, beside: float = 0.0) -> list[Leg]:
+    def grasp(self, targets: Targets, object: WorldObject, joints: np.ndarray, beside: float = 0.0) -> list[Leg]:
         """Approach with the arm opened, close while the mount goes down, lift.
 
         Args:
             beside: m, by which the straight arm's tip is seen beside the bending plane, towards its base's y: the mount
-                makes up for it, as a narrow coil must meet a thing in its middle.
+                makes up for it, as a narrow coil must meet an object in its middle.
 
         Raises:
-            InputError: the thing is too heavy, nobody knows how to grasp it, or the rigid robot cannot be there.
+            InputError: the object is too heavy, nobody knows how to grasp it, or the rigid robot cannot be there.
         """
-        h, name = self.handling, way_of_grasping(thing)
+        h, name = self.handling, way_of_grasping(object)
         if name not in self.grips:
-            raise InputError(f"grasp: {thing.name} is {thing.support}, expected {' or '.join(self.grips)}")
-        most = h.heaviest(thing.shape, thing.diameter)
-        if thing.mass > most:
+            raise InputError(f"grasp: {object.name} is {object.support}, expected {' or '.join(self.grips)}")
+        most = h.heaviest(object.shape, object.diameter)
+        if object.mass > most:
             raise InputError(
-                f"payload: {thing.name} weighs {thing.mass:g} kg, expected at most {most:.3g} kg "
-                f"at a diameter of {1e3 * thing.diameter:.0f} mm"
+                f"payload: {object.name} weighs {object.mass:g} kg, expected at most {most:.3g} kg "
+                f"at a diameter of {1e3 * object.diameter:.0f} mm"
             )
-        placement = self.placement(targets, thing)
-        centre = np.array(grip_of(thing)) - beside * placement.rotation[:, 1]
+        placement = self.placement(targets, object)
+        centre = np.array(grip_of(object)) - beside * placement.rotation[:, 1]
         opened = self.straight - placement.opened
         closed, still, gravity = self.straight - placement.closed, np.zeros(len(opened)), _gravity(targets)
 
@@ -123,14 +123,14 @@ class Grasping:
             Leg("lift", at(sunk, placement.mount + h.lift * UP), closed, seconds=up / h.carry, gentle=True),
         ]
 
-    def placement(self, targets: Targets, thing: Thing) -> GraspPose:
+    def placement(self, targets: Targets, object: WorldObject) -> GraspPose:
         """Of the user's own targets."""
-        centre = np.array(grip_of(thing))
+        centre = np.array(grip_of(object))
         rotation = rotation_from_wxyz(np.array(base_quaternion(targets.pointing, targets.heading))).as_matrix()
-        return self.grips[way_of_grasping(thing)].placed(rotation, np.array(targets.rigid.position) - centre)
+        return self.grips[way_of_grasping(object)].placed(rotation, np.array(targets.rigid.position) - centre)
 
     def bring(
-        self, targets: Targets, thing: Thing, world: World, joints: np.ndarray, commands: np.ndarray
+        self, targets: Targets, object: WorldObject, world: World, joints: np.ndarray, commands: np.ndarray
     ) -> list[Leg]:
         """Transfer what is held to above its place, down, open and rise.
 
@@ -138,8 +138,8 @@ class Grasping:
             InputError: nothing is beneath the place, or the rigid robot cannot be there.
         """
         h, place = self.handling, np.array(targets.rigid.position)
-        _require_ground(thing, targets.tip.position, world, h.beneath)
-        opened, rise = np.maximum(commands, self.straight), self.grips[way_of_grasping(thing)].rise
+        _require_ground(object, targets.tip.position, world, h.beneath)
+        opened, rise = np.maximum(commands, self.straight), self.grips[way_of_grasping(object)].rise
         above = self._solve(joints, place + h.above * UP, targets)
         there = self._solve(above, place, targets)
         away = np.linalg.norm(place + h.above * UP - mount_pose(joints[None], self.mount_offset)[0][0])
@@ -158,18 +158,18 @@ def _gravity(targets: Targets) -> np.ndarray:
     return np.array(rotate(conjugate(base_quaternion(targets.pointing, targets.heading)), DOWN))
 
 
-def _require_ground(thing: Thing, place: Vector, world: World, most: float) -> None:
-    """Refuse to release a thing at `place`, m, where nothing is beneath it.
+def _require_ground(object: WorldObject, place: Vector, world: World, most: float) -> None:
+    """Refuse to release an object at `place`, m, where nothing is beneath it.
 
     Raises:
         InputError: telling what is missing.
     """
-    x, y, z = place[0], place[1], place[2] - below_grip(thing)
-    box = beneath((x, y, z), world)
-    gap = np.inf if box is None else z - box.high[2]
+    x, y, z = place[0], place[1], place[2] - below_grip(object)
+    obstacle = beneath((x, y, z), world)
+    gap = np.inf if obstacle is None else z - obstacle.high[2]
     if gap > most:
-        gap_text = "nothing" if box is None else f"{1e3 * gap:.0f} mm"
+        gap_text = "nothing" if obstacle is None else f"{1e3 * gap:.0f} mm"
         raise InputError(
-            f"release: found {gap_text} between {thing.name} and what is beneath it, "
+            f"release: found {gap_text} between {object.name} and what is beneath it, "
             f"expected at most {1e3 * most:.0f} mm"
         )

@@ -1,7 +1,8 @@
 """Where the robot holds because the headset is lost: no new stamp of its clock has come for `Safety.silence` s.
 
 Behind it, each with a timeout of its own: control passes from a client that is silent (`ar/session/lease.py`), the
-robot's process brakes without a permit (`ar/session/robot.py`), a driver without setpoints (`ar/drivers/watchdog.py`).
+robot's process brakes without a permit (`ar/session/robot_process.py`), a driver without setpoints
+(`ar/drivers/watchdog.py`).
 """
 
 from trunkline.ar.teleop.settings import Safety

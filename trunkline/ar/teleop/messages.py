@@ -2,18 +2,19 @@
 
 Frames: `reference` is the headset's, any frame that stands still; `base` is the rigid robot's, z up. A controller's
 pose is the pose of its ray: origin at the device, the ray along -z, y up from the back of the hand (WebXR's target ray
-space). Positions in m, quaternions (w, x, y, z), stamps in s of the client's clock.
+space). Positions in m, quaternions (w, x, y, z), stamps in s of the client's clock. In JSON, which clients in other
+languages read, some fields have another name: their `alias`.
 """
 
 from dataclasses import dataclass
 from typing import Annotated, Literal, TypeVar
 
-from pydantic import BeforeValidator, ConfigDict, TypeAdapter, ValidationError
+from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationError
 
 from trunkline.ar.hybrid.basket import Basket
 from trunkline.errors import InputError
 
-STRICT = ConfigDict(extra="forbid", ser_json_inf_nan="null")
+STRICT = ConfigDict(extra="forbid", ser_json_inf_nan="null", serialize_by_alias=True)
 # JSON has no NaN: it is written as null, and read back, so that recorded faults are vectors too.
 Number = Annotated[float, BeforeValidator(lambda value: float("nan") if value is None else value)]
 Vector = tuple[Number, Number, Number]
@@ -52,8 +53,9 @@ class Pose:
 
 
 @dataclass(frozen=True)
-class Box:
-    """A solid, axes along the base frame: `low` and `high` corners, m. A table, a chair's seat, the floor."""
+class Obstacle:
+    """A solid that must not be touched, axes along the base frame: `low` and `high` corners, m. A table, a seat,
+    the floor."""
 
     __pydantic_config__ = STRICT
     name: str
@@ -62,7 +64,7 @@ class Box:
 
 
 @dataclass(frozen=True)
-class Thing:
+class WorldObject:
     """Something to grasp, as the client believes it: `position` of its centre, m, and `quaternion`, in the base frame.
 
     `diameter`: m, of a box its width along x and y, of a basket its bar's; `height`: m, along z, idle for a sphere, of
@@ -84,31 +86,31 @@ class Thing:
 
 @dataclass(frozen=True)
 class World:
-    """What stands around the robot: its `digest`, which changes with it, the solids that no target may be in, and the
-    things that can be grasped."""
+    """What stands around the robot: its `digest`, which changes with it, the obstacles, and the objects that can be
+    grasped."""
 
     __pydantic_config__ = STRICT
     digest: str
-    boxes: tuple[Box, ...] = ()
-    things: tuple[Thing, ...] = ()
+    obstacles: Annotated[tuple[Obstacle, ...], Field(alias="boxes")] = ()
+    objects: Annotated[tuple[WorldObject, ...], Field(alias="things")] = ()
 
-    def thing(self, name: str) -> Thing:
+    def object(self, name: str) -> WorldObject:
         """That of this name; there is one, as names come from here."""
-        return next(thing for thing in self.things if thing.name == name)
+        return next(object for object in self.objects if object.name == name)
 
     @property
-    def held_object(self) -> Thing | None:
+    def held_object(self) -> WorldObject | None:
         """What the arm holds."""
-        return next((thing for thing in self.things if thing.support == "held"), None)
+        return next((object for object in self.objects if object.support == "held"), None)
 
 
 @dataclass(frozen=True)
 class Offer:
-    """The assistant's: with the mount at `rigid`, m, the end effector `pointing`, the thing is held with `probability`,
-    more surely than where the user has it."""
+    """The assistant's: with the mount at `rigid`, m, the end effector `pointing`, the object is held with
+    `probability`, more surely than where the user has it."""
 
     __pydantic_config__ = STRICT
-    thing: str
+    object: Annotated[str, Field(alias="thing")]
     rigid: Vector
     pointing: Vector
     probability: Number
@@ -164,7 +166,7 @@ class Input:
 class Target:
     """A target in the base frame, and whether it can be reached.
 
-    `reach`: "inside", "outside", "unknown" (no map tells), "blocked" (in a solid of the world, named by `solid`).
+    `reach`: "inside", "outside", "unknown" (no map tells), "blocked" (in an obstacle, named by `obstacle`).
     `offer`: where outside, the nearest point that is inside; an offer only, the target stays where the user put it.
     """
 
@@ -173,7 +175,7 @@ class Target:
     reach: Literal["inside", "outside", "unknown", "blocked"] = "unknown"
     outside_by: Number = 0.0
     offer: Vector | None = None
-    solid: str = ""
+    obstacle: Annotated[str, Field(alias="solid")] = ""
 
 
 @dataclass(frozen=True)
@@ -183,9 +185,9 @@ class Targets:
     `pointing`: direction in which the end effector points, unit length; `heading`: angle of the soft arm's tendon 1
     about the arm's axis, rad (`alignment.base_quaternion`). `half_plane`: which bends, 0 dorsal, 1 ventral. `turned`:
     by which the wrist turns from where it is, rad; None where no half-plane is within the wrist's limits.
-    `tilt_limited`: the controller was tilted further than the end effector may be. `thing`: name of what the tip target
-    marks, to be grasped, or of what the arm holds, to be brought to where the tip target is then; "" for nothing.
-    `better`: the assistant's offer; an offer only.
+    `tilt_limited`: the controller was tilted further than the end effector may be. `object`: name of what the tip
+    target marks, to be grasped, or of what the arm holds, to be brought to where the tip target is then; "" for
+    nothing. `better`: the assistant's offer; an offer only.
     """
 
     __pydantic_config__ = STRICT
@@ -196,7 +198,7 @@ class Targets:
     half_plane: int
     turned: Number | None
     tilt_limited: bool = False
-    thing: str = ""
+    object: Annotated[str, Field(alias="thing")] = ""
     better: Offer | None = None
 
 

@@ -1,50 +1,55 @@
-"""Things as a grasp sees them: how they are grasped, where, and how far they reach down."""
+"""Objects as a grasp sees them: how they are grasped, where, and how far they reach down."""
 
 import numpy as np
 
 from trunkline.ar.hybrid.basket import Part, bar_height, parts_of
-from trunkline.ar.teleop.messages import Box, Thing, World
+from trunkline.ar.teleop.messages import Obstacle, World, WorldObject
 from trunkline.ar.teleop.vectors import Vector, add, rotate
 from trunkline.frames import rotation_from_wxyz
 
 WHOLE = np.eye(3)
 
 
-def way_of_grasping(thing: Thing) -> str:
+def way_of_grasping(object: WorldObject) -> str:
     """A basket is grasped by its bar, whatever supports it; all else is as it hangs, and is in the arm since it did."""
-    if thing.shape == "basket":
+    if object.shape == "basket":
         return "basket"
-    return "standing" if thing.support == "standing" else "hanging"
+    return "standing" if object.support == "standing" else "hanging"
 
 
-def grip_of(thing: Thing) -> Vector:
+def grip_of(object: WorldObject) -> Vector:
     """The middle of what the arm wraps, base frame, m: a basket's bar, else the centre."""
-    if thing.shape != "basket":
-        return thing.position
-    return add(thing.position, rotate(thing.quaternion, (0.0, 0.0, bar_height(thing.basket, thing.height))))
+    if object.shape != "basket":
+        return object.position
+    return add(object.position, rotate(object.quaternion, (0.0, 0.0, bar_height(object.basket, object.height))))
 
 
-def below_grip(thing: Thing) -> float:
+def below_grip(object: WorldObject) -> float:
     """How far its lowest point is below its grip, as it is turned, m."""
-    if thing.shape == "sphere":
-        return thing.diameter / 2
-    turn = rotation_from_wxyz(np.array(thing.quaternion)).as_matrix()
-    lowest = min(float(turn[2] @ part.place) - _half_extent(part, turn) for part in _parts(thing))
-    return grip_of(thing)[2] - thing.position[2] - lowest
+    if object.shape == "sphere":
+        return object.diameter / 2
+    turn = rotation_from_wxyz(np.array(object.quaternion)).as_matrix()
+    lowest = min(float(turn[2] @ part.place) - _half_extent(part, turn) for part in _parts(object))
+    return grip_of(object)[2] - object.position[2] - lowest
 
 
-def beneath(place: Vector, world: World) -> Box | None:
-    """The highest solid that is beneath `place`, m; None where there is none."""
+def beneath(place: Vector, world: World) -> Obstacle | None:
+    """The highest obstacle that is beneath `place`, m; None where there is none."""
     x, y, z = place
-    under = [box for box in world.boxes if box.low[0] <= x <= box.high[0] and box.low[1] <= y <= box.high[1]]
-    return max((box for box in under if box.high[2] <= z), key=lambda box: box.high[2], default=None)
+    under = [
+        obstacle
+        for obstacle in world.obstacles
+        if obstacle.low[0] <= x <= obstacle.high[0] and obstacle.low[1] <= y <= obstacle.high[1]
+    ]
+    lower = (obstacle for obstacle in under if obstacle.high[2] <= z)
+    return max(lower, key=lambda obstacle: obstacle.high[2], default=None)
 
 
-def _parts(thing: Thing) -> list[Part]:
-    if thing.shape == "basket":
-        return list(parts_of(thing.basket, thing.diameter, thing.height).values())
-    half = np.array([thing.diameter, thing.diameter, thing.height]) / 2
-    return [Part("cylinder" if thing.shape == "cylinder" else "box", half, np.zeros(3), WHOLE, 1.0)]
+def _parts(object: WorldObject) -> list[Part]:
+    if object.shape == "basket":
+        return list(parts_of(object.basket, object.diameter, object.height).values())
+    half = np.array([object.diameter, object.diameter, object.height]) / 2
+    return [Part("cylinder" if object.shape == "cylinder" else "box", half, np.zeros(3), WHOLE, 1.0)]
 
 
 def _half_extent(part: Part, turn: np.ndarray) -> float:

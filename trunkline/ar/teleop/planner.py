@@ -8,8 +8,8 @@ import numpy as np
 from trunkline.ar.teleop.alignment import base_quaternion
 from trunkline.ar.teleop.grasping import Grasping, Leg
 from trunkline.ar.teleop.messages import Request, Targets, World
-from trunkline.ar.teleop.obstacles import refuse
 from trunkline.ar.teleop.plan import Plan
+from trunkline.ar.teleop.plan_checks import check_plan
 from trunkline.ar.teleop.rigid_ik import RigidIK
 from trunkline.ar.teleop.shaping import Shaper, shaped
 from trunkline.ar.teleop.tendons import Network, bend
@@ -27,7 +27,7 @@ ShaperOf = Callable[[np.ndarray, np.ndarray, np.ndarray], Shaper]
 class Planner:
     """What plans are made with. `straight`: commands that leave the arm straight, m, (K,). `tolerance`: m, how far
     from its target the tip may be foreseen. `step`: s, between a plan's rows. `chain`: the arm's statics, by which the
-    network's answers are corrected, and no solid may be in the arm's way. `grasping`: how things are grasped."""
+    network's answers are corrected, and no obstacle may be in the arm's way. `grasping`: how objects are grasped."""
 
     rigid: RigidIK
     network: Network
@@ -43,7 +43,7 @@ class Planner:
     def plan(
         self, request: Request, world: World, joints: np.ndarray, commands: np.ndarray, beside: float = 0.0
     ) -> Plan:
-        """From rest at `joints` (7,), rad, and `commands` (K,), m: approach with a straight arm and curl; of a thing
+        """From rest at `joints` (7,), rad, and `commands` (K,), m: approach with a straight arm and curl; of an object
         that the tip target marks, approach, curl and lift; of one that the arm holds, transfer and release.
 
         Args:
@@ -66,19 +66,19 @@ class Planner:
             rows.append(np.concatenate([way[1:], np.tile(end, (round(leg.calm / self.step), 1))]))
         every = np.concatenate(rows)
         plan = Plan(self.step, every[:, :JOINTS], every[:, JOINTS:], tuple(phases), request.package, request.world)
-        refuse(plan, world, self.mount_offset, self.chain)
+        check_plan(plan, world, self.mount_offset, self.chain)
         return plan
 
     def _legs(
         self, targets: Targets, world: World, joints: np.ndarray, commands: np.ndarray, beside: float
     ) -> list[Leg]:
-        if targets.thing:
-            thing = world.thing(targets.thing)
+        if targets.object:
+            object = world.object(targets.object)
             if self.grasping is None:
-                raise InputError(f"grasp: found no way of grasping {thing.name}, expected a planner that has one")
-            if thing.support == "held":
-                return self.grasping.bring(targets, thing, world, joints, commands)
-            return self.grasping.grasp(targets, thing, joints, beside)
+                raise InputError(f"grasp: found no way of grasping {object.name}, expected a planner that has one")
+            if object.support == "held":
+                return self.grasping.bring(targets, object, world, joints, commands)
+            return self.grasping.grasp(targets, object, joints, beside)
         there, curled = self.goal(targets, joints)
         gravity = np.array(_soft_target(targets)[1])
         return [Leg("approach", there, self.straight, gravity), Leg("curl", there, curled, gravity)]

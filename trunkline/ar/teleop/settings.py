@@ -84,7 +84,7 @@ class Teleop:
     """Settings of the core. `look_back`: s before a press from which the targets are taken. `delay`: s from a
     confirmation to its execution. `follow_delay`: s by which the robot follows. `moved`: m by which a ray must move
     with its grip held to aim anew while a plan is shown. `rigid_hand`: whose ray holds the rigid target. `mark`: m from
-    a thing's centre within which the tip target marks it."""
+    an object's centre within which the tip target marks it."""
 
     rigid_hand: Literal["left", "right"]
     rays: RaySettings

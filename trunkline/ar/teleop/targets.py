@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 from trunkline.ar.teleop.alignment import Aligned, Wrist, align, base_quaternion, carried_heading
-from trunkline.ar.teleop.messages import Offer, Target, Targets, Thing, World
+from trunkline.ar.teleop.messages import Offer, Target, Targets, World, WorldObject
 from trunkline.ar.teleop.object_shapes import grip_of
 from trunkline.ar.teleop.reach import Reach, Reading
 from trunkline.ar.teleop.settings import Orientation, Teleop
@@ -36,16 +36,16 @@ def place(
 ) -> Targets:
     """Both targets (base frame, m) with their reach under the gravity that the arm will have there.
 
-    A tip target that marks a thing is where the arm grips it. Whether it can be grasped no map tells: plan and preview
-    do.
+    A tip target that marks an object is where the arm grips it. Whether it can be grasped no map tells: plan and
+    preview do.
     """
-    thing = marked(tip, world, settings.mark)
-    tip = tip if thing is None else grip_of(thing)
+    object = marked(tip, world, settings.mark)
+    tip = tip if object is None else grip_of(object)
     aligned = align(tip, rigid, pointing, wrist, last, settings.bending_plane)
     turn = base_quaternion(pointing, aligned.heading)
     back = conjugate(turn)
     reading = Reading("unknown")
-    if thing is None:
+    if object is None:
         reading = reach.soft(rotate(back, subtract(tip, rigid)), rotate(back, DOWN))
     offer = None if reading.offer is None else add(rigid, rotate(turn, reading.offer))
     return Targets(
@@ -56,12 +56,12 @@ def place(
         aligned.half_plane,
         aligned.turned,
         limited,
-        "" if thing is None else thing.name,
+        "" if object is None else object.name,
     )
 
 
 def bring(
-    thing: Thing,
+    object: WorldObject,
     rigid: Vector,
     pointing: Vector,
     limited: bool,
@@ -70,12 +70,12 @@ def bring(
     world: World,
     reach: Reach,
 ) -> Targets:
-    """Targets of an arm that holds a thing: the mount goes to `rigid`, the wrist as joint 1 carries it, and the tip
+    """Targets of an arm that holds an object: the mount goes to `rigid`, the wrist as joint 1 carries it, and the tip
     target is where what it grips comes to."""
     heading = carried_heading(rigid, wrist)
     there = base_quaternion(pointing, heading)
     here = base_quaternion(wrist.pointing, wrist.heading)
-    beside = rotate(conjugate(here), subtract(grip_of(thing), wrist.position))
+    beside = rotate(conjugate(here), subtract(grip_of(object), wrist.position))
     tip = add(rigid, rotate(there, beside))
     return Targets(
         _target(rigid, reach.rigid(rigid, pointing), world),
@@ -85,25 +85,25 @@ def bring(
         half_plane,
         0.0,
         limited,
-        thing.name,
+        object.name,
     )
 
 
-def marked(tip: Vector, world: World, within: float) -> Thing | None:
-    """The thing nearest to the tip target, at most `within` m from it."""
-    near = [thing for thing in world.things if distance(tip, grip_of(thing)) <= within]
-    return min(near, key=lambda thing: distance(tip, grip_of(thing)), default=None)
+def marked(tip: Vector, world: World, within: float) -> WorldObject | None:
+    """The object nearest to the tip target, at most `within` m from it."""
+    near = [object for object in world.objects if distance(tip, grip_of(object)) <= within]
+    return min(near, key=lambda object: distance(tip, grip_of(object)), default=None)
 
 
 def offered(targets: Targets, offer: Offer | None) -> Targets:
-    """The targets with the assistant's offer, where it is for the thing that they mark."""
-    return replace(targets, better=offer) if offer is not None and offer.thing == targets.thing else targets
+    """The targets with the assistant's offer, where it is for the object that they mark."""
+    return replace(targets, better=offer) if offer is not None and offer.object == targets.object else targets
 
 
 def _target(position: Vector, reading: Reading, world: World) -> Target:
-    for box in world.boxes:
-        if all(low <= x <= high for low, x, high in zip(box.low, position, box.high, strict=True)):
-            return Target(position, "blocked", solid=box.name)
+    for obstacle in world.obstacles:
+        if all(low <= x <= high for low, x, high in zip(obstacle.low, position, obstacle.high, strict=True)):
+            return Target(position, "blocked", obstacle=obstacle.name)
     return Target(position, *reading)
 
 
@@ -136,7 +136,7 @@ def why_not(targets: Targets | None) -> str:
         return "both targets are needed: hold a grip to set each"
     for name, target in (("rigid", targets.rigid), ("tip", targets.tip)):
         if target.reach == "blocked":
-            return f"{name} target is inside {target.solid}"
+            return f"{name} target is inside {target.obstacle}"
         if target.reach == "outside":
             offered = "; primary button takes the nearest point that is within" if target.offer else ""
             return f"{name} target is {1e3 * target.outside_by:.0f} mm out of reach{offered}"

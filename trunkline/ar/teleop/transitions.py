@@ -58,9 +58,9 @@ TRANSITIONS |= {(mode, "fault"): "stopped" for mode in ("execute", "follow")}
 TRANSITIONS |= {(mode, "stop"): "stopped" for mode in MODES if mode != "stopped"}
 
 
-def first_event(mode: Mode, happened: dict[Event, bool]) -> Event | None:
-    """Of the events that `happened`, the first that `mode` answers to."""
-    return next((event for event in EVENTS if happened.get(event) and (mode, event) in TRANSITIONS), None)
+def first_event(mode: Mode, events: dict[Event, bool]) -> Event | None:
+    """Of the `events` that are true, the first that `mode` answers to."""
+    return next((event for event in EVENTS if events.get(event) and (mode, event) in TRANSITIONS), None)
 
 
 def diagram() -> str:

@@ -1,8 +1,8 @@
-"""What forbids a plan: the rigid robot's range, the robot in its own way, a solid of the world in its way or the arm's.
+"""What forbids a plan: the rigid robot's range, the robot in its own way, an obstacle in its way or the arm's.
 
 The arm is taken to be where it rests under what its motors are sent at that instant: what swings is not seen here, nor
-what a cable's friction holds back. Of a thing, the arm's way is looked at until it closes about it; what comes then is
-for the preview to show.
+what a cable's friction holds back. Of an object, the arm's way is looked at until it closes about it; what comes then
+is for the preview to show.
 """
 
 import numpy as np
@@ -18,16 +18,18 @@ from trunkline.model.statics.chain import Chain
 from trunkline.model.statics.equilibria import actuated
 from trunkline.model.statics.placement import joint_places
 
-LINK_RADIUS = 0.08  # m, about the joints' centres and the mount, that no solid of the world may come into
+LINK_RADIUS = 0.08  # m, about the joints' centres and the mount, that no obstacle may come into
 EVERY = 0.04  # s between poses of the arm that are looked at
 
 
-def refuse(plan: Plan, world: World, mount_offset: float, chain: Chain | None = None) -> None:
-    """Whether the way is free, of the arm only where its statics are known: the `chain`. A plan may be of one row.
+def check_plan(plan: Plan, world: World, mount_offset: float, chain: Chain | None = None) -> None:
+    """Refuse a plan whose way is not free, of the arm only where its statics are known: the `chain`.
+
+    A plan may be of one row.
 
     Raises:
-        InputError: a joint beyond its limits, the robot touching itself, or one of its joints or the arm's axis in a
-            solid of the world.
+        InputError: a joint beyond its limits, the robot touching itself, or one of its joints or the arm's axis in an
+            obstacle.
     """
     for joint in range(JOINTS):
         angles = plan.joints[:, joint]
@@ -48,12 +50,12 @@ def refuse(plan: Plan, world: World, mount_offset: float, chain: Chain | None = 
     if chain is not None and (end := _closes(plan)):
         rows = np.unique(np.append(every[: end : max(round(EVERY / plan.step), 1)], end - 1))
         moving.append(("the arm", _arm(plan, rows, mount_offset, chain), rows, 0.0))
-    for box in world.boxes:
+    for obstacle in world.obstacles:
         for name, places, rows, radius in moving:
-            away = np.linalg.norm(np.maximum(np.maximum(box.low - places, places - box.high), 0.0), axis=2)
+            away = np.linalg.norm(np.maximum(np.maximum(obstacle.low - places, places - obstacle.high), 0.0), axis=2)
             inside = np.flatnonzero((away <= radius).any(axis=1))
             if len(inside):
-                raise InputError(f"world: {name} would come into {box.name}{_when(plan, int(rows[inside[0]]))}")
+                raise InputError(f"world: {name} would come into {obstacle.name}{_when(plan, int(rows[inside[0]]))}")
 
 
 def _when(plan: Plan, row: int) -> str:
@@ -61,7 +63,7 @@ def _when(plan: Plan, row: int) -> str:
 
 
 def _closes(plan: Plan) -> int:
-    """The row from which on the arm holds a thing, or closes about one."""
+    """The row from which on the arm holds an object, or closes about one."""
     phases = dict(plan.phases)
     if "transfer" in phases:
         return 0

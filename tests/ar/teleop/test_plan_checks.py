@@ -7,12 +7,12 @@ import pytest
 
 from tests.support.bent_chain import hardening_stump
 from tests.support.operator import READY_JOINTS, config
-from trunkline.ar.teleop import obstacles
+from trunkline.ar.teleop import plan_checks
 from trunkline.ar.teleop.alignment import base_quaternion
 from trunkline.ar.teleop.following import sought
-from trunkline.ar.teleop.messages import Box, Request, Target, Targets, World
-from trunkline.ar.teleop.obstacles import LINK_RADIUS, refuse
+from trunkline.ar.teleop.messages import Obstacle, Request, Target, Targets, World
 from trunkline.ar.teleop.plan import Plan
+from trunkline.ar.teleop.plan_checks import LINK_RADIUS, check_plan
 from trunkline.ar.teleop.planner import Planner
 from trunkline.ar.teleop.rigid_ik import RigidIK
 from trunkline.ar.teleop.tendons import Network
@@ -48,37 +48,37 @@ def places(commands: np.ndarray) -> np.ndarray:
 
 
 def about(place: np.ndarray, half: float = 0.005) -> World:
-    return World("world", (Box("the table", tuple(map(float, place - half)), tuple(map(float, place + half))),))
+    return World("world", (Obstacle("the table", tuple(map(float, place - half)), tuple(map(float, place + half))),))
 
 
 def test_the_hanging_arm_in_a_solid_is_refused_at_once():
     with pytest.raises(InputError, match=r"world: the arm would come into the table after 0\.00 s"):
-        refuse(curling("approach", "curl"), about(places(STRAIGHT)[-1]), OFFSET, CHAIN)
+        check_plan(curling("approach", "curl"), about(places(STRAIGHT)[-1]), OFFSET, CHAIN)
 
 
 def test_a_solid_where_the_arm_curls_to_is_named_with_when():
     there = about(places(STRAIGHT - PULL)[-1])
-    refuse(curling("approach", "curl"), there, OFFSET)  # of an arm that nobody knows, nothing is said
+    check_plan(curling("approach", "curl"), there, OFFSET)  # of an arm that nobody knows, nothing is said
     with pytest.raises(InputError, match=r"world: the arm would come into the table after 1\.[89]\d? s"):
-        refuse(curling("approach", "curl"), there, OFFSET, CHAIN)
+        check_plan(curling("approach", "curl"), there, OFFSET, CHAIN)
 
 
-def test_from_where_it_closes_about_a_thing_the_preview_shows_the_way():
+def test_from_where_it_closes_about_an_object_the_preview_shows_the_way():
     there = about(places(STRAIGHT - PULL)[-1])
-    refuse(curling("approach", "curl", "lift"), there, OFFSET, CHAIN)
-    refuse(curling("transfer", "release"), about(places(STRAIGHT)[-1]), OFFSET, CHAIN)
+    check_plan(curling("approach", "curl", "lift"), there, OFFSET, CHAIN)
+    check_plan(curling("transfer", "release"), about(places(STRAIGHT)[-1]), OFFSET, CHAIN)
     with pytest.raises(InputError, match="the arm would come into"):
-        refuse(curling("approach", "curl", "lift"), about(places(STRAIGHT)[-1]), OFFSET, CHAIN)
+        check_plan(curling("approach", "curl", "lift"), about(places(STRAIGHT)[-1]), OFFSET, CHAIN)
 
 
 def test_what_is_beside_the_arms_way_is_not_in_it():
-    refuse(curling("approach", "curl"), about(places(STRAIGHT)[-1] + [0, 0, -0.05]), OFFSET, CHAIN)
+    check_plan(curling("approach", "curl"), about(places(STRAIGHT)[-1] + [0, 0, -0.05]), OFFSET, CHAIN)
 
 
 def test_a_solid_in_a_links_way_is_named_first_of_its_kind():
     (mount,), _ = mount_pose(READY[None], OFFSET)
     with pytest.raises(InputError, match=r"world: (joint \d|mount) of the rigid robot would come into the table after"):
-        refuse(curling("approach", "curl"), about(mount), OFFSET, CHAIN)
+        check_plan(curling("approach", "curl"), about(mount), OFFSET, CHAIN)
 
 
 # --- each criterion by itself, from both sides of its border
@@ -98,7 +98,7 @@ def test_no_joint_leaves_its_range_on_either_side(joint, side):
     plan = curling("approach", "curl")
     plan.joints[50, joint] = border + outwards * NEAR
     with pytest.raises(InputError, match=f"limit: joint {joint + 1} of the rigid robot would leave its range"):
-        refuse(plan, World("world"), OFFSET)
+        check_plan(plan, World("world"), OFFSET)
     plan.joints[50, joint] = border
     assert not _reason(plan, World("world")).startswith("limit")  # there, the robot may touch itself
 
@@ -106,7 +106,7 @@ def test_no_joint_leaves_its_range_on_either_side(joint, side):
 def _reason(plan: Plan, world: World, chain=None) -> str:
     """Why the way is not free, "" where it is."""
     try:
-        refuse(plan, world, OFFSET, chain)
+        check_plan(plan, world, OFFSET, chain)
     except InputError as error:
         return str(error)
     return ""
@@ -136,37 +136,37 @@ def test_a_solid_beside_the_mount_is_in_its_way_within_a_links_radius(axis, side
         low, high = mount - 0.005, mount + 0.005
         (low if side > 0 else high)[axis] = mount[axis] + side * off
         (high if side > 0 else low)[axis] = mount[axis] + side * (off + 0.01)
-        world = World("world", (Box("the post", tuple(map(float, low)), tuple(map(float, high))),))
+        world = World("world", (Obstacle("the post", tuple(map(float, low)), tuple(map(float, high))),))
         assert (_reason(one_row(READY), world) == "") == free
 
 
 @pytest.mark.parametrize("frame", range(2, 7))
 def test_every_moving_link_is_looked_at(frame):
     place = joint_frames(READY[None])[frame].p[:, 0]
-    world = World("world", (Box("the post", tuple(map(float, place)), tuple(map(float, place))),))
+    world = World("world", (Obstacle("the post", tuple(map(float, place)), tuple(map(float, place))),))
     assert _reason(one_row(READY), world).startswith("world: joint ")
 
 
 @pytest.mark.parametrize("first", [True, False])
 def test_every_solid_of_the_world_is_looked_at(first):
     (mount,), _ = mount_pose(READY[None], OFFSET)
-    free = Box("the shelf", (5.0, 5.0, 5.0), (6.0, 6.0, 6.0))
-    (bad,) = about(mount).boxes
+    free = Obstacle("the shelf", (5.0, 5.0, 5.0), (6.0, 6.0, 6.0))
+    (bad,) = about(mount).obstacles
     assert "the table" in _reason(one_row(READY), World("world", (bad, free) if first else (free, bad)))
 
 
 def test_an_arm_that_finds_no_rest_is_not_seen_and_the_robot_still_is(monkeypatch):
     rest = actuated(CHAIN, STRAIGHT[None], gravity_in_base(0.0))
     lost = replace(rest, converged=np.array([False]))
-    monkeypatch.setattr(obstacles, "actuated", lambda chain, commands, pull: lost)
-    monkeypatch.setattr(obstacles, "joint_places", lambda chain, qpos: np.zeros((1, 3, 3)))
+    monkeypatch.setattr(plan_checks, "actuated", lambda chain, commands, pull: lost)
+    monkeypatch.setattr(plan_checks, "joint_places", lambda chain, qpos: np.zeros((1, 3, 3)))
     (mount,), _ = mount_pose(READY[None], OFFSET)
     assert _reason(one_row(READY), about(places(STRAIGHT)[-1]), CHAIN) == ""
     assert _reason(one_row(READY), about(mount), CHAIN).startswith("world: ")
 
 
 def test_the_arms_last_pose_before_it_closes_is_looked_at_too():
-    """However rarely its poses are: the row before the curl that closes about a thing, and a plan's last one."""
+    """However rarely its poses are: the row before the curl that closes about an object, and a plan's last one."""
     rows, plan = np.arange(ROWS)[:, None], curling("approach", "curl", "lift")
     bent = replace(plan, commands=np.where(rows == CURL - 1, STRAIGHT - PULL, STRAIGHT))
     assert _reason(bent, about(places(STRAIGHT - PULL)[-1]), CHAIN).startswith("world: the arm would come into")

@@ -22,7 +22,7 @@ from trunkline.ar.session import simulated
 from trunkline.ar.session.bodies import BodyPoses, drawn_bodies
 from trunkline.ar.session.composition import SEARCH, subject_of
 from trunkline.ar.session.log_reader import tip_path
-from trunkline.ar.session.robot import (
+from trunkline.ar.session.robot_process import (
     DEAD_MAN,
     FRESH,
     MODE,
@@ -265,7 +265,7 @@ class Still:
     def poses(self):
         return np.empty((0, POSE))
 
-    def thing(self):
+    def object(self):
         return np.full(POSE, np.nan)
 
     def measured(self):

@@ -84,7 +84,7 @@ class Goal:
 class RobotState:
     """What the robot does at `time`, s.
 
-    `joints` (7,), rad, and `commands` (K,), m, as they are sent, and poses of the `thing` (7,), NaN where there is
+    `joints` (7,), rad, and `commands` (K,), m, as they are sent, and poses of the `object` (7,), NaN where there is
     none, and of the `bodies` (N, 7). hold_time: s at which it was last commanded to hold. As measured: `measured`
     (7,), rad, of the joints, and `lengths` (K,), m, of the cables, and `hangs` (3,), m, where the straight arm's tip
     was in its base frame; NaN or None where nothing measures them.
@@ -94,7 +94,7 @@ class RobotState:
     hold_time: float
     joints: np.ndarray
     commands: np.ndarray
-    thing: np.ndarray
+    object: np.ndarray
     bodies: np.ndarray
     measured: np.ndarray | None = None
     lengths: np.ndarray | None = None
@@ -136,9 +136,9 @@ class RobotProcess:
     def robot_state(self) -> RobotState:
         """The newest."""
         numbers = self.channel.hear()[0]
-        joints, commands, measured, lengths, thing, bodies = (numbers[place] for place in self._places)
+        joints, commands, measured, lengths, object, bodies = (numbers[place] for place in self._places)
         bodies = bodies.reshape(self.channel.bodies, POSE)
-        return RobotState(numbers[TIME], numbers[HOLD_TIME], joints, commands, thing, bodies, measured, lengths)
+        return RobotState(numbers[TIME], numbers[HOLD_TIME], joints, commands, object, bodies, measured, lengths)
 
     def check(self, plan: Plan) -> str:
         now = self.robot_state()

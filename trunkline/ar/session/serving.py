@@ -1,4 +1,4 @@
-"""A live session: its processes, its port, its address."""
+"""Serving a live session: its processes, its port, its address."""
 
 import argparse
 import asyncio
@@ -21,7 +21,7 @@ from trunkline.ar.session.auth import CODE_SECONDS, Origins, make_token
 from trunkline.ar.session.composition import SessionParts, make
 from trunkline.ar.session.hardware import Hardware, hardware_of
 from trunkline.ar.session.server import PARTING, Composition, Server
-from trunkline.ar.session.settings import AlignmentSettings, SessionConfig
+from trunkline.ar.session.settings import AlignmentSettings, SessionConfig, read_session_config
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT, load_folder
@@ -103,7 +103,7 @@ async def opened(
     Raises:
         InputError: no package, a process that ends, a log that cannot be written, an address that cannot be had.
     """
-    config = config or load_folder(SessionConfig, PROJECT / "conf/live")
+    config = config or read_session_config()
     teleop = teleop or load_folder(Teleop, PROJECT / "conf/teleop")
     if hardware is not None:
         teleop = hardware.slow_enough(teleop)

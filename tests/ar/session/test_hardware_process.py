@@ -10,12 +10,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.ar.session.test_robot import simulation, until
+from tests.ar.session.test_robot_process import simulation, until
 from tests.support.motors import PlayedMotors, homed
 from tests.support.operator import PACKAGE, config
 from trunkline.ar.drivers.driver import TICK
 from trunkline.ar.drivers.driver_frames import Setpoint
-from trunkline.ar.drivers.robot import LEAD, SMOOTH
+from trunkline.ar.drivers.hardware_robot import LEAD, SMOOTH
 from trunkline.ar.drivers.setpoint_filter import LIMITS, SetpointFilter
 from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.ar.drivers.simulated_motors import SIMULATED
@@ -23,9 +23,19 @@ from trunkline.ar.drivers.tendon_driver import TendonDriver
 from trunkline.ar.drivers.time_scaling import TimeScaledRobot
 from trunkline.ar.session.__main__ import parsed
 from trunkline.ar.session.hardware import hardware_of
-from trunkline.ar.session.real import HardwarePlant, Pursuit, RealRobot
-from trunkline.ar.session.robot import DEAD_MAN, HOLD_TIME, MODE, MODES, PERMIT, PERMITTED, STOPS, Goal, RobotChannel
-from trunkline.ar.session.session import alignment_for
+from trunkline.ar.session.hardware_process import HardwarePlant, Pursuit, RealRobot
+from trunkline.ar.session.robot_process import (
+    DEAD_MAN,
+    HOLD_TIME,
+    MODE,
+    MODES,
+    PERMIT,
+    PERMITTED,
+    STOPS,
+    Goal,
+    RobotChannel,
+)
+from trunkline.ar.session.serving import alignment_for
 from trunkline.ar.session.settings import SessionConfig as Live
 from trunkline.ar.session.simulated import Loop, TwinPlant
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop

@@ -36,7 +36,7 @@ class RigidObject(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Of a thing. place (3,): of its centre, m. quaternion (4,): w first, world ← thing. speed (3,): m/s.
+    """Of an object. place (3,): of its centre, m. quaternion (4,): w first, world ← object. speed (3,): m/s.
     momentum (3,): angular, about its centre, N m s, in the world. hanging (1,): 1 while its string is on the hook."""
 
     place: np.ndarray
@@ -64,14 +64,14 @@ def transposed(matrix):
 
 
 @kernel
-def spin_of(thing, motion, turn):
-    """Angular velocity, rad/s, in the world. turn: rows of the thing's rotation."""
+def spin_of(object, motion, turn):
+    """Angular velocity, rad/s, in the world. turn: rows of the object's rotation."""
     local = turned(transposed(turn), (motion.momentum[0], motion.momentum[1], motion.momentum[2]))
-    return turned(turn, (local[0] / thing.inertia[0], local[1] / thing.inertia[1], local[2] / thing.inertia[2]))
+    return turned(turn, (local[0] / object.inertia[0], local[1] / object.inertia[1], local[2] / object.inertia[2]))
 
 
 @kernel
-def move_thing(thing, motion, force, torque, gravity, h):
+def move_object(object, motion, force, torque, gravity, h):
     """A step of h s: momenta first, so that they are kept to rounding, then the pose by the new velocities.
 
     The rotation goes by the angular velocity in the middle of the step, as momentum turns it: second order in h.
@@ -80,12 +80,12 @@ def move_thing(thing, motion, force, torque, gravity, h):
         force, torque: tuples, N and N m about the centre. gravity (3,): m/s².
     """
     for a in range(3):
-        motion.speed[a] += h * (force[a] / thing.mass + gravity[a])
+        motion.speed[a] += h * (force[a] / object.mass + gravity[a])
         motion.place[a] += h * motion.speed[a]
         motion.momentum[a] += h * torque[a]
-    first = spin_of(thing, motion, rotation(motion.quaternion))
+    first = spin_of(object, motion, rotation(motion.quaternion))
     middle = _turned_by(motion.quaternion, first, 0.5 * h)
-    spin = spin_of(thing, motion, rotation(middle))
+    spin = spin_of(object, motion, rotation(middle))
     motion.quaternion[:] = _turned_by(motion.quaternion, spin, h)
 
 
@@ -105,22 +105,22 @@ def _turned_by(quaternion, spin, h):
 
 
 @kernel
-def pull_string(thing, motion, turn, spin):
-    """Force on the thing, and its torque about the centre, of a string that only pulls; it leaves the hook if slack."""
+def pull_string(object, motion, turn, spin):
+    """Force on the object, and its torque about the centre, of a string that only pulls. Slack, it leaves the hook."""
     if motion.hanging[0] == 0:
         return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    arm = turned(turn, (thing.eye[0], thing.eye[1], thing.eye[2]))
+    arm = turned(turn, (object.eye[0], object.eye[1], object.eye[2]))
     along = (
-        motion.place[0] + arm[0] - thing.hook[0], motion.place[1] + arm[1] - thing.hook[1],
-        motion.place[2] + arm[2] - thing.hook[2],
+        motion.place[0] + arm[0] - object.hook[0], motion.place[1] + arm[1] - object.hook[1],
+        motion.place[2] + arm[2] - object.hook[2],
     )  # fmt: skip
     length = np.sqrt(dot(along, along))
-    if thing.string - length > thing.lip:
+    if object.string - length > object.lip:
         motion.hanging[0] = 0
-    if length <= thing.string:
+    if length <= object.string:
         return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     velocity = plus((motion.speed[0], motion.speed[1], motion.speed[2]), 1.0, cross(spin, arm))
     rate = dot(velocity, along) / length
-    tension = max(thing.tautness * (length - thing.string) + thing.loss * rate, 0.0)
+    tension = max(object.tautness * (length - object.string) + object.loss * rate, 0.0)
     force = (-tension * along[0] / length, -tension * along[1] / length, -tension * along[2] / length)
     return force, cross(arm, force)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from trunkline.ar.drivers.driver import TICK
-from trunkline.ar.drivers.robot import LEAD, HardwareRobot
+from trunkline.ar.drivers.hardware_robot import LEAD, HardwareRobot
 from trunkline.ar.session import simulated
 from trunkline.ar.session.simulated import drive
 

@@ -1,7 +1,7 @@
 """A real robot's process, and what is drawn of it: the calls are those of the simulated robot.
 
 The robot's process turns 1000 times a second and simulates nothing. What is drawn is the twin, moved in a process of
-its own by what the axes are sent: nothing measures the soft arm's shape here, nor where a thing is.
+its own by what the axes are sent: nothing measures the soft arm's shape here, nor where an object is.
 """
 
 import gc
@@ -18,12 +18,12 @@ from threadpoolctl import threadpool_limits
 from trunkline.ar.drivers.driver import Driver
 from trunkline.ar.drivers.driver_client import panda
 from trunkline.ar.drivers.driver_host import start_driver
+from trunkline.ar.drivers.hardware_robot import HardwareRobot
 from trunkline.ar.drivers.motors import MotorsOnBus
 from trunkline.ar.drivers.realtime_priority import raise_priority
-from trunkline.ar.drivers.robot import HardwareRobot
 from trunkline.ar.drivers.time_scaling import TimeScaledRobot
 from trunkline.ar.session.hardware import Hardware
-from trunkline.ar.session.robot import POSE, READY, TIME, RobotChannel, RobotProcess, RobotState
+from trunkline.ar.session.robot_process import POSE, READY, TIME, RobotChannel, RobotProcess, RobotState
 from trunkline.ar.session.simulated import Loop, Simulation, TwinPlant, drive
 from trunkline.ar.teleop.following import Follower, Following
 from trunkline.ar.teleop.messages import ExecutorReport
@@ -54,7 +54,7 @@ class HardwarePlant(HardwareRobot):
     def poses(self) -> np.ndarray:
         return np.empty((0, POSE))
 
-    def thing(self) -> np.ndarray:
+    def object(self) -> np.ndarray:
         return np.full(POSE, np.nan)
 
 
@@ -84,7 +84,7 @@ class RealRobot(RobotProcess):
 
     def robot_state(self) -> RobotState:
         poses = self._drawn.hear()[0][-POSE * (1 + self._drawn.bodies) :].reshape(-1, POSE)
-        return replace(super().robot_state(), thing=poses[0], bodies=poses[1:])
+        return replace(super().robot_state(), object=poses[0], bodies=poses[1:])
 
     def state(self) -> ExecutorReport:
         report, (drawn, fault) = super().state(), self._drawn.hear()
@@ -186,7 +186,7 @@ def draw(channel: RobotChannel, machine: RobotChannel, simulation: Simulation) -
     end_with_parent()
     plant = TwinPlant(simulation)
     pursuit = Pursuit(simulation, plant.tick)
-    due, poses, since = time.monotonic(), np.append(plant.thing(), plant.poses()), 0.0
+    due, poses, since = time.monotonic(), np.append(plant.object(), plant.poses()), 0.0
     while True:
         numbers, before = machine.hear()[0], pursuit.here
         if numbers[READY] > 0:
@@ -197,7 +197,7 @@ def draw(channel: RobotChannel, machine: RobotChannel, simulation: Simulation) -
             pursuit.go(due)
             here = pursuit.here
             plant.move(here[: len(JOINTS)], here[len(JOINTS) :])
-            now = np.append(plant.thing(), plant.poses())
+            now = np.append(plant.object(), plant.poses())
             if np.abs(here - before).max() > LEAST or np.nanmax(np.abs(now - poses)) > STILL:
                 poses, since = now, due
         numbers_out = np.zeros(channel.size)

@@ -17,7 +17,7 @@ from tests.support.live import RATE, Hands, Laid, binary, controlling, hand, lai
 from trunkline.ar.session import binary as wire
 from trunkline.ar.session.__main__ import main
 from trunkline.ar.session.gc_policy import NEVER
-from trunkline.ar.session.session import Address, expect_free
+from trunkline.ar.session.serving import Address, expect_free
 from trunkline.ar.teleop.messages import Intent
 from trunkline.ar.teleop.plan import Plan
 from trunkline.errors import InputError
@@ -252,7 +252,7 @@ def test_a_silent_holder_loses_the_lease_to_whoever_asked_and_the_robot_holds():
             await second.hears("lease", holder=first.id, asking=[second.id])
             first.sending.cancel()
             await asyncio.sleep(0.8)
-            assert here.server.control.holder == first.id
+            assert here.server.lease.holder == first.id
             await second.hears("lease", 1.0, holder=second.id, asking=[])
             assert (await second.hears("state"))["motion"] == "hold"
 
@@ -323,7 +323,7 @@ def test_the_same_client_again_ends_the_older_connection_and_the_lease():
             again = await here.come(id=guest.id)
             assert again.id == guest.id
             await asyncio.wait_for(guest.closed.wait(), 2.0)
-            assert here.server.control.holder == ""
+            assert here.server.lease.holder == ""
             assert list(here.server.clients) == [guest.id]
 
     asyncio.run(session())
@@ -362,7 +362,7 @@ def test_a_session_that_is_told_to_end_is_closed_in_order(monkeypatch, capsys, n
             await asyncio.sleep(0.05)
             closed.append(number)
 
-    monkeypatch.setattr("trunkline.ar.session.session.opened", opened)
+    monkeypatch.setattr("trunkline.ar.session.serving.opened", opened)
     try:
         assert main(["package.tgz", "--port", "18459"]) == 0
     finally:
