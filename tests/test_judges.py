@@ -32,6 +32,10 @@ JUDGES = {  # by function, the test that has its table, and its file below tests
         "rehearsal/test_held.py",
         "test_a_hand_over_ends_at_rest_on_the_table_alone",
     ),
+    "rehearsal.experiments.reach:is_clean": (
+        "rehearsal/test_reach.py",
+        "test_a_clean_reach_is_near_and_touches_nothing_else",
+    ),
     "rehearsal.experiments.reach:failure": (
         "rehearsal/test_reach.py",
         "test_the_first_contact_decides_who_has_reached",

@@ -30,6 +30,9 @@ def rehearsal_table(metrics: Mapping[str, Any], goals: Mapping[str, Limit], pack
         goal = goals.get(f"{name}.rate")
         if "runs" in result:
             lines.append(_row(name, name, result, _goal(goal, result["rate"])))
+        if clean := result.get("clean"):
+            words = "… tip within 20 mm, nothing else touched"
+            lines.append(f"| {words} | {clean['runs']} | {_percent(clean['rate'])} | {_interval(clean)} | | | |")
         if variants:
             lines += [_row(name, f"… {kind}", row, "") for kind, row in result.get("objects", {}).items()]
             lines += [_row(name, f"… {variant}", row, "") for variant, row in result.get("variants", {}).items()]
@@ -55,8 +58,12 @@ def _row(experiment: str, words: str, result: Mapping[str, Any], goal: str) -> s
     error = " / ".join(f"{distances[key]:.0f}" for key in ("median", "p95")) if distances else ""
     causes = sorted(result["causes"].items(), key=lambda cause: -cause[1])
     failed = ", ".join(f"{kind} {count}" for kind, count in causes) or "none"
-    interval = f"{100 * result['low']:.1f} to {_percent(result['high'])}"
-    return f"| {words} | {result['runs']} | {_percent(result['rate'])} | {interval} | {goal} | {error} | {failed} |"
+    share, interval = _percent(result["rate"]), _interval(result)
+    return f"| {words} | {result['runs']} | {share} | {interval} | {goal} | {error} | {failed} |"
+
+
+def _interval(result: Mapping[str, Any]) -> str:
+    return f"{100 * result['low']:.1f} to {_percent(result['high'])}"
 
 
 def _percent(share: float) -> str:

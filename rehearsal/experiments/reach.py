@@ -12,6 +12,8 @@ from rehearsal.operator.scripts import Ending
 from rehearsal.session import Session
 from trunkline.ar.session.messages import PredictionMessage
 
+WITHIN = 0.02  # m from the object's place: nearer than its surface, which a tip also touches from the side
+
 
 def reach(bench: Bench, seed: int) -> Staged:
     rng = np.random.default_rng([seed, 0])
@@ -22,6 +24,7 @@ def reach(bench: Bench, seed: int) -> Staged:
     def judge(result: Result, ending: Ending, frames: list[SessionFrame], _) -> str:
         result.plans = ending.plans
         result.aimed_mm, result.previewed_mm = 1e3 * ending.aimed, 1e3 * ending.previewed
+        result.clean = float(is_clean(frames, object, least))
         if frames:
             result.nearest_mm = 1e3 * min(float(np.linalg.norm(frame.truth.tip - object)) for frame in frames)
         return failure(ending, frames, least, radius)
@@ -70,6 +73,17 @@ def failure(ending: Ending, frames: list[SessionFrame], least: int, radius: floa
     if not ending.aimed <= radius:
         return "aim: the tip target was beside the object"
     return "missed: the preview's tip was on the object, the robot's was not"
+
+
+def is_clean(frames: list[SessionFrame], place: np.ndarray, least: int) -> bool:
+    """Whether the tip came within WITHIN of the object's place (3,), m, while nothing but the object was touched, and
+    that by units from number `least` on alone, from the first frame to the last. A force that is no number is a touch;
+    a robot that never moved, and a tip that is nowhere, came near nothing."""
+    worlds = [frame.truth.arm_world for frame in frames]
+    shafts = [frame.truth.arm_object[:least] for frame in frames]
+    if any(forces.any() for forces in worlds + shafts):
+        return False
+    return any(float(np.linalg.norm(frame.truth.tip - place)) <= WITHIN for frame in frames)
 
 
 def _touches(frame: SessionFrame) -> bool:

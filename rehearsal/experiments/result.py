@@ -39,6 +39,7 @@ class Result:
     aimed_mm: float = float("nan")
     previewed_mm: float = float("nan")
     nearest_mm: float = float("nan")
+    clean: float = float("nan")
     tip_mm: float = float("nan")
     worst_mm: float = float("nan")
     robot_mm: float = float("nan")
@@ -135,8 +136,8 @@ def causes(results: list[Result]) -> dict[str, int]:
 
 def summary(results: list[Result]) -> dict:
     """metrics.json: by experiment, and in it by variant, runs, successes, rate, its interval from `low` to `high`,
-    causes, and of every distance that was measured median and 95th percentile over runs; of experiments with several
-    kinds of objects the same of each kind, in `objects`."""
+    causes, and of every distance that was measured median and 95th percentile over runs; `clean`: of how many reaches,
+    their share and its interval; of experiments with several kinds of objects the same of each kind, in `objects`."""
     table: dict = {}
     for (experiment, variant), rows in grouped(results).items():
         entry, kinds = _summary_of(rows), sorted({row.object for row in rows})
@@ -153,6 +154,11 @@ def _summary_of(rows: list[Result]) -> dict:
     share, low, high = rate(rows)
     successes = sum(row.success for row in rows)
     entry = {"runs": len(rows), "successes": successes, "rate": share, "low": low, "high": high, "causes": causes(rows)}
+    judged = [row.clean for row in rows if np.isfinite(row.clean)]
+    if judged:
+        clean, count = int(sum(judged)), len(judged)
+        low, high = wilson(clean, count)
+        entry["clean"] = {"runs": count, "successes": clean, "rate": clean / count, "low": low, "high": high}
     for name in COLUMNS:
         values = np.array([getattr(row, name) for row in rows]) if name.endswith("_mm") else np.zeros(0)
         if len(finite := values[np.isfinite(values)]):

@@ -91,6 +91,18 @@ def test_rates_are_told_by_experiment_and_variant(made, tmp_path):
     assert rows[1][0] == "… off by 5 mm"
 
 
+def test_clean_reaches_are_counted_among_those_that_were_judged():
+    rows = [Result("reach", seed, True, clean=clean) for seed, clean in enumerate((1.0, 1.0, 0.0, float("nan")))]
+    metrics = summary(rows)["reach"]
+    assert {name: metrics["clean"][name] for name in ("runs", "successes", "rate")} == {
+        "runs": 3, "successes": 2, "rate": pytest.approx(2 / 3),
+    }  # fmt: skip
+    assert 0.2 < metrics["clean"]["low"] < 0.3 < 0.9 < metrics["clean"]["high"] < 0.95
+    table = rehearsal_table({"reach": metrics}, {}, "of a test", False).splitlines()
+    assert table[3].startswith("| … tip within 20 mm, nothing else touched | 3 | 66.7 % | 20.8 to 93.9 % |")
+    assert "clean" not in summary([Result("follow", 0, True)])["follow"]
+
+
 def test_the_table_is_in_the_paper_s_order_and_names_frequent_causes_first():
     metrics = {"runs": 9, "rate": 0.5, "low": 0.2, "high": 0.8, "causes": {"aim": 1, "missed": 4}}
     tables = {"follow": metrics, "handle": metrics, "package": "abc", "reach": metrics}

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-WORDS = ("success", "agreed", "held", "reachable", "converged", "at_bound")
+WORDS = ("success", "clean", "agreed", "held", "reachable", "converged", "at_bound")
 ROOMS = ("trunkline", "rehearsal", "demo", "stages")
 CAUSES = "rehearsal.experiments."  # here a verdict is a cause in words, "" for success
 LOGICAL = ("all", "any", "bool", "isfinite", "isnan", "isclose", "allclose", "array_equal", "logical_and",
