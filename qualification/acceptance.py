@@ -33,7 +33,7 @@ from trunkline.ar.session.previewer import Answer, Order, PlanAnswer, PreviewBeg
 from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.session.simulated import Simulation, TwinPlant
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
-from trunkline.ar.teleop.executor import SimulatedRobot
+from trunkline.ar.teleop.executor import PlanFollower
 from trunkline.ar.teleop.messages import Request, Target, Targets, Vector, World
 from trunkline.ar.teleop.plan import Plan
 from trunkline.ar.teleop.rigid_ik import RigidIK
@@ -188,7 +188,7 @@ def distances(found: Previewed, simulation: Simulation) -> tuple[np.ndarray, boo
     """Of the tip from where the preview has it, m (F,), once the simulated robot runs the plan; whether it pushed the
     object."""
     plant = TwinPlant(simulation)
-    robot = SimulatedRobot(
+    robot = PlanFollower(
         simulation.joints, simulation.commands, simulation.limits, simulation.package,
         lambda joints, commands, _: plant.move(joints, commands, smooth=True),
     )  # fmt: skip

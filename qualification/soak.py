@@ -44,7 +44,7 @@ from trunkline.ar.session.server import Composition, Server
 from trunkline.ar.session.serving import listening
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.core import Teleoperation
-from trunkline.ar.teleop.executor import SimulatedRobot
+from trunkline.ar.teleop.executor import PlanFollower
 from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.messages import ExecutorReport, PlanReport
 from trunkline.ar.teleop.plan import Plan
@@ -61,7 +61,7 @@ class ScriptedRobot:
 
     def __init__(self, package: Package, teleop: Teleop) -> None:
         self.limits = limits_of(teleop.motors, package.rate_limit, len(package.straight))
-        self.robot = SimulatedRobot(SEARCH, package.straight, self.limits, package.digest)
+        self.robot = PlanFollower(SEARCH, package.straight, self.limits, package.digest)
         self.start, self.hear, self.now, self.stops = self.robot.start, self.robot.hear, 0.0, 0
 
     def follow(self, following: Following) -> str:

@@ -22,7 +22,7 @@ from trunkline.ar.session.log_writer import LogWriter
 from trunkline.ar.session.previewer import InlinePreviewer, PlanAnswer, PredictionAnswer, PreviewBegun, PreviewPiece
 from trunkline.ar.session.robot_process import RobotState
 from trunkline.ar.teleop.core import Teleoperation
-from trunkline.ar.teleop.executor import FOLLOWS, SimulatedRobot
+from trunkline.ar.teleop.executor import FOLLOWS, PlanFollower
 from trunkline.ar.teleop.messages import Controller, ExecutorReport, Intent, Obstacle, PlanReport, Pose
 from trunkline.ar.teleop.plan import Plan
 
@@ -349,7 +349,7 @@ def test_a_process_that_plans_and_has_ended_is_a_refusal():
 # --- a whole session, tick by tick
 
 
-class PlayedRobot(SimulatedRobot):
+class PlayedRobot(PlanFollower):
     """As its plan says; it brakes by itself where nobody `permit`s it at a tick. `permits`, `stops`: how often."""
 
     def __init__(self):
@@ -472,7 +472,7 @@ def hidden(session):
 
 
 def rested(session):
-    SimulatedRobot.stop(session.robot)
+    PlanFollower.stop(session.robot)
     session.wait(0.3)
 
 

@@ -31,7 +31,7 @@ from trunkline.ar.session.robot_process import (
     RobotProcess,
 )
 from trunkline.ar.session.simulated import LISTENS, Loop
-from trunkline.ar.teleop.executor import BRAKE, FOLLOWS, SimulatedRobot
+from trunkline.ar.teleop.executor import BRAKE, FOLLOWS, PlanFollower
 from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.messages import ExecutorReport
 from trunkline.ar.teleop.plan import Plan
@@ -55,7 +55,7 @@ class Played:
         self.channel = RobotChannel(multiprocessing.get_context("spawn"), 3, 0)
         self.channel.plans = queue.Queue()
         self.plant = Still()
-        self.robot = SimulatedRobot(START, STRAIGHT, LIMITS, PACKAGE)
+        self.robot = PlanFollower(START, STRAIGHT, LIMITS, PACKAGE)
         self.loop, self.now, self.serial = Loop(self.channel, self.robot, self.plant), BEGINS, 0
 
     def permit(self, serial=None, ago=0.0):

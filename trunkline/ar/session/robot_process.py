@@ -16,7 +16,7 @@ from multiprocessing.context import SpawnContext
 
 import numpy as np
 
-from trunkline.ar.teleop.executor import FOLLOWS, SimulatedRobot
+from trunkline.ar.teleop.executor import FOLLOWS, PlanFollower
 from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.messages import ExecutorReport
 from trunkline.ar.teleop.plan import Plan
@@ -142,7 +142,7 @@ class RobotProcess:
 
     def check(self, plan: Plan) -> str:
         now = self.robot_state()
-        return SimulatedRobot(now.joints, now.commands, self._limits, self._package).check(plan)
+        return PlanFollower(now.joints, now.commands, self._limits, self._package).check(plan)
 
     def start(self, plan: Plan, digest: str) -> str:
         """As `Executor.start`; what the robot's process finds besides is in its state."""

@@ -23,7 +23,7 @@ from trunkline.ar.hybrid.rollouts import ComposedTwin
 from trunkline.ar.hybrid.torques import servo_commands
 from trunkline.ar.session.bodies import BodyPoses
 from trunkline.ar.session.robot_process import DEAD_MAN, MODES, PERMIT, PERMITTED, STOPS, TELLS, Goal, RobotChannel
-from trunkline.ar.teleop.executor import FOLLOWS, SimulatedRobot
+from trunkline.ar.teleop.executor import FOLLOWS, PlanFollower
 from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.plan import Plan
 from trunkline.ar.teleop.trajectory import MotionLimits
@@ -152,7 +152,7 @@ class MovingPlant(Protocol):
 class Loop:
     """Plans in, motion out; what the process does at each turn. `robot` moves the `plant`."""
 
-    def __init__(self, channel: RobotChannel, robot: SimulatedRobot, plant: MovingPlant) -> None:
+    def __init__(self, channel: RobotChannel, robot: PlanFollower, plant: MovingPlant) -> None:
         self.channel, self.robot, self.plant = channel, robot, plant
         self.serial, self.fault, self.hold_time = 0, "", 0.0
         self._stops, self._holds, self._listens = channel.asked[STOPS], False, 0.0
@@ -248,7 +248,7 @@ def run(channel: RobotChannel, simulation: Simulation) -> None:
     threadpool_limits(1)
     parent = parent_pid()
     plant = TwinPlant(simulation)
-    robot = SimulatedRobot(
+    robot = PlanFollower(
         simulation.joints, simulation.commands, simulation.limits, simulation.package,
         lambda joints, commands, _: plant.move(joints, commands, robot.state().digest != FOLLOWS),
     )  # fmt: skip
