@@ -204,14 +204,14 @@ def test_ctrl_c_is_for_whoever_sends_and_not_for_the_driver_process(driver):
 
 def test_a_robots_joint_may_be_as_far_off_as_the_settings_say(clock):
     """A Panda's: 0.05 rad."""
-    assert SETTINGS.arm.astray == ASTRAY
+    assert SETTINGS.panda.astray == ASTRAY
     for off, fault in ((ASTRAY - NEAR, ""), (ASTRAY + NEAR, "joint 4: found 0.05 rad from where it is sent, ")):
-        driver = panda(SETTINGS.arm, "panda")
+        driver = panda(SETTINGS.panda, "panda")
         assert driver.process.command[1:5] == [
             "-m",
             "trunkline.ar.drivers.driver_process",
             "panda",
-            SETTINGS.arm.address,
+            SETTINGS.panda.address,
         ]
         driver.process.tell(BEGUN, READY + off * np.eye(7)[3])
         driver.turn(BEGUN)
@@ -222,7 +222,7 @@ def test_a_robots_joint_may_be_as_far_off_as_the_settings_say(clock):
 
 @pytest.mark.parametrize(
     ("driver_of", "patience"),
-    [(lambda: panda(SETTINGS.arm, "fr3"), CONNECTING),
+    [(lambda: panda(SETTINGS.panda, "fr3"), CONNECTING),
      (lambda: start_driver(MotorsOnBus(SETTINGS.motors, "can0", "socketcan")), HOMING + STARTING),
      (lambda: start_driver(SETTINGS.ros), CONNECTING + STARTING)],
 )  # fmt: skip

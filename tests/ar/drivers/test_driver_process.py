@@ -12,12 +12,12 @@ import pytest
 
 from tests.support.waiting import SOON, until
 from trunkline.ar.drivers import driver_process
-from trunkline.ar.drivers.driver_client import ArmSettings, panda
+from trunkline.ar.drivers.driver_client import PandaSettings, panda
 from trunkline.ar.drivers.driver_frames import DriverState, FrameSocket, Setpoint
 from trunkline.ar.drivers.setpoint_filter import LIMITS
 from trunkline.errors import InputError
 
-SETTINGS = ArmSettings(python="", address="nowhere", astray=0.1)
+SETTINGS = PandaSettings(python="", address="nowhere", astray=0.1)
 ROOT = Path(__file__).parents[3]
 DT, LEAD, READY = 0.001, 0.03, driver_process.FakeDevice.READY
 
@@ -173,8 +173,8 @@ def test_a_library_that_is_not_there_is_one_line():
 
 
 def test_a_python_that_is_not_there_is_one_line():
-    with pytest.raises(InputError, match=r"^arm\.python: found /nowhere/python"):
-        panda(ArmSettings("/nowhere/python", "nowhere", 0.1), "panda")
+    with pytest.raises(InputError, match=r"^panda\.python: found /nowhere/python"):
+        panda(PandaSettings("/nowhere/python", "nowhere", 0.1), "panda")
 
 
 def test_it_imports_what_any_environment_has():

@@ -9,7 +9,7 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
-from trunkline.ar.drivers.ros_arm import PERIOD, RosArm
+from trunkline.ar.drivers.ros_panda import PERIOD, RosPanda
 from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT, load_folder
@@ -105,7 +105,7 @@ def stub(monkeypatch):
 
 @pytest.fixture
 def arm(stub):
-    arm = RosArm(SETTINGS)
+    arm = RosPanda(SETTINGS)
     stub.say(READY)
     arm.turn(arm._heard)
     assert arm.ready
@@ -164,7 +164,7 @@ def test_its_faults_are_those_of_the_other_link(stub, arm):
 
 
 def test_it_ends_its_node_and_its_context(stub):
-    RosArm(SETTINGS).close()
+    RosPanda(SETTINGS).close()
     assert stub.spins.is_set()
     assert stub.ended == ["node", "context"]
 
@@ -173,4 +173,4 @@ def test_no_rclpy_is_one_line(monkeypatch):
     monkeypatch.setitem(sys.modules, "rclpy", None)
     monkeypatch.delitem(sys.modules, LINK, raising=False)
     with pytest.raises(InputError, match=r"^ros\.link: found no rclpy \(.*\), expected ROS 2 to be sourced, or dds$"):
-        RosArm(SETTINGS)
+        RosPanda(SETTINGS)

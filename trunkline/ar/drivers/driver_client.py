@@ -29,7 +29,7 @@ CLOSING = 3.0  # s
 
 
 @dataclass(frozen=True)
-class ArmSettings:
+class PandaSettings:
     """python: the Python of the environment with the robot's library, "" for this one. address: of the robot. astray:
     rad that a joint may be from where it is sent."""
 
@@ -129,7 +129,7 @@ class DriverClient:
         self.fault = self.fault or fault
 
 
-def panda(settings: ArmSettings, robot: str) -> DriverClient:
+def panda(settings: PandaSettings, robot: str) -> DriverClient:
     """A robot, "panda", "fr3" or "fake".
 
     Raises:
@@ -140,4 +140,4 @@ def panda(settings: ArmSettings, robot: str) -> DriverClient:
     try:
         return DriverClient(command, AXES, astray=settings.astray, at=f", expected {robot} at {settings.address}")
     except OSError as error:
-        raise InputError(f"arm.python: found {python} ({error.strerror}), expected a Python") from error
+        raise InputError(f"panda.python: found {python} ({error.strerror}), expected a Python") from error

@@ -52,9 +52,9 @@ def driver_of(settings: DriverSettings) -> Driver:
     """
     try:
         if isinstance(settings, RosSettings):
-            from trunkline.ar.drivers.ros_arm import RosArm
+            from trunkline.ar.drivers.ros_panda import RosPanda
 
-            return RosArm(settings)
+            return RosPanda(settings)
         from trunkline.ar.drivers.on_bus import motors_on
         from trunkline.ar.drivers.tendon_driver import TendonDriver
     except ImportError as error:

@@ -18,10 +18,9 @@ import numpy as np
 from trunkline.ar.drivers.gm6020 import COUNTS, RATE
 from trunkline.ar.drivers.motors import MotorSettings
 from trunkline.ar.drivers.on_bus import BusMotors, SimulatedMotorsThread
-from trunkline.ar.drivers.settings import ExecutionConfig
+from trunkline.ar.drivers.settings import read_execution_config
 from trunkline.ar.drivers.simulated_motors import MotorParameters
 from trunkline.errors import InputError, in_one_line
-from trunkline.pipeline.config import PROJECT, load_folder
 
 DEPTH, SECONDS = 0.09, 2.0  # m and s of a pull
 LOST = 0.01
@@ -164,7 +163,7 @@ def main(arguments: list[str]) -> int:
     if arguments:
         print((__doc__ or "").strip())
         return 0 if arguments in (["-h"], ["--help"]) else 2
-    rows = measures(load_folder(ExecutionConfig, PROJECT / "conf/execution").motors)
+    rows = measures(read_execution_config().motors)
     print(table(rows))
     return 0 if all(so for *_, so in rows) else 1
 

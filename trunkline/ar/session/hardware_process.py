@@ -109,8 +109,8 @@ def run(channel: RobotChannel, hardware: Hardware, begins: Beginning) -> None:
     threadpool_limits(1)
     machine = None
     try:
-        arm = arm_of(hardware)
-        machine = HardwarePlant(arm, motors_of(hardware), begins.commands)
+        panda_driver = panda_of(hardware)
+        machine = HardwarePlant(panda_driver, motors_of(hardware), begins.commands)
         joints = machine.begin(begins.joints, lambda: os.getppid() != parent)
         moved = machine
         robot = TimeScaledRobot(
@@ -127,11 +127,11 @@ def run(channel: RobotChannel, hardware: Hardware, begins: Beginning) -> None:
             machine.close()
 
 
-def arm_of(hardware: Hardware) -> Driver | None:
+def panda_of(hardware: Hardware) -> Driver | None:
     """The robot, None where none is named."""
     if hardware.robot == "ros2":
         return start_driver(hardware.ros)
-    return panda(hardware.arm, hardware.robot) if hardware.robot else None
+    return panda(hardware.panda, hardware.robot) if hardware.robot else None
 
 
 def motors_of(hardware: Hardware) -> Driver | None:

@@ -61,7 +61,7 @@ def link_of(settings: RosSettings) -> Link:
     return NodeLink(settings)
 
 
-class RosArm:
+class RosPanda:
     """A `Driver` of the Panda's joints, rad, that a controller moves, and whose states are told.
 
     After a fault nothing is sent: the controller stands at the last point, which is on the way, at most the setpoints'
