@@ -12,7 +12,7 @@ from trunkline.ar.drivers import driver_client
 from trunkline.ar.drivers.driver import CONNECTING
 from trunkline.ar.drivers.driver_client import CLOSING, SILENT, DriverClient, panda
 from trunkline.ar.drivers.driver_frames import DriverState, FrameSocket, Setpoint
-from trunkline.ar.drivers.driver_host import STARTING, start_driver
+from trunkline.ar.drivers.local_driver_process import STARTING, start_driver
 from trunkline.ar.drivers.motors import HOMING, MotorsOnBus
 from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.pipeline.config import PROJECT, load_folder
@@ -209,7 +209,7 @@ def test_a_robots_joint_may_be_as_far_off_as_the_settings_say(clock):
         driver = panda(SETTINGS.panda, "panda")
         assert driver.process.command[1:5] == [
             "-m",
-            "trunkline.ar.drivers.driver_process",
+            "trunkline.ar.drivers.panda_process",
             "panda",
             SETTINGS.panda.address,
         ]

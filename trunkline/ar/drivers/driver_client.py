@@ -20,7 +20,7 @@ from pydantic import Field
 
 from trunkline.ar.drivers.driver import CONNECTING
 from trunkline.ar.drivers.driver_frames import DriverState, FrameSocket, Setpoint
-from trunkline.ar.drivers.driver_process import AXES
+from trunkline.ar.drivers.panda_process import AXES
 from trunkline.errors import InputError
 
 ROOT = Path(__file__).parents[3]
@@ -136,7 +136,7 @@ def panda(settings: PandaSettings, robot: str) -> DriverClient:
         InputError: its Python is not there.
     """
     python = settings.python or sys.executable
-    command = [python, "-m", "trunkline.ar.drivers.driver_process", robot, settings.address]
+    command = [python, "-m", "trunkline.ar.drivers.panda_process", robot, settings.address]
     try:
         return DriverClient(command, AXES, astray=settings.astray, at=f", expected {robot} at {settings.address}")
     except OSError as error:

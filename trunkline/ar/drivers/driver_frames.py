@@ -1,6 +1,6 @@
 """Frames between the robot's process and a driver process, over a socket: of one size each way, little-endian.
 
-This, `driver_process`, `driver`, `setpoint_filter` and `realtime_priority` run in an environment of the robot's own
+This, `panda_process`, `driver`, `setpoint_filter` and `realtime_priority` run in an environment of the robot's own
 library: they import the standard library, numpy, each other and `trunkline.kinematics.panda` alone.
 """
 

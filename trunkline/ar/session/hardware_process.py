@@ -17,8 +17,8 @@ from threadpoolctl import threadpool_limits
 
 from trunkline.ar.drivers.driver import Driver
 from trunkline.ar.drivers.driver_client import panda
-from trunkline.ar.drivers.driver_host import start_driver
 from trunkline.ar.drivers.hardware_robot import HardwareRobot
+from trunkline.ar.drivers.local_driver_process import start_driver
 from trunkline.ar.drivers.motors import MotorsOnBus
 from trunkline.ar.drivers.realtime_priority import raise_priority
 from trunkline.ar.drivers.time_scaling import TimeScaledRobot
