@@ -130,7 +130,7 @@ async def served(package: Path, runs: int, folder: Path) -> list[CycleRun]:
     config = replace(config, alignment=alignment, journal=replace(config.journal, folder=str(folder)))
     safety = replace(teleop.core.safety, silence=PATIENCE)
     teleop = replace(teleop, core=replace(teleop.core, safety=safety))
-    lease.SILENCE = PATIENCE
+    lease.LEASE_TIMEOUT = PATIENCE
     execution = read_execution_config()
     hardware = hardware_of("simulated", "gm6020", SIMULATED, "", execution)
     log = lambda line: print(line, file=sys.stderr, flush=True)  # noqa: E731

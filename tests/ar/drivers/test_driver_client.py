@@ -10,7 +10,7 @@ import pytest
 
 from trunkline.ar.drivers import driver_client
 from trunkline.ar.drivers.driver import CONNECTING
-from trunkline.ar.drivers.driver_client import CLOSING, SILENT, DriverClient, panda
+from trunkline.ar.drivers.driver_client import CLOSING, DRIVER_TIMEOUT, DriverClient, panda
 from trunkline.ar.drivers.driver_frames import DriverState, FrameSocket, Setpoint
 from trunkline.ar.drivers.local_driver_process import STARTING, start_driver
 from trunkline.ar.drivers.motors import HOMING, MotorsOnBus
@@ -67,7 +67,7 @@ def ready(driver):
 
 
 def test_a_driver_process_that_tells_of_itself_is_no_fault_however_long(ready):
-    for now in np.arange(BEGUN, BEGUN + 100.0, 0.5 * SILENT):
+    for now in np.arange(BEGUN, BEGUN + 100.0, 0.5 * DRIVER_TIMEOUT):
         ready.process.tell(now)
         ready.turn(now)
     assert ready.fault == ""
@@ -77,7 +77,7 @@ def test_a_driver_process_that_tells_of_itself_is_no_fault_however_long(ready):
 
 @pytest.mark.parametrize(
     ("silent", "fault"),
-    [(0.0, ""), (SILENT - NEAR, ""), (SILENT + NEAR, "its adapter is silent for 100 ms"),
+    [(0.0, ""), (DRIVER_TIMEOUT - NEAR, ""), (DRIVER_TIMEOUT + NEAR, "its adapter is silent for 100 ms"),
      (10.0, "its adapter is silent for 10000 ms")],
 )  # fmt: skip
 def test_a_driver_process_that_is_silent_is_a_fault_after_so_long(ready, silent, fault):
@@ -87,7 +87,7 @@ def test_a_driver_process_that_is_silent_is_a_fault_after_so_long(ready, silent,
 
 def test_what_it_told_long_ago_does_not_count_as_told_when_it_is_heard(ready):
     ready.process.tell(BEGUN + 1.0)
-    ready.turn(BEGUN + 1.0 + SILENT + NEAR)
+    ready.turn(BEGUN + 1.0 + DRIVER_TIMEOUT + NEAR)
     assert ready.fault == "its adapter is silent for 100 ms"
 
 

@@ -11,12 +11,11 @@ from trunkline.ar.drivers import hardware_robot, ros_panda
 from trunkline.ar.drivers.driver import CONNECTING
 from trunkline.ar.drivers.gm6020 import MOST_AMPERES, Feedback, command_frames, commanded
 from trunkline.ar.drivers.hardware_robot import LEAD, HardwareRobot
-from trunkline.ar.drivers.motors import PRESENT, MotorGroup
-from trunkline.ar.drivers.motors import SILENT as UNHEARD
-from trunkline.ar.drivers.ros_panda import RosPanda
+from trunkline.ar.drivers.motors import FEEDBACK_TIMEOUT, PRESENT, MotorGroup
+from trunkline.ar.drivers.ros_panda import JOINT_STATE_TIMEOUT, RosPanda
 from trunkline.ar.drivers.setpoint_filter import ROUNDING
 from trunkline.ar.drivers.settings import ExecutionConfig
-from trunkline.ar.drivers.watchdog import SILENT, Watchdog
+from trunkline.ar.drivers.watchdog import SETPOINT_TIMEOUT, Watchdog
 from trunkline.ar.drivers.winch import Winch
 from trunkline.errors import InputError
 from trunkline.kinematics.panda.limits import VELOCITY
@@ -37,7 +36,7 @@ def heard_at(now, motors, numbers=(1, 2, 3), celsius=30):
 
 
 @pytest.mark.parametrize("number", [1, 2, 3])
-@pytest.mark.parametrize(("silent", "faulty"), [(UNHEARD - NEAR, False), (UNHEARD + NEAR, True)])
+@pytest.mark.parametrize(("silent", "faulty"), [(FEEDBACK_TIMEOUT - NEAR, False), (FEEDBACK_TIMEOUT + NEAR, True)])
 def test_a_motor_may_be_silent_for_so_long(number, silent, faulty):
     motors = MotorGroup(motor_settings(), 100.0)
     heard_at(100.0, motors)
@@ -118,7 +117,7 @@ def test_the_current_of_a_loop_ends_at_what_the_settings_allow_either_way(side, 
 # --- setpoints
 
 
-@pytest.mark.parametrize(("silent", "late"), [(SILENT - NEAR, False), (SILENT + NEAR, True)])
+@pytest.mark.parametrize(("silent", "late"), [(SETPOINT_TIMEOUT - NEAR, False), (SETPOINT_TIMEOUT + NEAR, True)])
 def test_a_watchdog_barks_after_so_long_and_not_before_the_first_setpoint(silent, late):
     dog = Watchdog()
     assert dog.late(1e9) == ""
@@ -184,7 +183,9 @@ def test_a_joint_whose_place_is_no_number_is_a_fault(arm, link, joint):
     assert arm.fault.startswith(f"{ROS.names[joint]}: found nan rad")
 
 
-@pytest.mark.parametrize(("silent", "faulty"), [(ros_panda.SILENT - NEAR, False), (ros_panda.SILENT + NEAR, True)])
+@pytest.mark.parametrize(
+    ("silent", "faulty"), [(JOINT_STATE_TIMEOUT - NEAR, False), (JOINT_STATE_TIMEOUT + NEAR, True)]
+)
 def test_joints_have_to_be_told_of_so_often(arm, link, silent, faulty):
     link.joints = None
     arm.turn(100.0 + silent)

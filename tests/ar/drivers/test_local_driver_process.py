@@ -16,7 +16,7 @@ from tests.support import waiting
 from tests.support.motors import PlayedMotors, Workbench, homed, motor_settings
 from trunkline.ar.drivers import driver_client, local_driver_process
 from trunkline.ar.drivers.driver import TICK
-from trunkline.ar.drivers.driver_client import SILENT
+from trunkline.ar.drivers.driver_client import DRIVER_TIMEOUT
 from trunkline.ar.drivers.driver_frames import FrameSocket, Setpoint
 from trunkline.ar.drivers.local_driver_process import SETTLES, run_driver, start_driver
 from trunkline.ar.drivers.motors import MotorsOnBus
@@ -143,7 +143,9 @@ def test_a_driver_process_that_is_killed_is_a_fault(played):
     assert played.client.fault == "its adapter has ended"
 
 
-@pytest.mark.parametrize(("late", "fault"), [(SILENT - 2 * TELL * TICK, ""), (SILENT, "its adapter is silent for")])
+@pytest.mark.parametrize(
+    ("late", "fault"), [(DRIVER_TIMEOUT - 2 * TELL * TICK, ""), (DRIVER_TIMEOUT, "its adapter is silent for")]
+)
 def test_a_driver_process_that_hangs_is_a_fault_after_a_while(played, late, fault):
     played.play(played.send(lambda t: 0.0), 0.1)
     assert played.client.fault == ""
@@ -213,7 +215,7 @@ def test_their_process_hanging_is_a_fault(driver):
     until(lambda: driver.fault, lambda: driver.turn(time.monotonic()))
     os.kill(driver.process.pid, signal.SIGCONT)
     assert driver.fault.startswith("its adapter is silent for")
-    assert time.monotonic() - stopped > SILENT - TELL * TICK
+    assert time.monotonic() - stopped > DRIVER_TIMEOUT - TELL * TICK
 
 
 @pytest.mark.realtime

@@ -12,7 +12,7 @@ from tests.support import waiting
 from tests.support.motors import PLANTS, TICK, Workbench, homed, motor_settings
 from trunkline.ar.drivers import on_bus
 from trunkline.ar.drivers.gm6020 import Feedback
-from trunkline.ar.drivers.motors import SILENT
+from trunkline.ar.drivers.motors import FEEDBACK_TIMEOUT
 from trunkline.ar.drivers.on_bus import (
     FILTERS,
     BusMotors,
@@ -109,7 +109,7 @@ def test_a_bus_that_gives_nothing_but_errors_ends_all_current_at_once(driven):
     assert driven.currents.max() == 0.0
     assert driven.driver.fault == "bus: gone"
     assert driven.bus.sent[-1] == (0x1FE, bytes(8))
-    driven.turn(SILENT / 2)
+    driven.turn(FEEDBACK_TIMEOUT / 2)
     assert driven.driver.motors.fault == ""
     assert driven.currents.max() == 0.0
     driven.bus.hears = True
@@ -132,7 +132,7 @@ def test_a_bus_that_takes_nothing_is_a_fault_and_no_current_is_sent_once_it_does
 
 def test_a_motor_that_is_silent_ends_all_current(driven):
     driven.bench.simulated.motors[0].silent = True
-    driven.turn(SILENT - TICK)
+    driven.turn(FEEDBACK_TIMEOUT - TICK)
     assert driven.driver.fault == ""
     assert driven.currents.min() > 0.0
     driven.turn(3 * TICK)

@@ -11,7 +11,7 @@ from trunkline.ar.drivers.driver import TICK
 from trunkline.ar.drivers.ros_panda import PERIOD, RosPanda
 from trunkline.ar.drivers.setpoint_filter import ROUNDING
 from trunkline.ar.drivers.settings import ExecutionConfig
-from trunkline.ar.drivers.watchdog import SILENT
+from trunkline.ar.drivers.watchdog import SETPOINT_TIMEOUT
 from trunkline.kinematics.panda.limits import VELOCITY
 from trunkline.pipeline.config import PROJECT, load_folder
 
@@ -113,7 +113,7 @@ def test_where_either_process_is_late_it_is_a_fault_and_the_controller_stands(pl
 @pytest.mark.parametrize("who", ["sends", "turns"])
 def test_by_less_than_that_it_goes_on(played, who):
     played.play(LATE)
-    played.play(SILENT - 2 * TICK, **{who: False})
+    played.play(SETPOINT_TIMEOUT - 2 * TICK, **{who: False})
     played.play(0.5)
     assert played.arm.fault == ""
     assert played.turned == pytest.approx(played._way(played.now), abs=1e-6)

@@ -235,7 +235,7 @@ async def obey(server: Server, robot: Robot, runner: web.AppRunner, port: int, l
 
 
 async def serve(port: int, folder: Path) -> None:
-    lease.SILENCE = PATIENCE
+    lease.LEASE_TIMEOUT = PATIENCE
     figure, token, log = Figure(), make_token(), []
     robot, planning = Robot(figure), Planning(figure)
     core = config().core

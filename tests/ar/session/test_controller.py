@@ -17,7 +17,7 @@ from trunkline.ar.session import messages
 from trunkline.ar.session.binary import HAND, Received
 from trunkline.ar.session.controller import MOST_INPUTS, SessionController
 from trunkline.ar.session.controller_input import controllers
-from trunkline.ar.session.follow import SILENT
+from trunkline.ar.session.follow import PLANNER_TIMEOUT
 from trunkline.ar.session.log_writer import LogWriter
 from trunkline.ar.session.previewer import InlinePreviewer, PlanAnswer, PredictionAnswer, PreviewBegun, PreviewPiece
 from trunkline.ar.session.robot_process import RobotState
@@ -217,7 +217,7 @@ def test_an_older_fault_is_not_replaced_by_a_newer_one():
     assert controller._fault == "it has come to rest by itself"
 
 
-@pytest.mark.parametrize("silent", [SILENT - 0.01, SILENT + 0.01])
+@pytest.mark.parametrize("silent", [PLANNER_TIMEOUT - 0.01, PLANNER_TIMEOUT + 0.01])
 def test_as_it_follows_a_process_that_plans_has_to_answer(silent):
     robot = ToldRobot("running")
     controller = controller_of(robot)
@@ -226,8 +226,9 @@ def test_as_it_follows_a_process_that_plans_has_to_answer(silent):
     controller._follow.advance(silent)
     robot.calls.clear()
     controller._drive(intent("follow", motion="follow"))
-    assert robot.calls == (["permit"] if silent < SILENT else ["stop"])
-    assert controller._fault == ("" if silent < SILENT else "the process that plans has not answered for 1.01 s")
+    assert robot.calls == (["permit"] if silent < PLANNER_TIMEOUT else ["stop"])
+    fault = "" if silent < PLANNER_TIMEOUT else "the process that plans has not answered for 1.01 s"
+    assert controller._fault == fault
 
 
 @pytest.mark.parametrize("alignment", [None, BASE])
@@ -535,7 +536,7 @@ def test_as_it_follows_it_goes_after_the_targets_and_holds_as_soon_as_nobody_ans
     session.wait(1.0)
     assert session.robot.state() == ExecutorReport("running", FOLLOWS)
     session.planning.poll = list
-    session.wait(SILENT - 0.2)
+    session.wait(PLANNER_TIMEOUT - 0.2)
     assert session.controller.intent.motion == "follow"
     intent = session.wait(0.5)
     assert (intent.mode, intent.motion) == ("stopped", "hold")

@@ -24,7 +24,7 @@ from trunkline.ar.drivers.panda_process import AXES
 from trunkline.errors import InputError
 
 ROOT = Path(__file__).parents[3]
-SILENT = 0.1  # s without a frame of the driver process
+DRIVER_TIMEOUT = 0.1  # s without a frame of the driver process
 CLOSING = 3.0  # s
 
 
@@ -95,7 +95,7 @@ class DriverClient:
             if now > self._until:
                 self._fail(f"its adapter is not ready after {self._patience:.0f} s{self._at}")
             return
-        if (silent := now - self.state.time) > SILENT:
+        if (silent := now - self.state.time) > DRIVER_TIMEOUT:
             self._fail(f"its adapter is silent for {1e3 * silent:.0f} ms")
 
     def close(self) -> None:

@@ -13,7 +13,7 @@ from pydantic import Field
 from trunkline.ar.drivers.gm6020 import FEEDBACK, Feedback
 from trunkline.ar.drivers.winch import Winch, WinchSettings
 
-SILENT = 0.02  # s without feedback of a motor
+FEEDBACK_TIMEOUT = 0.02  # s without feedback of a motor
 HOMING = 60.0  # s
 PRESENT = 1.0  # s within which each must be heard at first
 
@@ -105,7 +105,7 @@ class MotorGroup:
                 if now - self._begun > PRESENT:
                     self._fail(f"motor {number}: found no feedback, expected it under the id {FEEDBACK + number:#x}")
                 return False
-            if (silent := now - winch.heard) > SILENT:
+            if (silent := now - winch.heard) > FEEDBACK_TIMEOUT:
                 self._fail(f"motor {number}: silent for {1e3 * silent:.0f} ms, expected feedback every 1 ms")
         return not self.fault
 

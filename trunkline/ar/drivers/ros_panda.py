@@ -18,7 +18,7 @@ from trunkline.ar.drivers.watchdog import Watchdog
 from trunkline.errors import InputError
 
 PERIOD = 0.01  # s between points
-SILENT = 0.2  # s without the joints' state
+JOINT_STATE_TIMEOUT = 0.2  # s without the joints' state
 VELOCITY = LIMITS["panda"].velocity  # (7,), rad/s
 
 
@@ -112,7 +112,7 @@ class RosPanda:
             self._fresh = False
         if not self.link.listeners:
             self._fail(f"{settings.trajectory}: nobody listens any more")
-        if (silent := now - self._heard) > SILENT:
+        if (silent := now - self._heard) > JOINT_STATE_TIMEOUT:
             self._fail(f"{settings.states}: silent for {1e3 * silent:.0f} ms")
         off = np.abs(self.measured - self.sent)
         if not off.max() <= settings.astray:  # or no number

@@ -4,7 +4,7 @@ import math
 
 from trunkline.ar.drivers.driver import TICK
 
-SILENT = 0.05  # s without a setpoint
+SETPOINT_TIMEOUT = 0.05  # s without a setpoint
 
 
 class Watchdog:
@@ -22,9 +22,9 @@ class Watchdog:
         self.heard = now
 
     def late(self, now: float) -> str:
-        """The fault at `now`, s, that none was heard for SILENT s; "" for none. Asked before those that wait are heard,
-        it finds too that this process itself was late."""
+        """The fault at `now`, s, that none came for SETPOINT_TIMEOUT s; "" for none. Called before those that wait are
+        read, it finds too that this process itself was late."""
         silent = now - self.heard
-        if silent <= SILENT:
+        if silent <= SETPOINT_TIMEOUT:
             return ""
         return f"heard no setpoint for {1e3 * silent:.0f} ms, expected one every {1e3 * TICK:.0f} ms"

@@ -1,12 +1,12 @@
 """Who controls: one does, all watch. The rules, without clock and sockets.
 
-The lease is asked for, released and given away. It ends after SILENCE s without a sound input, or when its holder
+The lease is asked for, released and given away. It ends after LEASE_TIMEOUT s without a sound input, or when its holder
 leaves; then the first who asked has it. It never comes back by itself. The stop does not ask for it.
 """
 
 from dataclasses import dataclass, field
 
-SILENCE = 1.0  # s
+LEASE_TIMEOUT = 1.0  # s without a sound input
 
 
 @dataclass
@@ -52,7 +52,7 @@ class ControlLease:
 
     def silent(self, now: float) -> bool:
         """Let time pass; whether the lease ended by its holder's silence."""
-        if not self.holder or now - self.heard <= SILENCE:
+        if not self.holder or now - self.heard <= LEASE_TIMEOUT:
             return False
         return self.release(self.holder, now)
 
