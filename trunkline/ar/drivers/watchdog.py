@@ -1,4 +1,4 @@
-"""Where a driver stops its axes because no setpoints come any more."""
+"""Whether setpoints are late: it reports a fault, on which the driver that asks halts its axes by its own means."""
 
 import math
 

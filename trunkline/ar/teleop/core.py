@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 from trunkline.ar.teleop.alignment import Aligned, wrist_of
 from trunkline.ar.teleop.events import Ends, detect_events, looked_back, stopped_by
-from trunkline.ar.teleop.headset_loss import silence_fault
+from trunkline.ar.teleop.headset_silence import silence_fault
 from trunkline.ar.teleop.input_validation import clock_fault, fault_of, setting_fault, swapped
 from trunkline.ar.teleop.messages import Input, Intent, Motion, Pose, Request, Targets
 from trunkline.ar.teleop.reach import Reach
