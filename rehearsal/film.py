@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rehearsal.robot.scene import SceneObject, SupportSurface
-from rehearsal.session import RATE, Session
+from rehearsal.session import RATE, RehearsedSession
 from trunkline.frames import rotation_from_wxyz
 from trunkline.kinematics.panda.kinematics import FLANGE, joint_frames
 
@@ -40,7 +40,7 @@ class Shot:
     surfaces: list[SupportSurface]
 
 
-def filmed(session: Session) -> list[Shot]:
+def filmed(session: RehearsedSession) -> list[Shot]:
     """Of every fifth frame of a session that has not begun: filled as it goes on."""
     frame, shots, count = session.frame, [], 0
 
@@ -56,7 +56,7 @@ def filmed(session: Session) -> list[Shot]:
     return shots
 
 
-def shoot(session: Session, mode: str) -> Shot:
+def shoot(session: RehearsedSession, mode: str) -> Shot:
     """What is so now; what the client takes for the base frame is turned back into the true one."""
     robot, scene = session.robot, session.robot.scene
     truth, (units, axes) = robot.truth(), robot.links()
@@ -76,7 +76,7 @@ def shoot(session: Session, mode: str) -> Shot:
     )  # fmt: skip
 
 
-def _true(session: Session, places: np.ndarray) -> np.ndarray:
-    """The inverse of `Session.in_client_frame`."""
+def _true(session: RehearsedSession, places: np.ndarray) -> np.ndarray:
+    """The inverse of `RehearsedSession.in_client_frame`."""
     instruments = session.robot.instruments
     return instruments.turn.inv().apply(places - instruments.shift)

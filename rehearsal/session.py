@@ -111,7 +111,7 @@ class RehearsedRobot:
         self.robot.advance(dt)
 
 
-class Session:
+class RehearsedSession:
     """From the robot at rest with its arm straight. `place` says where the object truly is; `foresight` previews
     grasps, where the operator is `judged` by previews."""
 

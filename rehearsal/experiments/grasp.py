@@ -15,7 +15,7 @@ from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending, Operator
 from rehearsal.robot.scene import Scene, SceneObject, SupportSurface
 from rehearsal.robot.stand_in import StandInRobot
-from rehearsal.session import Session
+from rehearsal.session import RehearsedSession
 from trunkline.ar.hybrid.grasps import object_in_base
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.teleop.messages import Obstacle, WorldObject
@@ -84,7 +84,7 @@ def session_of(
     operator: Operator,
     seed: int,
     table: SupportSurface | None = None,
-) -> Session:
+) -> RehearsedSession:
     """The stand-in at its ready pose, the object on its string or its stand, the client's world as it is seen at
     first."""
     x, y, z = bench.settings.mount_ready
@@ -101,7 +101,7 @@ def session_of(
         NAME, object.shape, object.diameter, object.height, object.mass, (a, b, c), (d, e, f, g),
         "standing" if placed.stands else "hanging", object.basket,
     )  # fmt: skip
-    return Session(
+    return RehearsedSession(
         bench.package, bench.config, robot, (operator.left, operator.right), make_world(obstacles, (object_seen,)),
         lambda now: robot.truth().grip, bench.foresight, bench.judged,
     )  # fmt: skip
@@ -136,7 +136,7 @@ def grasp(bench: Bench, seed: int) -> Staged:
     return Staged("grasp", seed, session, script, judge, placed.name)
 
 
-def tell(result: Result, ending: Ending, session: Session, succeeded: bool) -> None:
+def tell(result: Result, ending: Ending, session: RehearsedSession, succeeded: bool) -> None:
     """What the preview had said, and how far off it was."""
     result.plans, result.probability = ending.plans, ending.probability
     result.agreed = agreed(ending.probability, succeeded)
