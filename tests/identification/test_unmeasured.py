@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.support.swings import FRAMES, LIKE, MARKERS, TIME, TIP, experiment, swing, trial
+from trunkline.identification.diagnostics.trial_diagnostics import exchanged_labels, moving_start, started_off
 from trunkline.identification.evaluation.baselines import hanging_still
 from trunkline.identification.evaluation.error_tables import marker_table, trial_table
 from trunkline.identification.evaluation.evaluation import Prediction, errors_of, scores
@@ -21,7 +22,6 @@ from trunkline.identification.simulate.loss import (
     position_error,
     velocity_error,
 )
-from trunkline.identification.uncertainty.trial_diagnostics import exchanged_labels, moving_start, started_off
 
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 FIT = Fit(MARKERS, {}, (), "positions", WEIGHTS, None)  # type: ignore[arg-type]
