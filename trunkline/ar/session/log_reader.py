@@ -12,7 +12,7 @@ from trunkline.ar.session.log_format import EVENTS, INPUT, INTENT, JOINTS, POSES
 from trunkline.errors import InputError
 from trunkline.recordings.logs.cdr import HEADER
 from trunkline.recordings.logs.joint_stream import JointStream, joint_stream
-from trunkline.recordings.logs.log import Log, read_log
+from trunkline.recordings.logs.mcap_log import Log, read_log
 from trunkline.recordings.logs.pose_stream import PoseStream, pose_stream
 
 INPUT_KEY = b',"given":'
