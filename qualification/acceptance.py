@@ -9,7 +9,7 @@ in a preview (`trunkline/ar/hybrid/rollouts.py`).
 
 Goals were set before any of it was built; what misses one is printed as it is. Times are by the wall, of a machine that
 should do nothing else. Goals of presses, alignment, clocks, the page, the log and ROS 2's bytes are held by tests:
-tests/ar/teleop/test_presses.py, tests/ar/session, tests/ar/drivers/test_ros.py.
+tests/ar/teleop/test_presses.py, tests/ar/session, tests/ar/drivers/test_ros_panda.py.
 """
 
 import sys

@@ -20,9 +20,9 @@ from trunkline.ar.teleop.messages import Input, Joints, to_json
 from trunkline.ar.teleop.settings import Teleop
 from trunkline.kinematics.panda.mounts import PandaRobot
 from trunkline.twin.package import MANIFEST, robot_of
+from trunkline.unity.assemble import sealed
 from trunkline.unity.manifest import Manifest
-from trunkline.unity.package import without_metas
-from trunkline.unity.twin import sealed
+from trunkline.unity.upm_package import without_metas
 
 FOLDER = "Tests/Vectors"
 STEPS = f"{FOLDER}/steps.json"
