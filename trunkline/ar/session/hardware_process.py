@@ -30,7 +30,7 @@ from trunkline.ar.teleop.messages import ExecutorReport
 from trunkline.ar.teleop.trajectory import MotionLimits
 from trunkline.compute.processes import end_with_parent, leave_signals_to_parent, parent_pid
 from trunkline.errors import InputError
-from trunkline.kinematics.panda.shipped import JOINTS
+from trunkline.kinematics.panda.maker_model import JOINTS
 
 DELAY, MEAN = 0.15, 0.1  # s that the twin is behind the machine, and over which it takes the mean of what it hears
 RESTS, STILL, LEAST = 2.0, 2e-4, 1e-9  # s in which no pose (m) and no axis (rad, m) changes by more: the twin rests

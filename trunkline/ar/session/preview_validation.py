@@ -21,7 +21,7 @@ from trunkline.ar.session.log_format import SIMULATED, WRIST
 from trunkline.ar.session.log_reader import LogReader, read_session_log, tip_path
 from trunkline.errors import in_one_line
 from trunkline.kinematics.panda.kinematics import FLANGE, mount_pose
-from trunkline.kinematics.panda.shipped import JOINTS
+from trunkline.kinematics.panda.maker_model import JOINTS
 
 LATEST = 0.25  # s that a robot may need to begin
 FEWEST = 5  # poses of a path that is compared

@@ -28,7 +28,7 @@ from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.plan import Plan
 from trunkline.ar.teleop.trajectory import MotionLimits
 from trunkline.compute.processes import leave_signals_to_parent, parent_pid
-from trunkline.kinematics.panda.shipped import JOINTS
+from trunkline.kinematics.panda.maker_model import JOINTS
 from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.capstan import REFRESH, capstan_friction_of
 from trunkline.model.simulation.motion import batch_of, hold
