@@ -15,7 +15,7 @@ from trunkline.identification.fit.fit import Fit
 from trunkline.identification.fit.identify import _few
 from trunkline.identification.results.scoring import fingerprint
 from trunkline.identification.simulate.loss import (
-    RESIDUALS,
+    LOSSES,
     LossWeights,
     internal_error,
     loss_of,
@@ -109,8 +109,8 @@ COMPARED = {
     "E_internal": lambda p, mask: internal_error(SIMULATED, p, mask),
     "the position error": lambda p, mask: position_error(SIMULATED, p, mask),
     "the velocity error": lambda p, mask: velocity_error(SIMULATED, p, mask, 100.0),
-    "the loss of distances": lambda p, mask: loss_of(RESIDUALS["distances"](SIMULATED[None], p, mask, WEIGHTS)),
-    "the loss of positions": lambda p, mask: loss_of(RESIDUALS["positions"](SIMULATED[None], p, mask, WEIGHTS)),
+    "the loss of distances": lambda p, mask: loss_of(LOSSES["distances"](SIMULATED[None], p, mask, WEIGHTS)),
+    "the loss of positions": lambda p, mask: loss_of(LOSSES["positions"](SIMULATED[None], p, mask, WEIGHTS)),
     "the errors of a swing": of_trial,
     "the errors of a path": of_path,
     "the table of trials": table(trial_table),
