@@ -175,7 +175,7 @@ class RehearsedSession:
         if controller.plan is not before:
             self.previewed = self._end(controller.plan, intent)
         if intent.mode == "preview":
-            controller.shown(intent.preview, self.now)  # which counts once it has lasted long enough
+            controller.preview_shown(intent.preview, self.now)  # which counts once it has lasted long enough
         if intent.execute and intent.execute != self._executed:
             self._executed, self.tips = intent.execute, []
             self._began = self.now - 1 / RATE  # `now` is the end of a frame, in which the plan runs already

@@ -166,7 +166,7 @@ def test_a_fault_lasts_and_is_the_first(ready):
 def test_what_is_sent_comes_to_the_driver_process(ready):
     for number in range(3):
         ready.send(BEGUN + 0.001 * number, READY + number)
-    setpoints = [Setpoint.unpack(frame) for frame in ready.process.line.heard()]
+    setpoints = [Setpoint.unpack(frame) for frame in ready.process.line.received()]
     assert setpoints == [Setpoint(BEGUN + 0.001 * number, tuple(READY + number)) for number in range(3)]
 
 
@@ -190,7 +190,7 @@ def test_a_driver_process_that_does_not_end_is_killed_after_a_while(clock, ends)
     driver = DriverClient(["adapter"], 7)
     driver.process.ends = ends
     driver.close()
-    driver.process.line.heard()
+    driver.process.line.received()
     assert not driver.process.line.open
     assert driver.process.waited[0] == CLOSING
     assert driver.process.killed == (not ends)

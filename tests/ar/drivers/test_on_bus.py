@@ -156,7 +156,7 @@ def test_of_the_frames_of_a_motor_that_wait_the_newest_counts(driven):
     assert len(driven.bus.waiting) == 15
     driven.driver.turn([0.01] * 3, [0.0] * 3)
     np.testing.assert_allclose(driven.bench.motors.pulls, driven.bench.pulls, atol=3e-4)
-    assert {winch.heard for winch in driven.bench.motors.winches} == {driven.bench.now}
+    assert {winch.last_feedback for winch in driven.bench.motors.winches} == {driven.bench.now}
 
 
 def test_an_error_frame_is_no_feedback(monkeypatch):
@@ -165,7 +165,7 @@ def test_an_error_frame_is_no_feedback(monkeypatch):
     waits = [frame, None]
     played.bus.recv = lambda timeout: waits.pop(0)
     played.driver.turn([0.0] * 3, [0.0] * 3)
-    assert played.bench.motors.winches[0].heard is None
+    assert played.bench.motors.winches[0].last_feedback is None
 
 
 def test_a_closed_driver_leaves_no_current_and_no_bus(driven):

@@ -40,7 +40,7 @@ class Played:
                 self.line.send(Setpoint(self.now + LEAD, tuple(way(self.now - begun))).pack())
             self.joints, self.ended = self.adapter.cycle(self.joints, self.joints, DT, None)
             if self.line.open:
-                self.states += [DriverState.unpack(frame) for frame in self.line.heard()]
+                self.states += [DriverState.unpack(frame) for frame in self.line.received()]
             if self.ended:
                 break
         return self
@@ -118,7 +118,7 @@ def test_an_fr3_is_held_against_its_own_limits(monkeypatch):
 def test_why_control_has_ended_is_told_last(played):
     played.play(0.1)
     played.adapter.fail("ControlException: reflex")
-    (state,) = (DriverState.unpack(frame) for frame in played.line.heard())
+    (state,) = (DriverState.unpack(frame) for frame in played.line.received())
     assert state.fault == "ControlException: reflex"
     assert state.sent == tuple(played.joints)
 

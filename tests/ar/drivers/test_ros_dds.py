@@ -121,7 +121,7 @@ def test_silence_and_a_joint_astray_are_faults(joined):
     arm.fault, controller.joints, controller.stuck = "", READY + 0.2 * np.eye(7)[3], True
     arm._sent = READY
     until(lambda: np.abs(arm.measured - READY).max() > 0.1, lambda: (controller.turn(), arm._hear(time.monotonic())))
-    arm.turn(arm._heard)
+    arm.turn(arm._state_time)
     assert arm.fault == "panda_joint4: found 0.2 rad from where it is sent, expected at most 0.1"
 
 

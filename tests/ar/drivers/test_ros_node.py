@@ -107,7 +107,7 @@ def stub(monkeypatch):
 def arm(stub):
     arm = RosPanda(SETTINGS)
     stub.say(READY)
-    arm.turn(arm._heard)
+    arm.turn(arm._state_time)
     assert arm.ready
     yield arm
     arm.close()
@@ -116,7 +116,7 @@ def arm(stub):
 def test_a_node_sends_one_point_for_when_it_is_due(stub, arm):
     assert stub.domain == SETTINGS.domain
     np.testing.assert_array_equal(arm.sent, READY)
-    now = arm._heard
+    now = arm._state_time
     for step in (0.04, 0.05):  # of those that wait the newest is sent
         arm.send(now + 1.5, READY + step)
     arm.turn(now)
@@ -139,7 +139,7 @@ def test_what_it_hears_is_the_newest(stub, arm):
 
 
 def test_its_faults_are_those_of_the_other_link(stub, arm):
-    now = arm._heard
+    now = arm._state_time
     arm.turn(now + 0.3)
     assert arm.fault == "/joint_states: silent for 300 ms"
     arm.fault = ""

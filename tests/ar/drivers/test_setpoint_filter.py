@@ -224,11 +224,11 @@ def test_frames_are_cut_however_they_come(line):
     data, frames = b"".join(Setpoint(n, tuple(READY)).pack() for n in range(9)), []
     for begin in range(0, len(data), 50):
         theirs.send(data[begin : begin + 50])
-        frames += ours.heard()
+        frames += ours.received()
     assert [Setpoint.unpack(frame).due for frame in frames] == list(range(9))
     assert ours.open
     theirs.close()
-    assert ours.heard() == []
+    assert ours.received() == []
     assert not ours.open
 
 

@@ -238,7 +238,7 @@ def test_whoever_takes_over_finds_a_robot_that_was_told_to_stop_and_nothing_of_w
     controller.hear(*received(1.0))
     controller.control(alignment, "not sure")
     assert robot.calls == ["stop"]
-    assert not controller._heard
+    assert not controller._inputs
     assert (controller.alignment, controller.unfit) == (alignment, "not sure")
     assert controller.hear(*received(0.5)) == ""  # another clock
 
@@ -278,7 +278,7 @@ def test_of_more_inputs_than_a_tick_takes_the_oldest_are_left_out():
     controller = controller_of(ToldRobot())
     for number in range(MOST_INPUTS + 3):
         controller.hear(*received(1.0 + number))
-    assert [heard.stamp for heard in controller._heard] == [1.0 + number for number in range(3, MOST_INPUTS + 3)]
+    assert [heard.stamp for heard in controller._inputs] == [1.0 + number for number in range(3, MOST_INPUTS + 3)]
 
 
 # --- what has been shown
@@ -316,14 +316,14 @@ SHOWN = [
 @pytest.mark.parametrize(("changes", "digest", "after", "reason"), SHOWN)
 def test_what_counts_as_shown_to_its_end(changes, digest, after, reason):
     controller = previewed(**changes)
-    assert controller.shown(digest, 10.0 + after) == reason
-    assert controller._shown == ("" if reason else DIGEST)
+    assert controller.preview_shown(digest, 10.0 + after) == reason
+    assert controller._shown_digest == ("" if reason else DIGEST)
 
 
 @pytest.mark.parametrize(("serial", "counts"), [(2, False), (3, True), (4, False)])
 def test_only_an_answer_to_what_was_asked_for_last_counts(serial, counts):
     controller = controller_of(ToldRobot())
-    controller._asked = 3
+    controller._requested = 3
     plan, prediction = some_plan(), messages.PredictionMessage(DIGEST, None, None, None, (), (), (), 0.9, 12)
     answers = [
         PlanAnswer(PlanReport(serial, plan.digest(), "", PACKAGE, "world"), plan),
@@ -342,7 +342,7 @@ def test_only_an_answer_to_what_was_asked_for_last_counts(serial, counts):
 
 def test_a_process_that_plans_and_has_ended_is_a_refusal():
     controller = controller_of(ToldRobot())
-    controller._asked = 3
+    controller._requested = 3
     assert not controller.answered(None, 0.0)
     assert (controller.report.serial, controller.report.refused) == (3, "the process that plans has ended")
 
@@ -413,7 +413,7 @@ class Played:
         self.until(lambda intent: intent.mode == "preview")
         self.right = {"grip": 1.0}
         self.wait(PREVIEW + 0.1)
-        assert self.controller.shown(self.controller.intent.preview, self.now) == ""
+        assert self.controller.preview_shown(self.controller.intent.preview, self.now) == ""
         self.until(lambda intent: intent.mode == "ready")
         self.right = {"grip": 1.0, "trigger": 1.0}
         self.until(lambda intent: intent.mode == "execute")
@@ -449,7 +449,7 @@ def test_from_hands_to_a_robot_that_has_arrived(session):
 def test_what_runs_is_still_known_where_its_preview_breaks_off_meanwhile(session):
     """Else the world would not hear at its end of what it grasped."""
     controller, plan = session.executing().controller, session.controller.plan
-    refusal = PlanReport(controller._asked, refused="preview: ValueError: it diverged")
+    refusal = PlanReport(controller._requested, refused="preview: ValueError: it diverged")
     assert not controller.answered(PlanAnswer(refusal), session.now)
     assert controller.plan is plan
     session.until(lambda intent: intent.mode == "aim")

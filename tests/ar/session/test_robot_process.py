@@ -283,8 +283,8 @@ def test_where_its_server_is_gone_it_brakes_along_the_plan_before_it_ends():
     robot = PlanFollower(s.joints, s.commands, s.limits, PACKAGE, lambda joints, commands, dt: None)
     loop = Loop(channel, robot, Still())
     drive(loop, gone)  # at rest, it ends at once
-    channel.plans.put((1, plan().digest(), plan(), channel.asked[STOPS]))
-    channel.asked[PERMIT], channel.asked[PERMITTED] = time.monotonic(), 1
+    channel.plans.put((1, plan().digest(), plan(), channel.requests[STOPS]))
+    channel.requests[PERMIT], channel.requests[PERMITTED] = time.monotonic(), 1
     loop.turn(time.monotonic())
     assert robot.state().mode == "running"
     began = time.monotonic()

@@ -76,7 +76,7 @@ def steps_file(core: Teleoperation, recorded: dict[str, list[tuple[float, Input]
 def cases_file(answers: Answers, name: str, questions: list[Case]) -> bytes:
     """Questions that `answers` answers by this name, each with its answer."""
     answer = getattr(answers, name)
-    lines = (b'{"question":%b,"answer":%b}' % (_json(asked), _json(answer(**asked))) for asked in questions)
+    lines = (b'{"question":%b,"answer":%b}' % (_json(question), _json(answer(**question))) for question in questions)
     return b'{"cases":%b}\n' % _lines(lines)
 
 

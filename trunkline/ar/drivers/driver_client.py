@@ -108,7 +108,7 @@ class DriverClient:
             self.process.wait()
 
     def _hear(self) -> None:
-        for frame in self.line.heard():
+        for frame in self.line.received():
             state = DriverState.unpack(frame)
             if state.fault:
                 self._fail(state.fault)

@@ -67,7 +67,7 @@ def run_driver(driver: Driver, line: FrameSocket) -> None:
     """Turn the driver until nobody is at the other end, and SETTLES s more."""
     due, gone, turns, fault = time.monotonic(), math.inf, 0, ""
     while (now := time.monotonic()) - gone < SETTLES:
-        for frame in line.heard():
+        for frame in line.received():
             setpoint = Setpoint.unpack(frame)
             driver.send(setpoint.due, np.array(setpoint.axes))
         gone = gone if line.open else min(gone, now)

@@ -112,7 +112,7 @@ class PandaProcess:
         now, stream = time.monotonic(), self._stream
         if rates is not None:
             stream.synchronize(desired, *rates)
-        for frame in self._line.heard():
+        for frame in self._line.received():
             stream.hear(Setpoint.unpack(frame), now)
         if not self._line.open:
             stream.brake("the machine's process is gone")

@@ -155,7 +155,7 @@ class Loop:
     def __init__(self, channel: RobotChannel, robot: PlanFollower, plant: MovingPlant) -> None:
         self.channel, self.robot, self.plant = channel, robot, plant
         self.serial, self.fault, self.hold_time = 0, "", 0.0
-        self._stops, self._holds, self._listens = channel.asked[STOPS], False, 0.0
+        self._stops, self._holds, self._listens = channel.requests[STOPS], False, 0.0
 
     @property
     def moves(self) -> bool:
@@ -164,12 +164,12 @@ class Loop:
 
     def turn(self, now: float, woken: bool = True) -> None:
         """Obey what was asked since; plans are looked for where it was `woken` of late."""
-        asked = self.channel.asked
-        stopped = asked[STOPS] != self._stops
-        permitted = asked[PERMITTED] == self.serial and now - asked[PERMIT] <= DEAD_MAN
+        requests = self.channel.requests
+        stopped = requests[STOPS] != self._stops
+        permitted = requests[PERMITTED] == self.serial and now - requests[PERMIT] <= DEAD_MAN
         holds = stopped or (self.moves and not permitted)
         if holds:
-            self._stops = asked[STOPS]
+            self._stops = requests[STOPS]
             self.robot.stop()
         if stopped or (holds and not self._holds):
             self.hold_time = now
@@ -198,23 +198,23 @@ class Loop:
 
     def _hear(self, now: float) -> None:
         try:
-            serial, digest, asked, stops = self.channel.plans.get_nowait()
+            serial, digest, motion, stops = self.channel.plans.get_nowait()
         except Empty:
             return
-        if isinstance(asked, Goal):
+        if isinstance(motion, Goal):
             if serial == self.serial:
-                self.robot.hear(now - asked.time, asked.axes)
+                self.robot.hear(now - motion.time, motion.axes)
             return
         self.serial = serial
-        overtaken = "a stop came before it began" if stops != self.channel.asked[STOPS] else ""
-        self.fault = overtaken or self.plant.fault or self._begin(asked, digest)
+        overtaken = "a stop came before it began" if stops != self.channel.requests[STOPS] else ""
+        self.fault = overtaken or self.plant.fault or self._begin(motion, digest)
 
-    def _begin(self, asked: Plan | Following, digest: str) -> str:
+    def _begin(self, motion: Plan | Following, digest: str) -> str:
         """Why it does not begin, "" where it does."""
         robot = self.robot
-        if isinstance(asked, Plan):
-            return robot.start(asked, digest)
-        return robot.follow(asked, self.plant.tick)
+        if isinstance(motion, Plan):
+            return robot.start(motion, digest)
+        return robot.follow(motion, self.plant.tick)
 
 
 def drive(loop: Loop, parent: int, behind: Callable[[], float] = lambda: BEHIND) -> None:
