@@ -77,7 +77,7 @@ def rows(path: Path) -> list[Row]:
     with planning(path, teleop, config, simulation, world) as process:
         found = list(previews(process, package, config, simulation, world))
     first, enough, whole = np.array([(one.first, one.enough, one.whole) for one in found]).T
-    shown, long = np.array([one.times[-1] for one in found]), np.isfinite(enough)
+    duration, long = np.array([one.times[-1] for one in found]), np.isfinite(enough)
     apart: dict[bool, list[np.ndarray]] = {False: [], True: []}
     for one in found:
         off, pushed = distances(one, simulation)
@@ -85,7 +85,7 @@ def rows(path: Path) -> list[Row]:
     return [
         Row(f"first piece of a preview after its plan, {len(found)} plans", _told(first, 1e3, "ms"), "≤ 150 ms"),
         Row(f"… {ENOUGH:g} s of preview, of the {long.sum()} that are so long", _told(enough[long], 1, "s"), "≤ 1.5 s"),
-        Row(f"… the whole preview, of {shown.min():.1f} to {shown.max():.1f} s", _told(whole, 1, "s"), "none"),
+        Row(f"… the whole preview, of {duration.min():.1f} to {duration.max():.1f} s", _told(whole, 1, "s"), "none"),
         _apart("preview against the simulated robot, tip", apart[False], "≤ 1 mm"),
         _apart("… where the arm pushes what hangs in its way", apart[True], "none"),
     ]
@@ -131,7 +131,7 @@ def previews(
         targets = _targets(rng, package, config.ready)
         request = Request(serial, targets, world.digest, package.digest)
         process.submit(Order(request, world, simulation.joints, simulation.commands))
-        found = _heard(process, serial)
+        found = _await_preview(process, serial)
         if found is not None:
             made += 1
             yield found
@@ -159,7 +159,7 @@ def _answers(process: PreviewProcess) -> Iterator[tuple[float, Answer | None]]:
     raise InputError(f"the process that plans: no answer within {COMES:g} s")
 
 
-def _heard(process: PreviewProcess, serial: int) -> Previewed | None:
+def _await_preview(process: PreviewProcess, serial: int) -> Previewed | None:
     """The answers to order `serial`, those to the one before left out; None where it is refused."""
     plan, step, began, pieces = None, 0.0, 0.0, []
     for at, answer in _answers(process):

@@ -66,11 +66,11 @@ def shoot(session: RehearsedSession, mode: str) -> Shot:
     flange = frames[-1].p[:, 0] + FLANGE * frames[-1].z[:, 0]
     ends = np.array([(np.nan,) * 3 if end is None else end for end in session.rays], dtype=float)
     hands = np.array([hand.turn.apply(hand.origin) + hand.shift for hand in session.hands])
-    shown = session.previewed if mode in ("preview", "ready", "delay", "execute") else None
+    ghost = session.previewed if mode in ("preview", "ready", "delay", "execute") else None
     return Shot(
         session.now, mode, np.array([np.zeros(3), *origins, flange]), robot.base()[1], units, axes,
         np.array(robot.arm.chain.widths) / 2, _true(session, hands), _true(session, ends),
-        None if shown is None else _true(session, shown), session.place(session.now) - grip, truth.quaternion,
+        None if ghost is None else _true(session, ghost), session.place(session.now) - grip, truth.quaternion,
         np.array(scene.hook) if truth.hanging and scene.hook is not None else None,
         scene.object, list(scene.surfaces.values()),
     )  # fmt: skip

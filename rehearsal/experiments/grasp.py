@@ -151,17 +151,18 @@ def agreed(probability: float, succeeded: bool) -> float:
     return float((probability >= 0.5) == succeeded) if np.isfinite(probability) else float("nan")
 
 
-def tip_difference(tips: list[tuple[float, np.ndarray]], times: np.ndarray, shown: np.ndarray) -> float:
+def tip_difference(tips: list[tuple[float, np.ndarray]], times: np.ndarray, previewed: np.ndarray) -> float:
     """Median distance between the robot's tip and the preview's at the same time, m; NaN if there is no such time.
 
     Args:
-        tips: s since the plan began, and the robot's tip (3,), m. times, shown: of the preview, (F,), s, and (F, 3), m.
+        tips: s since the plan began, and the robot's tip (3,), m. times, previewed: of the preview's tip,
+            (F,), s, and (F, 3), m.
     """
     during = [(time, tip) for time, tip in tips if times[0] <= time <= times[-1]]
     if not during:
         return float("nan")
     took, there = (np.array(column) for column in zip(*during, strict=True))
-    foreseen = np.column_stack([np.interp(took, times, column) for column in shown.T])
+    foreseen = np.column_stack([np.interp(took, times, column) for column in previewed.T])
     return float(np.median(np.linalg.norm(there - foreseen, axis=1)))
 
 
