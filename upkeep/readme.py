@@ -427,7 +427,7 @@ def _rehearsal_rows(metrics: dict | None, goals: Mapping[str, Limit]) -> list[st
     for name, words in EXPERIMENT_NAMES.items():
         rate, goal = lookup(metrics, f"{name}.rate"), goals.get(f"{name}.rate")
         clean = lookup(metrics, f"{name}.clean.rate")
-        beside = "" if clean is None else f" (within 20 mm, nothing else touched: {_percent(clean)})"
+        beside = "" if clean is None else f" (within 20 mm, and no other part touched anything: {_percent(clean)})"
         rates.append(_marked(f"{words} {_percent(rate)}", goal, rate) + beside)
         rate_goals += [f"{words} ≥ {_percent(goal.target)}"] if goal and goal.target is not None else []
     rows = [f"| Rehearsed experiments that succeed | {', '.join(rates)} | goal: {', '.join(rate_goals)} |"]

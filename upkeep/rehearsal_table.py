@@ -31,7 +31,7 @@ def rehearsal_table(metrics: Mapping[str, Any], goals: Mapping[str, Limit], pack
         if "runs" in result:
             lines.append(_row(name, name, result, _goal(goal, result["rate"])))
         if clean := result.get("clean"):
-            words = "… tip within 20 mm, nothing else touched"
+            words = "… tip within 20 mm, and no other part touched anything"
             lines.append(f"| {words} | {clean['runs']} | {_percent(clean['rate'])} | {_interval(clean)} | | | |")
         if variants:
             lines += [_row(name, f"… {kind}", row, "") for kind, row in result.get("objects", {}).items()]

@@ -99,7 +99,8 @@ def test_clean_reaches_are_counted_among_those_that_were_judged():
     }  # fmt: skip
     assert 0.2 < metrics["clean"]["low"] < 0.3 < 0.9 < metrics["clean"]["high"] < 0.95
     table = rehearsal_table({"reach": metrics}, {}, "of a test", False).splitlines()
-    assert table[3].startswith("| … tip within 20 mm, nothing else touched | 3 | 66.7 % | 20.8 to 93.9 % |")
+    words = "… tip within 20 mm, and no other part touched anything"
+    assert table[3].startswith(f"| {words} | 3 | 66.7 % | 20.8 to 93.9 % |")
     assert "clean" not in summary([Result("follow", 0, True)])["follow"]
 
 
