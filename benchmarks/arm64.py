@@ -24,7 +24,7 @@ import numpy as np
 from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.config import PROJECT
 from trunkline.twin.package import MANIFEST, read_tarball
-from trunkline.unity.package import MODEL
+from trunkline.unity.upm_package import MODEL
 from upkeep.results import recorded
 
 SOURCE = PROJECT / "benchmarks/arm64.c"

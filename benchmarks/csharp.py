@@ -13,7 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from trunkline.twin.package import read_tarball
-from trunkline.unity.twin import CSHARP
+from trunkline.unity.assemble import CSHARP
 from upkeep.results import recorded
 
 PROGRAM = Path("tests/unity/csharp")

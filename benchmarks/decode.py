@@ -16,7 +16,7 @@ from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from trunkline.recordings.logs.definitions import RIGID_BODIES
-from trunkline.recordings.logs.log import read_log
+from trunkline.recordings.logs.mcap_log import read_log
 from trunkline.recordings.logs.pose_stream import pose_stream
 from upkeep.results import recorded
 

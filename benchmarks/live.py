@@ -125,7 +125,7 @@ async def plainly(package: Path, watchers: int, stops: int) -> tuple[list[Row], 
             ("the same while one more reads nothing", halves(rest.ages), "95th: 5"),
             ("frames that are held for it", str(looks.most(rest, deaf)), "3"),
         ]
-        holds, looks, asked = (
+        holds, looks, first_serial = (
             Holds(made, [made.robot.robot_state().hold_time]),
             Looks(server),
             made.controller.state.serial,
@@ -137,7 +137,7 @@ async def plainly(package: Path, watchers: int, stops: int) -> tuple[list[Row], 
                 looks.look()
 
         span, sent = await attended(look, CLOSELY, door, stopping, watchers, stops)
-        plans, took = made.controller.state.serial - asked, holds.after(sent)
+        plans, took = made.controller.state.serial - first_serial, holds.after(sent)
         size = binary.HEAD_BYTES + 28 * (len(made.scene["bodies"]) + len(binary.MARKERS))
     told = 1e3 * np.quantile(took, (0.5, 0.95, 0.99, 1.0))
     rows += [

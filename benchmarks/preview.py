@@ -51,15 +51,15 @@ def main(path: Path, count: int) -> None:
     print(f"{path}: {twin.model.nv} degrees of freedom, {count} futures of {LENGTH:g} s, {thread_count()} threads")
     first = None
     for step in STEPS:
-        own, shown, began = twin.stepped(step), [], time.process_time()
-        pieces = lambda piece, shown=shown, began=began: shown.append(time.process_time() - began)  # noqa: E731
+        own, spans, began = twin.stepped(step), [], time.process_time()
+        pieces = lambda piece, spans=spans, began=began: spans.append(time.process_time() - began)  # noqa: E731
         found = preview(own, way, doubts, holding, count, show=pieces)
         spent = time.process_time() - began
         first = found if first is None else first
         low, high = found.interval or (0.0, 1.0)
         print(
-            f"step {1e3 * step:.2f} ms: first piece after {shown[0]:.3f} s of processor, nominal {shown[-1]:.2f} s, "
-            f"all {spent:.1f} s ({(spent - shown[-1]) / count:.2f} s a future); "
+            f"step {1e3 * step:.2f} ms: first piece after {spans[0]:.3f} s of processor, nominal {spans[-1]:.2f} s, "
+            f"all {spent:.1f} s ({(spent - spans[-1]) / count:.2f} s a future); "
             f"holds with {found.probability:.2f} ({low:.2f} to {high:.2f})"
         )
         same = int(np.sum(found.success == first.success))

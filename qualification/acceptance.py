@@ -9,7 +9,7 @@ in a preview (`trunkline/ar/hybrid/rollouts.py`).
 
 Goals were set before any of it was built; what misses one is printed as it is. Times are by the wall, of a machine that
 should do nothing else. Goals of presses, alignment, clocks, the page, the log and ROS 2's bytes are held by tests:
-tests/ar/teleop/test_presses.py, tests/ar/session, tests/ar/drivers/test_ros.py.
+tests/ar/teleop/test_presses.py, tests/ar/session, tests/ar/drivers/test_ros_panda.py.
 """
 
 import sys
@@ -33,7 +33,7 @@ from trunkline.ar.session.previewer import Answer, Order, PlanAnswer, PreviewBeg
 from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.session.simulated import Simulation, TwinPlant
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
-from trunkline.ar.teleop.executor import SimulatedRobot
+from trunkline.ar.teleop.executor import PlanFollower
 from trunkline.ar.teleop.messages import Request, Target, Targets, Vector, World
 from trunkline.ar.teleop.plan import Plan
 from trunkline.ar.teleop.rigid_ik import RigidIK
@@ -77,7 +77,7 @@ def rows(path: Path) -> list[Row]:
     with planning(path, teleop, config, simulation, world) as process:
         found = list(previews(process, package, config, simulation, world))
     first, enough, whole = np.array([(one.first, one.enough, one.whole) for one in found]).T
-    shown, long = np.array([one.times[-1] for one in found]), np.isfinite(enough)
+    duration, long = np.array([one.times[-1] for one in found]), np.isfinite(enough)
     apart: dict[bool, list[np.ndarray]] = {False: [], True: []}
     for one in found:
         off, pushed = distances(one, simulation)
@@ -85,7 +85,7 @@ def rows(path: Path) -> list[Row]:
     return [
         Row(f"first piece of a preview after its plan, {len(found)} plans", _told(first, 1e3, "ms"), "≤ 150 ms"),
         Row(f"… {ENOUGH:g} s of preview, of the {long.sum()} that are so long", _told(enough[long], 1, "s"), "≤ 1.5 s"),
-        Row(f"… the whole preview, of {shown.min():.1f} to {shown.max():.1f} s", _told(whole, 1, "s"), "none"),
+        Row(f"… the whole preview, of {duration.min():.1f} to {duration.max():.1f} s", _told(whole, 1, "s"), "none"),
         _apart("preview against the simulated robot, tip", apart[False], "≤ 1 mm"),
         _apart("… where the arm pushes what hangs in its way", apart[True], "none"),
     ]
@@ -131,7 +131,7 @@ def previews(
         targets = _targets(rng, package, config.ready)
         request = Request(serial, targets, world.digest, package.digest)
         process.submit(Order(request, world, simulation.joints, simulation.commands))
-        found = _heard(process, serial)
+        found = _await_preview(process, serial)
         if found is not None:
             made += 1
             yield found
@@ -159,7 +159,7 @@ def _answers(process: PreviewProcess) -> Iterator[tuple[float, Answer | None]]:
     raise InputError(f"the process that plans: no answer within {COMES:g} s")
 
 
-def _heard(process: PreviewProcess, serial: int) -> Previewed | None:
+def _await_preview(process: PreviewProcess, serial: int) -> Previewed | None:
     """The answers to order `serial`, those to the one before left out; None where it is refused."""
     plan, step, began, pieces = None, 0.0, 0.0, []
     for at, answer in _answers(process):
@@ -188,7 +188,7 @@ def distances(found: Previewed, simulation: Simulation) -> tuple[np.ndarray, boo
     """Of the tip from where the preview has it, m (F,), once the simulated robot runs the plan; whether it pushed the
     object."""
     plant = TwinPlant(simulation)
-    robot = SimulatedRobot(
+    robot = PlanFollower(
         simulation.joints, simulation.commands, simulation.limits, simulation.package,
         lambda joints, commands, _: plant.move(joints, commands, smooth=True),
     )  # fmt: skip

@@ -27,7 +27,7 @@ import numpy as np
 
 from qualification.command import qualify
 from qualification.guests import ADDRESS
-from trunkline.ar.drivers.settings import ExecutionConfig as Execution
+from trunkline.ar.drivers.settings import read_execution_config
 from trunkline.ar.drivers.simulated_motors import SIMULATED
 from trunkline.ar.session import lease
 from trunkline.ar.session.composition import SessionParts
@@ -130,8 +130,8 @@ async def served(package: Path, runs: int, folder: Path) -> list[CycleRun]:
     config = replace(config, alignment=alignment, journal=replace(config.journal, folder=str(folder)))
     safety = replace(teleop.core.safety, silence=PATIENCE)
     teleop = replace(teleop, core=replace(teleop.core, safety=safety))
-    lease.SILENCE = PATIENCE
-    execution = load_folder(Execution, PROJECT / "conf/execution")
+    lease.LEASE_TIMEOUT = PATIENCE
+    execution = read_execution_config()
     hardware = hardware_of("simulated", "gm6020", SIMULATED, "", execution)
     log = lambda line: print(line, file=sys.stderr, flush=True)  # noqa: E731
     async with opened(package, ADDRESS, log, hardware, config, teleop) as (server, made):

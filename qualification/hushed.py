@@ -4,7 +4,7 @@ import signal
 import sys
 import time
 
-from trunkline.ar.drivers import driver_host, on_bus
+from trunkline.ar.drivers import local_driver_process, on_bus
 
 HUSH = 0.05  # s
 
@@ -26,4 +26,4 @@ def hush(*_) -> None:
 def main() -> int:
     signal.signal(signal.SIGUSR1, hush)
     on_bus.SimulatedMotorsOnBus = Hushed
-    return driver_host.main(sys.argv[1:])
+    return local_driver_process.main(sys.argv[1:])

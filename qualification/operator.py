@@ -59,7 +59,7 @@ def operate(pipe: Connection, token: str, told: str) -> None:
 
 
 async def _operate(pipe: Connection, token: str, told: str) -> None:
-    hands, gripped, asked = Hands(), None, 0.0
+    hands, gripped, request_time = Hands(), None, 0.0
     async with ClientSession() as session:
         guest = await knock(session, ADDRESS.url, lambda: time.monotonic() + JUMP * (told == "jump"))
         await guest.greet(token)
@@ -70,8 +70,8 @@ async def _operate(pipe: Connection, token: str, told: str) -> None:
                 await guest.leave()
                 break
             now = time.monotonic()
-            if not guest.controls and now - asked > AGAIN:
-                asked = now
+            if not guest.controls and now - request_time > AGAIN:
+                request_time = now
                 await guest.say(type="lease", action="ask")
             held, side = await hands.move(guest, now), ASIDE * (-1) ** hands.cycles
             held = {"grip": held | {"grip": 1.0, "trigger": 0.0}, "release": {}}.get(told, held)

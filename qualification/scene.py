@@ -16,13 +16,12 @@ from pathlib import Path
 from qualification.guests import ADDRESS
 from qualification.operator import PATIENCE, OperatorProcess
 from qualification.witness import Watched, Witness, machine
-from trunkline.ar.drivers.settings import ExecutionConfig
+from trunkline.ar.drivers.settings import read_execution_config
 from trunkline.ar.drivers.simulated_motors import SIMULATED
 from trunkline.ar.session import hardware_process, robot_process
 from trunkline.ar.session.hardware import hardware_of
 from trunkline.ar.session.serving import opened
 from trunkline.errors import InputError
-from trunkline.pipeline.config import PROJECT, load_folder
 
 ENDS = 20.0  # s that a session has to end
 
@@ -130,7 +129,7 @@ async def _serve(pipe: Connection, package: Path, motors: bool) -> None:
         with contextlib.suppress(OSError):  # it says how its end goes to nobody
             pipe.send((time.monotonic(), line))
 
-    execution = load_folder(ExecutionConfig, PROJECT / "conf/execution")
+    execution = read_execution_config()
     hardware = hardware_of("simulated", "gm6020", SIMULATED, "", execution) if motors else None
     async with opened(package, ADDRESS, say, hardware) as (server, made):
         assert made.robot.pid is not None

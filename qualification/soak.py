@@ -44,7 +44,7 @@ from trunkline.ar.session.server import Composition, Server
 from trunkline.ar.session.serving import listening
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.core import Teleoperation
-from trunkline.ar.teleop.executor import SimulatedRobot
+from trunkline.ar.teleop.executor import PlanFollower
 from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.messages import ExecutorReport, PlanReport
 from trunkline.ar.teleop.plan import Plan
@@ -61,7 +61,7 @@ class ScriptedRobot:
 
     def __init__(self, package: Package, teleop: Teleop) -> None:
         self.limits = limits_of(teleop.motors, package.rate_limit, len(package.straight))
-        self.robot = SimulatedRobot(SEARCH, package.straight, self.limits, package.digest)
+        self.robot = PlanFollower(SEARCH, package.straight, self.limits, package.digest)
         self.start, self.hear, self.now, self.stops = self.robot.start, self.robot.hear, 0.0, 0
 
     def follow(self, following: Following) -> str:
@@ -145,12 +145,12 @@ async def session(package: Package, hours: float) -> None:
             await guest.greet(token)
             return guest
 
-        async def heard(happens) -> None:
+        async def wait_for(happens) -> None:
             await until(happens, 10.0, f"after {clock[0]:.1f} s of the session", 0.0)
 
         async def control(guest: Guest) -> None:
             await guest.say(type="lease", action="ask")
-            await heard(lambda: server.lease.holder == guest.told["welcome"]["id"])
+            await wait_for(lambda: server.lease.holder == guest.told["welcome"]["id"])
 
         guest, hands, visitors = await come(), Hands(), []
         await control(guest)
@@ -161,7 +161,7 @@ async def session(package: Package, hours: float) -> None:
             robot.robot.advance(1 / HZ)
             held, before = await hands.move(guest, now), server.inputs
             await guest.send("input", hands_at(RIGID, TIP, held), SEEN, 2)
-            await heard(lambda before=before: server.inputs > before)
+            await wait_for(lambda before=before: server.inputs > before)
             server.step()
             if tick % round(VISIT * HZ) == 0:
                 visitors.append((now, await come()))
@@ -169,12 +169,12 @@ async def session(package: Package, hours: float) -> None:
             if visitors and now > visitors[0][0] + STAY:
                 stopped, stops = server.stopped, robot.stops
                 await visitors[0][1].send("stop")
-                await heard(lambda stopped=stopped: server.stopped > stopped)
+                await wait_for(lambda stopped=stopped: server.stopped > stopped)
                 found["stops"] += 1
                 found["missed"] += robot.stops == stops
                 if now // HAND_OVER > found["given"]:
                     await guest.say(type="lease", action="give", to=visitors[0][1].told["welcome"]["id"])
-                    await heard(lambda: server.lease.holder == visitors[0][1].told["welcome"]["id"])
+                    await wait_for(lambda: server.lease.holder == visitors[0][1].told["welcome"]["id"])
                     await guest.leave()
                     guest, found["given"] = visitors.pop(0)[1], int(now // HAND_OVER)
                     found["hand-overs"] += 1

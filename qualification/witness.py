@@ -8,7 +8,7 @@ from multiprocessing.context import SpawnContext
 import numpy as np
 
 from trunkline.ar.drivers.driver_client import DriverClient
-from trunkline.ar.drivers.driver_host import start_driver
+from trunkline.ar.drivers.local_driver_process import start_driver
 from trunkline.ar.drivers.motors import MotorsOnBus
 from trunkline.ar.session import hardware_process
 from trunkline.ar.session.hardware import Hardware

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rehearsal.robot.scene import SceneObject, SupportSurface
-from rehearsal.session import RATE, Session
+from rehearsal.session import RATE, RehearsedSession
 from trunkline.frames import rotation_from_wxyz
 from trunkline.kinematics.panda.kinematics import FLANGE, joint_frames
 
@@ -40,7 +40,7 @@ class Shot:
     surfaces: list[SupportSurface]
 
 
-def filmed(session: Session) -> list[Shot]:
+def filmed(session: RehearsedSession) -> list[Shot]:
     """Of every fifth frame of a session that has not begun: filled as it goes on."""
     frame, shots, count = session.frame, [], 0
 
@@ -56,7 +56,7 @@ def filmed(session: Session) -> list[Shot]:
     return shots
 
 
-def shoot(session: Session, mode: str) -> Shot:
+def shoot(session: RehearsedSession, mode: str) -> Shot:
     """What is so now; what the client takes for the base frame is turned back into the true one."""
     robot, scene = session.robot, session.robot.scene
     truth, (units, axes) = robot.truth(), robot.links()
@@ -66,17 +66,17 @@ def shoot(session: Session, mode: str) -> Shot:
     flange = frames[-1].p[:, 0] + FLANGE * frames[-1].z[:, 0]
     ends = np.array([(np.nan,) * 3 if end is None else end for end in session.rays], dtype=float)
     hands = np.array([hand.turn.apply(hand.origin) + hand.shift for hand in session.hands])
-    shown = session.previewed if mode in ("preview", "ready", "delay", "execute") else None
+    ghost = session.previewed if mode in ("preview", "ready", "delay", "execute") else None
     return Shot(
         session.now, mode, np.array([np.zeros(3), *origins, flange]), robot.base()[1], units, axes,
         np.array(robot.arm.chain.widths) / 2, _true(session, hands), _true(session, ends),
-        None if shown is None else _true(session, shown), session.place(session.now) - grip, truth.quaternion,
+        None if ghost is None else _true(session, ghost), session.place(session.now) - grip, truth.quaternion,
         np.array(scene.hook) if truth.hanging and scene.hook is not None else None,
         scene.object, list(scene.surfaces.values()),
     )  # fmt: skip
 
 
-def _true(session: Session, places: np.ndarray) -> np.ndarray:
-    """The inverse of `Session.in_client_frame`."""
+def _true(session: RehearsedSession, places: np.ndarray) -> np.ndarray:
+    """The inverse of `RehearsedSession.in_client_frame`."""
     instruments = session.robot.instruments
     return instruments.turn.inv().apply(places - instruments.shift)

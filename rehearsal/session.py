@@ -20,7 +20,7 @@ from trunkline.ar.session.previewer import InlinePreviewer, PreviewPlanner
 from trunkline.ar.session.robot_process import DEAD_MAN, RobotState
 from trunkline.ar.teleop.config import TeleoperationConfig
 from trunkline.ar.teleop.core import Teleoperation
-from trunkline.ar.teleop.executor import SimulatedRobot
+from trunkline.ar.teleop.executor import PlanFollower
 from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.messages import ExecutorReport, Intent, Offer, Pose, World
 from trunkline.ar.teleop.plan import Plan
@@ -60,7 +60,7 @@ class RehearsedRobot:
 
     def __init__(self, robot: StandInRobot, package: Package, limits: MotionLimits, mount_offset: float) -> None:
         self.robot, self._straight, self._mount_offset = robot, package.straight, mount_offset
-        self.axes = SimulatedRobot(robot.joints[0], package.straight, limits, package.digest, self._send)
+        self.axes = PlanFollower(robot.joints[0], package.straight, limits, package.digest, self._send)
         self.start, self.hear, self.stop = self.axes.start, self.axes.hear, self.axes.stop
         self.moved, self._fault, self._unpermitted = False, "", 0.0
         self._hangs: list[np.ndarray] = []  # m, readings of the straight arm's tip in its base frame, (3,) each
@@ -111,7 +111,7 @@ class RehearsedRobot:
         self.robot.advance(dt)
 
 
-class Session:
+class RehearsedSession:
     """From the robot at rest with its arm straight. `place` says where the object truly is; `foresight` previews
     grasps, where the operator is `judged` by previews."""
 
@@ -175,7 +175,7 @@ class Session:
         if controller.plan is not before:
             self.previewed = self._end(controller.plan, intent)
         if intent.mode == "preview":
-            controller.shown(intent.preview, self.now)  # which counts once it has lasted long enough
+            controller.preview_shown(intent.preview, self.now)  # which counts once it has lasted long enough
         if intent.execute and intent.execute != self._executed:
             self._executed, self.tips = intent.execute, []
             self._began = self.now - 1 / RATE  # `now` is the end of a frame, in which the plan runs already

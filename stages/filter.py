@@ -32,8 +32,8 @@ def main(config: Filter) -> None:
     with output_folder(PROCESSED) as processed, output_folder(ARTIFACTS) as artifacts:
         write_trials(processed, trials)
         write_metrics(artifacts, summary(trials, effects))
-        shown = max(range(len(trials)), key=lambda i: np.ptp(trials[i].positions, axis=0).sum())
-        save_figure(filter_figure(raw_trials[shown], trials[shown]), artifacts / "filter.png")
+        farthest = max(range(len(trials)), key=lambda i: np.ptp(trials[i].positions, axis=0).sum())
+        save_figure(filter_figure(raw_trials[farthest], trials[farthest]), artifacts / "filter.png")
 
 
 if __name__ == "__main__":

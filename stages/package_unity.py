@@ -15,12 +15,12 @@ from trunkline.report.figures.package import roundtrip_figure
 from trunkline.report.figures.style import save_figure
 from trunkline.settings import settings
 from trunkline.twin.package import MANIFEST, read_tarball
+from trunkline.unity.assemble import Label, Trajectory, assemble, compare
 from trunkline.unity.comparison import curled, read_models
-from trunkline.unity.package import write_tarball
-from trunkline.unity.proof import started
 from trunkline.unity.readers import refusals
 from trunkline.unity.sources import read_sources
-from trunkline.unity.twin import Label, Trajectory, assemble, compare
+from trunkline.unity.start_check import started
+from trunkline.unity.upm_package import write_tarball
 
 ARTIFACTS = Path("artifacts/package_unity")
 

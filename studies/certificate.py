@@ -64,13 +64,13 @@ def main() -> int:
             tips = bring(pulls[chosen], poses.gravity[chosen], back[chosen])
             for index, place in enumerate(tips.tolist(), start=first):
                 rows.add(str(index), **dict(zip("xyz", place, strict=True)))
-    asked = load_config(Report, "report")
+    config = load_config(Report, "report")
     ingested = json.loads((ARTIFACTS / "ingest/metrics.json").read_text())
     kept = list(rows.read().values())
     with rows.recorded(len(kept) == COUNT):
-        draws = np.random.default_rng(asked.seed)
-        inputs = inputs_of(twin, trials, ingested, asked.arms, draws)
-        found = budget(inputs, poses[: len(kept)], asked.arms, asked.each, draws)
+        draws = np.random.default_rng(config.seed)
+        inputs = inputs_of(twin, trials, ingested, config.arms, draws)
+        found = budget(inputs, poses[: len(kept)], config.arms, config.each, draws)
         tips = np.array([[float(row[axis]) for axis in "xyz"] for row in kept])
         loose = np.max(pulls[: len(kept)], axis=1) <= 0
         print("\n".join(told_lines(tips, found, loose, back[: len(kept)])))

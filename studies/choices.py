@@ -97,10 +97,10 @@ def cells(choice: ModelChoice, chains: dict[str, StageChain]) -> dict[str, float
 
 def table_of(rows: dict[str, dict]) -> str:
     """Of the rows, in the order of CHOICES."""
-    shown = {name: rows[name] for name in CHOICES if name in rows}
-    heads = [head for head in next(iter(shown.values())) if head.endswith(")")]
+    compared = {name: rows[name] for name in CHOICES if name in rows}
+    heads = [head for head in next(iter(compared.values())) if head.endswith(")")]
     lines = [f"| choice | {' | '.join(heads)} |", "|---|" + "---:|" * len(heads)]
-    for name, row in shown.items():
+    for name, row in compared.items():
         values = [f"{row[head]:.0f}" if head.endswith("(s)") else f"{row[head]:.3f}" for head in heads]
         lines.append(f"| {CHOICES[name].title} | {' | '.join(values)} |")
     return "\n".join(lines)

@@ -22,7 +22,7 @@ from tests.support.matched_plant import FRAME, curl, markers_of, motion, small_m
 from tests.support.noisy_trials import WEIGHTS, Stage, measured, releases, with_values
 from trunkline.compute.progress import progress
 from trunkline.errors import in_one_line
-from trunkline.identification.fit.certainty import certainty
+from trunkline.identification.fit.intervals import certainty
 from trunkline.identification.fit.optimizers import LeastSquares
 from trunkline.identification.fit.problem import Bounds, Problem
 from trunkline.identification.fit.search import descend, search

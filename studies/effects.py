@@ -27,12 +27,12 @@ from stages.build_mjcf import cad_arm
 from studies.rows import Rows, digest
 from studies.stage_chain import STAGES, StageChain, committed, require_demo, run_stages
 from trunkline.errors import in_one_line
+from trunkline.identification.diagnostics.cross_validation import errors_left_out
 from trunkline.identification.evaluation.baselines import hanging_still, noise_floor
 from trunkline.identification.evaluation.evaluation import Prediction, replay
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.settings import IdentificationSettings
 from trunkline.identification.simulate.experiment import own_starts
-from trunkline.identification.uncertainty.cross_validation import errors_left_out
 from trunkline.model.arm.guide_holes import GuideHoles
 from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement
 from trunkline.pipeline.config import load_config

@@ -70,7 +70,7 @@ class Limit:
         return self.max is not None or self.better == "lower"
 
     @property
-    def asked(self) -> float | None:
+    def target(self) -> float | None:
         """The goal, met or missed."""
         return next((goal for goal in (self.max, self.min, self.goal) if goal is not None), None)
 
@@ -96,7 +96,7 @@ class Limit:
         """The goal that holds: one that was missed holds from the baseline on that meets it."""
         if self.goal is not None and (before is None or self.misses(before, self.goal)):
             return None
-        return self.asked
+        return self.target
 
     def bound(self, before: float) -> float:
         """The goal that holds or what `before` leaves, whichever is nearer."""

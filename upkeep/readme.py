@@ -161,10 +161,10 @@ def results_table(file: Path, results: Mapping[str, Sequence[tuple[str, Sequence
         metrics = _metrics(metrics_folder(file), stage)
         for what, figures in rows:
             keys = [figure.key for figure in figures]
-            asked = [limits.get(stage, {}).get(key) for key in keys]
+            row_limits = [limits.get(stage, {}).get(key) for key in keys]
             before = [baseline.metrics.get(stage, {}).get(key) for key in keys]
-            goals = [_goal(limit, lookup(metrics, key)) for limit, key in zip(asked, keys, strict=True)]
-            bounds = [_bound(limit, value) for limit, value in zip(asked, before, strict=True)]
+            goals = [_goal(limit, lookup(metrics, key)) for limit, key in zip(row_limits, keys, strict=True)]
+            bounds = [_bound(limit, value) for limit, value in zip(row_limits, before, strict=True)]
             lines.append(f"| {what} | {_figures(metrics, figures)} | {_joined(goals)} | {_joined(bounds)} |")
     return "\n".join(lines)
 
@@ -263,10 +263,10 @@ def preview_table(preview: dict | None, goals: dict[str, Limit]) -> str:
     counts = [[lookup(preview, f"coverage.{name}.{key}") for key in ("inside", "runs")] for name in times]
     inside = [f"{count} of {runs}" for count, runs in counts]
     off = [_number(lookup(preview, f"tip_error_radii.{name}.median")) for name in times]
-    asked = [_goal(goals.get(f"preview.coverage.{n}.share"), lookup(preview, f"coverage.{n}.share")) for n in times]
+    stated = [_goal(goals.get(f"preview.coverage.{n}.share"), lookup(preview, f"coverage.{n}.share")) for n in times]
     what = f"reach: the tip ends within a radius ({radius}, median) in 9 of 10 cases: {', '.join(times.values())}"
     came = f"{' / '.join(inside)}; it is {' / '.join(off)} radii off, median"
-    lines.append(f"| {what} | {came} | {_joined(asked)} |")
+    lines.append(f"| {what} | {came} | {_joined(stated)} |")
     likelier, previews = lookup(preview, "agreed"), lookup(preview, "previews")
     goal = _goal(goals.get("preview.agreement"), lookup(preview, "agreement"))
     lines.append(f"| grasp, hand-over: whether it holds | {likelier} of {previews} as predicted | {goal} |")
@@ -348,8 +348,8 @@ def log_table(folder: Path) -> str:
     """An example's trials of `test` by the log that they are pieces of: each model's mean position / tip error, mm."""
     file = folder / "artifacts" / "score" / "trials.csv"
     names = [LABELS[name] for name in ("identified", *BESIDE)]
-    shown = " | ".join(title(name) for name in ("identified", *BESIDE))
-    lines = [f"| log: position / tip error, mm | trials | {shown} |", f"|---{'|---:' * (len(names) + 1)}|"]
+    titles = " | ".join(title(name) for name in ("identified", *BESIDE))
+    lines = [f"| log: position / tip error, mm | trials | {titles} |", f"|---{'|---:' * (len(names) + 1)}|"]
     if not file.is_file():
         return "\n".join(lines)
     rows = pd.read_csv(file)
@@ -423,14 +423,14 @@ def _command_row(root: Path) -> str:
 
 def _rehearsal_rows(metrics: dict | None, goals: Mapping[str, Limit]) -> list[str]:
     """Success rates, and how often a stated radius held, beside their goals."""
-    rates, asked = [], []
+    rates, rate_goals = [], []
     for name, words in EXPERIMENT_NAMES.items():
         rate, goal = lookup(metrics, f"{name}.rate"), goals.get(f"{name}.rate")
         clean = lookup(metrics, f"{name}.clean.rate")
         beside = "" if clean is None else f" (within 20 mm, and no other part touched anything: {_percent(clean)})"
         rates.append(_marked(f"{words} {_percent(rate)}", goal, rate) + beside)
-        asked += [f"{words} ≥ {_percent(goal.asked)}"] if goal and goal.asked is not None else []
-    rows = [f"| Rehearsed experiments that succeed | {', '.join(rates)} | goal: {', '.join(asked)} |"]
+        rate_goals += [f"{words} ≥ {_percent(goal.target)}"] if goal and goal.target is not None else []
+    rows = [f"| Rehearsed experiments that succeed | {', '.join(rates)} | goal: {', '.join(rate_goals)} |"]
     counts, missed = [], []
     for name, words in COVERAGE_TIMES.items():
         inside, runs = (_number(lookup(metrics, f"preview.coverage.{name}.{key}")) for key in ("inside", "runs"))
@@ -445,7 +445,7 @@ def _rehearsal_rows(metrics: dict | None, goals: Mapping[str, Limit]) -> list[st
 
 def _marked(words: str, goal: Limit | None, value: float | None) -> str:
     """`words`, bold where `value` misses its goal."""
-    missed = goal is not None and goal.asked is not None and value is not None and goal.misses(value, goal.asked)
+    missed = goal is not None and goal.target is not None and value is not None and goal.misses(value, goal.target)
     return f"**{words}**" if missed else words
 
 
@@ -493,9 +493,9 @@ def _goal(limit: Limit | None, value: float | None) -> str:
     if limit is None:
         return ""
     words = [f"{limit.equals}"] if limit.equals is not None else []
-    if limit.asked is not None:
-        missed = " (missed)" if value is not None and limit.misses(value, limit.asked) else ""
-        words.append(f"{'≤' if limit.rises else '≥'} {_number(limit.asked)}{missed}")
+    if limit.target is not None:
+        missed = " (missed)" if value is not None and limit.misses(value, limit.target) else ""
+        words.append(f"{'≤' if limit.rises else '≥'} {_number(limit.target)}{missed}")
     words += [f"{limit.below.factor:g}× below {limit.below.key.partition('.')[0].upper()}"] if limit.below else []
     return ", ".join(words)
 

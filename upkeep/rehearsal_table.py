@@ -48,9 +48,9 @@ def source_words(root: Path, metrics: Mapping[str, Any]) -> str:
 
 def _goal(limit: Limit | None, rate: float) -> str:
     """The goal of a rate, with a word where it is missed."""
-    if limit is None or limit.asked is None:
+    if limit is None or limit.target is None:
         return ""
-    return f"≥ {_percent(limit.asked)}{' (missed)' if limit.misses(rate, limit.asked) else ''}"
+    return f"≥ {_percent(limit.target)}{' (missed)' if limit.misses(rate, limit.target) else ''}"
 
 
 def _row(experiment: str, words: str, result: Mapping[str, Any], goal: str) -> str:

@@ -34,9 +34,9 @@ class ReleaseGoal:
     below: Below | None = None
 
     def __post_init__(self):
-        asked = [name for name in ("max", "min", "below") if getattr(self, name) is not None]
-        if len(asked) != 1:
-            raise ValueError(f"found {' and '.join(asked) or 'no goal'}, expected one of max, min, below")
+        bounds = [name for name in ("max", "min", "below") if getattr(self, name) is not None]
+        if len(bounds) != 1:
+            raise ValueError(f"found {' and '.join(bounds) or 'no goal'}, expected one of max, min, below")
 
     def met(self, metrics: Any, key: str) -> bool:
         """Whether the metric at `key` meets it; one that is missing, null or no number does not."""
@@ -104,9 +104,9 @@ def results(root: Path, goals: Goals, before: Released | None) -> list[GoalResul
         InputError: a folder has no metrics of `score`, or such as are not finite.
     """
     rows = []
-    for folder, asked in goals.items():
+    for folder, folder_goals in goals.items():
         metrics = read_metrics(root / folder, SCORING)
-        for key, goal in asked.items():
+        for key, goal in folder_goals.items():
             value, then = lookup(metrics, key), None if before is None else before.met.get(folder, {}).get(key)
             number = value if is_finite(value) else None
             rows.append(GoalResult(folder, key, number, goal.words(metrics), goal.met(metrics, key), then))
@@ -119,8 +119,8 @@ def lost(rows: list[GoalResult], before: Released | None) -> list[str]:
     then: Mapping[str, Mapping[str, bool]] = {} if before is None else before.met
     return [
         f"{folder}: {key}: {'missed' if (folder, key) in now else 'asked no longer'}, was met"
-        for folder, asked in then.items()
-        for key, met in asked.items()
+        for folder, results in then.items()
+        for key, met in results.items()
         if met and not now.get((folder, key), False)
     ]
 

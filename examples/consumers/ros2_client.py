@@ -34,13 +34,13 @@ straight = json.loads(files["Runtime/manifest.json"])["model"]["rest_lengths"]
 pulls = [float(length - command) for length, command in zip(straight.values(), commands, strict=True)]
 model = model_of(files)
 model.body("base").quat = 1, 0, 0, 0  # the world is the base frame
-data, end, heard = mujoco.MjData(model), time.monotonic() + float(sys.argv[2]), 0
+data, end, received = mujoco.MjData(model), time.monotonic() + float(sys.argv[2]), 0
 while time.monotonic() < end:  # until it rests
     teller.write(JointState(Header(Time(0, 0), ""), list(straight), pulls, [], []))
     for state in [message for message in hearer.take() if isinstance(message, JointState)]:
-        data.qpos, heard = state.position, heard + 1
+        data.qpos, received = state.position, received + 1
     time.sleep(0.1)
-if not heard:
+if not received:
     sys.exit(f"/joint_states: found none in {sys.argv[2]} s, expected those of ros2_node.py, of the same ROS domain")
 mujoco.mj_kinematics(model, data)
 tip = data.site("tip").xpos

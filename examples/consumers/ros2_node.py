@@ -24,7 +24,7 @@ from trunkline.unity.unpacked import model_of
 
 files = read_tarball(Path(sys.argv[1]))
 bus = DomainParticipant(int(os.environ.get("ROS_DOMAIN_ID", 0)))
-heard = DataReader(bus, Topic(bus, "rt/tendons/command", JointState))
+commands_reader = DataReader(bus, Topic(bus, "rt/tendons/command", JointState))
 states, angles = (DataWriter(bus, Topic(bus, f"rt/{name}", JointState)) for name in ("tendons/state", "joint_states"))
 cases = json.loads(files["Tests/Vectors/network.json"])["cases"]
 down = next(case["question"]["pose"][:3] for case in cases if not case["answer"]["doubtful"])
@@ -35,7 +35,7 @@ data.ctrl = data.act = list(straight.values())  # its controls are commands: at 
 joints = [model.joint(i).name for i in range(model.njnt)]
 begun = time.monotonic()
 while True:
-    for command in [message for message in heard.take() if isinstance(message, JointState)]:
+    for command in [message for message in commands_reader.take() if isinstance(message, JointState)]:
         for name, pull in zip(command.name, command.position, strict=True):  # m
             data.actuator(f"{name}_position").ctrl = straight[name] - pull
     mujoco.mj_step(model, data, nstep=round(0.02 / model.opt.timestep))

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from rehearsal.experiments.bench import bench_of, perform
 from rehearsal.experiments.registry import EXPERIMENTS
-from rehearsal.session import RATE, Session
+from rehearsal.session import RATE, RehearsedSession
 from trunkline.ar.session.log_format import LogFormat, Record, Subject
 from trunkline.ar.session.log_writer import LogWriter
 from trunkline.errors import InputError, in_one_line
@@ -26,7 +26,7 @@ class Kept(LogWriter):
     """Writes here and now, by the clock of the session."""
 
     def __init__(self, path: Path, subject: Subject) -> None:
-        self.session: Session | None = None
+        self.session: RehearsedSession | None = None
         super().__init__(subject, lambda: 0.0 if self.session is None else self.session.now)
         self.file = open(path, "xb")  # noqa: SIM115
         self.book = LogFormat(self.file, subject, ZERO)
@@ -40,7 +40,7 @@ class Kept(LogWriter):
         self.file.close()
 
 
-def record(session: Session, journal: Kept) -> None:
+def record(session: RehearsedSession, journal: Kept) -> None:
     """Let a session that has not begun be logged as a live one is."""
     journal.session, session.controller.log_writer = session, journal
     session.controller.begin(RATE, __version__)

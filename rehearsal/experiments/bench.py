@@ -16,7 +16,7 @@ from rehearsal.operator.hands import Person, RayHand
 from rehearsal.operator.scripts import Ending, Operator, Script, offset_of
 from rehearsal.robot.scene import Scene, SceneObject
 from rehearsal.robot.stand_in import StandIn, StandInRobot, Truth
-from rehearsal.session import REFERENCE, Place, Session, View
+from rehearsal.session import REFERENCE, Place, RehearsedSession, View
 from rehearsal.settings import Free
 from rehearsal.settings import previewing as read_previewing
 from trunkline.ar.preview.grasp_preview import GraspPreviewer
@@ -72,7 +72,9 @@ class Bench:
         assert self.world_model is not None
         return GraspPreviewer(self.world_model, self.package.grips(self.config), self.previewing)
 
-    def session(self, operator: Operator, object_center: np.ndarray | None, seed: int, place: Place) -> Session:
+    def session(
+        self, operator: Operator, object_center: np.ndarray | None, seed: int, place: Place
+    ) -> RehearsedSession:
         """The stand-in at its ready pose; a sphere hangs at `object_center` (3,), m, or there is none."""
         s = self.settings
         x, y, z = s.mount_ready
@@ -84,7 +86,7 @@ class Bench:
         robot = StandInRobot(self.arm, Scene(FLOOR, hung, {}, hook), self.stand_in, ready, seed)
         world = World("floor", (FLOOR_OBSTACLE,))
         hands = operator.left, operator.right
-        return Session(self.package, self.config, robot, hands, world, place, self.foresight, self.judged)
+        return RehearsedSession(self.package, self.config, robot, hands, world, place, self.foresight, self.judged)
 
 
 def bench_of(file: Path) -> Bench:
@@ -134,7 +136,7 @@ class Staged:
 
     name: str
     seed: int
-    session: Session
+    session: RehearsedSession
     script: Script
     judge: Callable[[Result, Ending, list[SessionFrame], list[View]], str]
     object_name: str = ""
@@ -160,7 +162,7 @@ def perform(staged: Staged) -> tuple[Result, list[SessionFrame]]:
     return result, frames
 
 
-def rehearse(session: Session, script: Script) -> tuple[object, list[SessionFrame], list[View]]:
+def rehearse(session: RehearsedSession, script: Script) -> tuple[object, list[SessionFrame], list[View]]:
     """Run a script to its end: what it returned, and every frame in which the robot may have moved."""
     frames, views = [], []
     next(script)

@@ -15,7 +15,7 @@ from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending, Operator
 from rehearsal.robot.scene import Scene, SceneObject, SupportSurface
 from rehearsal.robot.stand_in import StandInRobot
-from rehearsal.session import Session
+from rehearsal.session import RehearsedSession
 from trunkline.ar.hybrid.grasps import object_in_base
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.teleop.messages import Obstacle, WorldObject
@@ -84,7 +84,7 @@ def session_of(
     operator: Operator,
     seed: int,
     table: SupportSurface | None = None,
-) -> Session:
+) -> RehearsedSession:
     """The stand-in at its ready pose, the object on its string or its stand, the client's world as it is seen at
     first."""
     x, y, z = bench.settings.mount_ready
@@ -101,7 +101,7 @@ def session_of(
         NAME, object.shape, object.diameter, object.height, object.mass, (a, b, c), (d, e, f, g),
         "standing" if placed.stands else "hanging", object.basket,
     )  # fmt: skip
-    return Session(
+    return RehearsedSession(
         bench.package, bench.config, robot, (operator.left, operator.right), make_world(obstacles, (object_seen,)),
         lambda now: robot.truth().grip, bench.foresight, bench.judged,
     )  # fmt: skip
@@ -136,7 +136,7 @@ def grasp(bench: Bench, seed: int) -> Staged:
     return Staged("grasp", seed, session, script, judge, placed.name)
 
 
-def tell(result: Result, ending: Ending, session: Session, succeeded: bool) -> None:
+def tell(result: Result, ending: Ending, session: RehearsedSession, succeeded: bool) -> None:
     """What the preview had said, and how far off it was."""
     result.plans, result.probability = ending.plans, ending.probability
     result.agreed = agreed(ending.probability, succeeded)
@@ -151,17 +151,18 @@ def agreed(probability: float, succeeded: bool) -> float:
     return float((probability >= 0.5) == succeeded) if np.isfinite(probability) else float("nan")
 
 
-def tip_difference(tips: list[tuple[float, np.ndarray]], times: np.ndarray, shown: np.ndarray) -> float:
+def tip_difference(tips: list[tuple[float, np.ndarray]], times: np.ndarray, previewed: np.ndarray) -> float:
     """Median distance between the robot's tip and the preview's at the same time, m; NaN if there is no such time.
 
     Args:
-        tips: s since the plan began, and the robot's tip (3,), m. times, shown: of the preview, (F,), s, and (F, 3), m.
+        tips: s since the plan began, and the robot's tip (3,), m. times, previewed: of the preview's tip,
+            (F,), s, and (F, 3), m.
     """
     during = [(time, tip) for time, tip in tips if times[0] <= time <= times[-1]]
     if not during:
         return float("nan")
     took, there = (np.array(column) for column in zip(*during, strict=True))
-    foreseen = np.column_stack([np.interp(took, times, column) for column in shown.T])
+    foreseen = np.column_stack([np.interp(took, times, column) for column in previewed.T])
     return float(np.median(np.linalg.norm(there - foreseen, axis=1)))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from rehearsal.experiments.bench import Bench, SessionFrame, Staged, executed
 from rehearsal.experiments.result import LATER, Result
 from rehearsal.operator.scripts import Ending
-from rehearsal.session import Session
+from rehearsal.session import RehearsedSession
 from trunkline.ar.session.messages import PredictionMessage
 
 WITHIN = 0.02  # m from the object's place: nearer than its surface, which a tip also touches from the side
@@ -97,7 +97,7 @@ def tell_end(result: Result, foreseen: PredictionMessage, tips: dict[str, np.nda
         setattr(result, f"{name}_mm", 1e3 * float(np.linalg.norm(tip - foreseen.tip[-1])))
 
 
-def tips_after(session: Session, frames: list[SessionFrame]) -> dict[str, np.ndarray]:
+def tips_after(session: RehearsedSession, frames: list[SessionFrame]) -> dict[str, np.ndarray]:
     """Where the tip appears, (3,), m, at the end of the first execution, and by LATER after it. What frames do not
     reach, the robot holds for."""
     done, tips, now = executed(frames), {}, session.now

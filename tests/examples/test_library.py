@@ -20,7 +20,7 @@ from trunkline.kinematics.ik.network import InverseKinematics
 from trunkline.kinematics.ik.onnx import to_onnx
 from trunkline.model.statics.chain import read_chain
 from trunkline.model.statics.equilibria import equilibrium
-from trunkline.unity.twin import CSHARP
+from trunkline.unity.assemble import CSHARP
 
 ROOT = Path(__file__).parents[2]
 # Kernels as plain Python: two equilibria take less time than to compile what the checkout has compiled already.

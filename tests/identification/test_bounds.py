@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.support.matched_plant import markers_of, release, small_model
-from trunkline.identification.fit.certainty import ALONE, certainty
 from trunkline.identification.fit.identify import BOUND_TOLERANCE, _at_bound, _factors_at_bound
+from trunkline.identification.fit.intervals import ALONE, certainty
 from trunkline.identification.fit.linearisation import Linearisation
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.parameters.parameters import PARAMETERS

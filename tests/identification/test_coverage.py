@@ -12,7 +12,7 @@ from scipy.stats import t as student
 
 from tests.support.matched_plant import FRAME, markers_of, small_model
 from tests.support.noisy_trials import STAGES, TRIALS, WEIGHTS, measured, with_values
-from trunkline.identification.fit.certainty import bootstrap, certainty
+from trunkline.identification.fit.intervals import bootstrap, certainty
 from trunkline.identification.fit.problem import Bounds, Problem
 from trunkline.identification.fit.search import descend
 from trunkline.identification.fit.surrogate import surrogate
@@ -53,7 +53,7 @@ def repetitions(request) -> Repetitions:
         errors.append(result.vector - exact)
         widths.append(certainty(result.linear, around=around).half_width)
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("trunkline.identification.fit.certainty.RESAMPLINGS", RESAMPLINGS)
+            patch.setattr("trunkline.identification.fit.intervals.RESAMPLINGS", RESAMPLINGS)
             resampled.append(bootstrap(result.linear, 1, around) - exact)
     return Repetitions(list(stage.true), np.array(errors), np.array(widths), np.array(resampled))
 

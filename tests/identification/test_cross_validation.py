@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from tests.support.matched_plant import markers_of, small_model, tilt
+from trunkline.identification.diagnostics.cross_validation import ERRORS, cross_validate
 from trunkline.identification.evaluation.evaluation import replay, scores
 from trunkline.identification.fit.fit import CoarseSearch, Fit, Method, Refinement
 from trunkline.identification.fit.identify import identify
@@ -13,7 +14,6 @@ from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields, set_fields
 from trunkline.identification.simulate.experiment import prepare
 from trunkline.identification.simulate.loss import LossWeights
-from trunkline.identification.uncertainty.cross_validation import ERRORS, cross_validate
 
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 METHOD = Method(
@@ -73,7 +73,7 @@ def test_every_trial_is_left_out_once(monkeypatch):
     model = small_model(4)
     trials = [prepare(tilt(model, angle), model, 1) for angle in (30, 60, 90)]
     calls = []
-    module = "trunkline.identification.uncertainty.cross_validation"
+    module = "trunkline.identification.diagnostics.cross_validation"
     monkeypatch.setattr(f"{module}.identify", lambda *args: type("Found", (), {"models": result.models})())
     monkeypatch.setattr(f"{module}.replay", lambda model, left, markers: calls.append([e.name for e in left]) or left)
     monkeypatch.setattr(f"{module}.trial_table", lambda predictions: error_table(predictions))

@@ -43,7 +43,7 @@ def identified(tmp_path_factory):
     """By what was identified: metrics, the table of parameters, and the model. And the true stiffness."""
     results = {}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("trunkline.identification.fit.certainty.RESAMPLINGS", 2000)
+        patch.setattr("trunkline.identification.fit.intervals.RESAMPLINGS", 2000)
         patch.chdir(tmp_path_factory.mktemp("sessions"))
         model = begin_project(Path("."), 6)
         middle = model.jnt_stiffness[0]

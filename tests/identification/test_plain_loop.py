@@ -7,7 +7,7 @@ from tests.support.matched_plant import markers_of, release, small_model
 from trunkline.identification.fit.problem import Bounds, Problem
 from trunkline.identification.parameters.parameters import candidate_fields, set_fields
 from trunkline.identification.simulate.experiment import prepare
-from trunkline.identification.simulate.loss import RESIDUALS, LossWeights, loss_of
+from trunkline.identification.simulate.loss import LOSSES, LossWeights, loss_of
 
 TRUTH = np.log([0.09, 0.5])
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
@@ -30,7 +30,7 @@ def plain_loss(problem, model, experiments, vector):
             mujoco.mj_step(model, data, nstep=substeps)
             mujoco.mj_kinematics(model, data)
             simulated[frame] = data.site_xpos[sites]
-        residuals = RESIDUALS["positions"](simulated[None], experiment.positions, experiment.measured, WEIGHTS)
+        residuals = LOSSES["positions"](simulated[None], experiment.positions, experiment.measured, WEIGHTS)
         losses.append(float(loss_of(residuals)[0]))
     return float(np.mean(losses))
 

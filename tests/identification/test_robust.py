@@ -9,13 +9,13 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.matched_plant import markers_of, release, small_model, tilt
 from tests.support.noisy_trials import WEIGHTS, measured, with_values
+from trunkline.identification.diagnostics.trial_diagnostics import moving_start, trial_diagnostics
 from trunkline.identification.fit.fit import CoarseSearch, Fit, Method, Refinement
 from trunkline.identification.fit.identify import identify
 from trunkline.identification.fit.optimizers import LeastSquares
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.robust import robust_loss, trial_weights, usual_losses
 from trunkline.identification.simulate.experiment import prepare
-from trunkline.identification.uncertainty.trial_diagnostics import moving_start, trial_diagnostics
 
 UNITS, FRAMES, LATE = 3, 40, 10
 METHOD = Method(

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.support.swings import FRAMES, LIKE, MARKERS, TIME, TIP, experiment, swing, trial
+from trunkline.identification.diagnostics.trial_diagnostics import exchanged_labels, moving_start, started_off
 from trunkline.identification.evaluation.baselines import hanging_still
 from trunkline.identification.evaluation.error_tables import marker_table, trial_table
 from trunkline.identification.evaluation.evaluation import Prediction, errors_of, scores
@@ -14,14 +15,13 @@ from trunkline.identification.fit.fit import Fit
 from trunkline.identification.fit.identify import _few
 from trunkline.identification.results.scoring import fingerprint
 from trunkline.identification.simulate.loss import (
-    RESIDUALS,
+    LOSSES,
     LossWeights,
     internal_error,
     loss_of,
     position_error,
     velocity_error,
 )
-from trunkline.identification.uncertainty.trial_diagnostics import exchanged_labels, moving_start, started_off
 
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 FIT = Fit(MARKERS, {}, (), "positions", WEIGHTS, None)  # type: ignore[arg-type]
@@ -109,8 +109,8 @@ COMPARED = {
     "E_internal": lambda p, mask: internal_error(SIMULATED, p, mask),
     "the position error": lambda p, mask: position_error(SIMULATED, p, mask),
     "the velocity error": lambda p, mask: velocity_error(SIMULATED, p, mask, 100.0),
-    "the loss of distances": lambda p, mask: loss_of(RESIDUALS["distances"](SIMULATED[None], p, mask, WEIGHTS)),
-    "the loss of positions": lambda p, mask: loss_of(RESIDUALS["positions"](SIMULATED[None], p, mask, WEIGHTS)),
+    "the loss of distances": lambda p, mask: loss_of(LOSSES["distances"](SIMULATED[None], p, mask, WEIGHTS)),
+    "the loss of positions": lambda p, mask: loss_of(LOSSES["positions"](SIMULATED[None], p, mask, WEIGHTS)),
     "the errors of a swing": of_trial,
     "the errors of a path": of_path,
     "the table of trials": table(trial_table),

@@ -44,7 +44,7 @@ def project(tmp_path_factory):
     """After all stages: its folder, and what the parameters truly are."""
     root = tmp_path_factory.mktemp("two")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("trunkline.identification.fit.certainty.RESAMPLINGS", 500)
+        patch.setattr("trunkline.identification.fit.intervals.RESAMPLINGS", 500)
         patch.chdir(root)
         model = begin_project(root, 4)
         true = {name: scale * parameter_named(name).read(model) for name, scale in SCALES.items()}

@@ -10,7 +10,7 @@ from rehearsal.experiments.bench import SessionFrame
 from rehearsal.experiments.reach import WITHIN, failure, is_clean, tell_end, tips_after
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending
-from rehearsal.session import Session
+from rehearsal.session import RehearsedSession
 from tests.rehearsal.frames import FORCE, TIP, UNITS, frame
 from trunkline.ar.session.messages import PredictionMessage
 
@@ -137,9 +137,9 @@ class Drifting:
         return SimpleNamespace(tip=np.array([self.x, 0.0, 0.0]))
 
 
-def run(last: float) -> tuple[Session, list]:
+def run(last: float) -> tuple[RehearsedSession, list]:
     """Frames until `last` s, the plan run from 1 to 2 s, and the session then."""
-    session = object.__new__(Session)
+    session = object.__new__(RehearsedSession)
     session.robot, session.now = Drifting(last), last  # type: ignore[assignment]
     modes = [(t, "execute" if 1.0 <= t <= 2.0 else "aim") for t in np.arange(0.0, last + 1e-9, 0.25)]
     return session, [frame(now, mode, tip=np.array([now, 0.0, 0.0])) for now, mode in modes]

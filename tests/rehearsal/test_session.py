@@ -12,7 +12,7 @@ from rehearsal import settings
 from rehearsal.experiments.bench import ORIGINS, rehearse
 from rehearsal.operator.hands import RayHand
 from rehearsal.operator.scripts import Operator
-from rehearsal.session import RATE, REFERENCE, TICKS, RehearsedRobot, Session
+from rehearsal.session import RATE, REFERENCE, TICKS, RehearsedRobot, RehearsedSession
 from tests.ar.teleop.test_plan import BENT, LIMITS, NETWORK, OFFSET, START, STRAIGHT
 from tests.support.operator import PACKAGE, Everywhere, config
 from trunkline.ar.hybrid.rollout_batch import Stated
@@ -80,13 +80,13 @@ class Sent:
         self.time += dt
 
 
-def session(off: list[float]) -> tuple[Session, Operator]:
+def session(off: list[float]) -> tuple[RehearsedSession, Operator]:
     rng = np.random.default_rng(0)
     person = replace(settings.person(), patience=3)
     left, right = (RayHand(origin, REFERENCE, person, 0.15, rng) for origin in ORIGINS)
     operator = Operator(person, (left, right), BENT, 0.03, 0.03, rng)
     previewer = GraspPreviewer(None, {}, settings.previewing())  # type: ignore[arg-type]
-    made = Session(Arc(off), config(), Sent(), (left, right), World("world"), lambda now: OBJECT, previewer)  # type: ignore[arg-type]
+    made = RehearsedSession(Arc(off), config(), Sent(), (left, right), World("world"), lambda now: OBJECT, previewer)  # type: ignore[arg-type]
     return made, operator
 
 
@@ -142,7 +142,7 @@ def test_an_operator_who_does_not_judge_confirms_the_first_plan():
 
 
 @pytest.fixture(scope="module")
-def ran() -> tuple[Session, list, list]:
+def ran() -> tuple[RehearsedSession, list, list]:
     """A reach whose client takes another frame for the base, with previews that count what is rolled out."""
     made, operator = session([])
     made.robot.instruments = SimpleNamespace(

@@ -33,7 +33,7 @@ from trunkline.ar.session.robot_process import RobotState
 from trunkline.ar.session.server import Composition, Server
 from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.teleop.core import Teleoperation
-from trunkline.ar.teleop.executor import SimulatedRobot
+from trunkline.ar.teleop.executor import PlanFollower
 from trunkline.ar.teleop.following import sought
 from trunkline.ar.teleop.messages import PlanReport
 from trunkline.ar.teleop.planner import Planner
@@ -56,7 +56,7 @@ class PlainRobot:
     """Where its plan says, in real time; `stops` are the times at which it was told to stop."""
 
     def __init__(self):
-        self.robot, self.last, self.stops, self.permits = SimulatedRobot(START, STRAIGHT, LIMITS, PACKAGE), 0.0, [], 0
+        self.robot, self.last, self.stops, self.permits = PlanFollower(START, STRAIGHT, LIMITS, PACKAGE), 0.0, [], 0
         self.silent = 0.0
         self.start, self.state, self.hear = self.robot.start, self.robot.state, self.robot.hear
 

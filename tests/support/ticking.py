@@ -3,7 +3,7 @@
 import time
 
 from trunkline.ar.session.log_format import EVENTS
-from trunkline.recordings.logs.log import read_log
+from trunkline.recordings.logs.mcap_log import read_log
 
 
 def fed(log_writer, seconds, pace=0.01):

@@ -5,10 +5,10 @@ import pytest
 
 from tests.support.folders import package
 from tests.support.operator import config
-from tests.unity.test_twin import LABEL, ROBOT, TRAJECTORY, grids, sheets_of_a_ball, sources_in
+from tests.unity.test_assemble import LABEL, ROBOT, TRAJECTORY, grids, sheets_of_a_ball, sources_in
 from trunkline.ar.conformance.vectors import with_shared_vectors
 from trunkline.twin.package import read_tarball
-from trunkline.unity.twin import assemble
+from trunkline.unity.assemble import assemble
 
 
 @pytest.fixture(scope="session")

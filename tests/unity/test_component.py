@@ -17,11 +17,11 @@ from tests.unity.test_csharp import CORE, SHARED
 from tests.unity.test_start import STEP
 from tests.unity.test_start import files as arm_files
 from trunkline.twin.package import MANIFEST
+from trunkline.unity.assemble import CSHARP
 from trunkline.unity.plugin import Scene
-from trunkline.unity.proof import DOWN, PREFIX, manifest_of, scene_of, turns
 from trunkline.unity.start import TwinComponent
+from trunkline.unity.start_check import DOWN, PREFIX, manifest_of, scene_of, turns
 from trunkline.unity.time_steps import steps_per_frame
-from trunkline.unity.twin import CSHARP
 
 HERE = Path(__file__).parent
 TURN = turns([1.0])[0]  # by which an arm's root is turned, so that it hangs to one side

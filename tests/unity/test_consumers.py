@@ -14,14 +14,14 @@ from onnx import TensorProto, helper
 from tests.support.folders import package
 from tests.support.reaching import EXAMPLES, reach, reach_by_ros
 from tests.support.small_arm import small_spec
-from tests.unity.test_twin import LABEL, ROBOT, TRAJECTORY, sources_in
+from tests.unity.test_assemble import LABEL, ROBOT, TRAJECTORY, sources_in
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.kinematics.ik.inputs import DIRECTION
 from trunkline.model.simulation.rest import settle
 from trunkline.twin.package import MANIFEST, read_tarball
-from trunkline.unity.package import write_tarball
-from trunkline.unity.twin import assemble
+from trunkline.unity.assemble import assemble
+from trunkline.unity.upm_package import write_tarball
 
 PAGE = Path(__file__).parents[2] / "docs/consumers.md"
 VECTORS = "Tests/Vectors/network.json"

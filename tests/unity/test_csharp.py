@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.operator import config
 from tests.unity.mono import compiled
+from tests.unity.test_assemble import network
 from tests.unity.test_shared_vectors import CASES
-from tests.unity.test_twin import network
 from trunkline.ar.conformance.answers import TARGETS, answers_of
 from trunkline.ar.conformance.vectors import with_shared_vectors
 from trunkline.ar.hybrid.basket import Basket
@@ -32,10 +32,10 @@ from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.kinematics.ik.inputs import DIRECTION, TILT
 from trunkline.twin.package import MANIFEST, package_digest, robot_of
+from trunkline.unity.assemble import CSHARP
 from trunkline.unity.frame import unity_position, unity_quaternion
-from trunkline.unity.package import NETWORK, write_tarball
-from trunkline.unity.twin import CSHARP
 from trunkline.unity.unpacked import maps_of
+from trunkline.unity.upm_package import NETWORK, write_tarball
 
 TESTS = Path(__file__).parent / "csharp"
 CORE = sorted((CSHARP / "Core").glob("*.cs"))

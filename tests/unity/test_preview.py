@@ -10,7 +10,7 @@ import pytest
 
 from tests.ar.hybrid.conftest import rubbing_arm
 from tests.support.folders import package
-from tests.unity.test_twin import LABEL, PARAMETERS, ROBOT, sources  # noqa: F401
+from tests.unity.test_assemble import LABEL, PARAMETERS, ROBOT, sources  # noqa: F401
 from trunkline.ar.hybrid.compose import Placed, compose
 from trunkline.ar.hybrid.objects import GraspObject
 from trunkline.ar.hybrid.outcomes import Holding
@@ -26,8 +26,8 @@ from trunkline.model.arm_model import ArmModel
 from trunkline.twin.package import MANIFEST, arm_of, package_digest, read_package, robot_of
 from trunkline.twin.posterior import Posterior
 from trunkline.twin.twin import Twin
-from trunkline.unity.package import CALIBRATED, MODEL, write_tarball
-from trunkline.unity.twin import Trajectory, assemble
+from trunkline.unity.assemble import Trajectory, assemble
+from trunkline.unity.upm_package import CALIBRATED, MODEL, write_tarball
 
 SECONDS, LET_GO, PULL, CURL = 0.6, 0.25, 0.02, Trajectory(0.2, 0.02, [0.0])
 

@@ -10,13 +10,13 @@ import torch
 
 from tests.support.folders import package
 from tests.unity.mono import compiled
-from tests.unity.test_twin import files, sources  # noqa: F401
+from tests.unity.test_assemble import files, sources  # noqa: F401
 from trunkline.kinematics.ik.network import InverseKinematics
 from trunkline.kinematics.ik.onnx import to_onnx
 from trunkline.twin.package import MANIFEST, read_tarball
 from trunkline.unity import readers
-from trunkline.unity.package import MODEL, NETWORK, write_tarball
 from trunkline.unity.readers import ENGINES, refusals
+from trunkline.unity.upm_package import MODEL, NETWORK, write_tarball
 
 OBJ = "Runtime/Reachability/soft_030.obj"
 CORE = "Runtime/Core/"

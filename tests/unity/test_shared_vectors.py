@@ -9,7 +9,7 @@ from pydantic import TypeAdapter
 
 from tests.ar.teleop.test_core_faults import LINES
 from tests.support.operator import config
-from tests.unity.test_twin import LABEL, TRAJECTORY, sources_in
+from tests.unity.test_assemble import LABEL, TRAJECTORY, sources_in
 from trunkline.ar.conformance.answers import answers_of
 from trunkline.ar.conformance.vectors import FOLDER, STEPS, cases_file, steps_file, with_shared_vectors
 from trunkline.ar.teleop.messages import Input, from_json
@@ -18,9 +18,9 @@ from trunkline.ar.teleop.transitions import MODES, TRANSITIONS
 from trunkline.errors import InputError
 from trunkline.kinematics.panda.mounts import FixedMount
 from trunkline.twin.package import package_digest, robot_of
-from trunkline.unity.package import NETWORK
+from trunkline.unity.assemble import assemble
 from trunkline.unity.readers import ENGINES, ENGINES_APART, refusals
-from trunkline.unity.twin import assemble
+from trunkline.unity.upm_package import NETWORK
 
 CASES = ("alignment", "rigid_reach", "soft_reach", "targets", "network")
 MOST = 1_500_000  # bytes of all, unpacked

@@ -9,20 +9,20 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.support.small_arm import small_spec
-from tests.unity.test_twin import LABEL, ROBOT, TRAJECTORY, sources_in
+from tests.unity.test_assemble import LABEL, ROBOT, TRAJECTORY, sources_in
 from trunkline.frames import gravity_in_base
 from trunkline.model.arm.joints import Joints, MaxwellElement, add_elements
 from trunkline.model.simulation.rest import settle
 from trunkline.unity import start
+from trunkline.unity.assemble import CSHARP, assemble
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import Laws, write_laws
-from trunkline.unity.package import MODEL
 from trunkline.unity.plugin import Imported, Scene
-from trunkline.unity.proof import DOWN, PREFIX, TIP, at_rest, manifest_of, pull, scene_of, turns
 from trunkline.unity.start import TwinComponent
+from trunkline.unity.start_check import DOWN, PREFIX, TIP, at_rest, manifest_of, pull, scene_of, turns
 from trunkline.unity.time_steps import steps_taken
-from trunkline.unity.twin import CSHARP, assemble
 from trunkline.unity.unpacked import model_of
+from trunkline.unity.upm_package import MODEL
 
 MM = 1e-3
 STEP = max(steps_taken())

@@ -9,6 +9,7 @@ import pytest
 
 from tests.support.small_arm import small_spec
 from tests.unity.test_csharp import TESTS
+from trunkline.unity.assemble import CSHARP
 from trunkline.unity.manifest import StepError
 from trunkline.unity.pulls import as_pulls
 from trunkline.unity.time_steps import (
@@ -21,7 +22,6 @@ from trunkline.unity.time_steps import (
     steps_taken,
     with_steps,
 )
-from trunkline.unity.twin import CSHARP
 
 CURL = {"duration": 0.4, "pull": 0.03, "tilts": [0.0, 1.0]}
 

@@ -33,9 +33,9 @@ from trunkline.kinematics.reachability.triangles import nearest_on_triangles
 from trunkline.kinematics.reachability.weights import spline_weights
 from trunkline.kinematics.reachability.workspace_surface import surface_triangles
 from trunkline.twin.package import MANIFEST, package_digest
-from trunkline.unity.package import SAMPLES, package_json
-from trunkline.unity.twin import CSHARP
+from trunkline.unity.assemble import CSHARP
 from trunkline.unity.unpacked import maps_of
+from trunkline.unity.upm_package import SAMPLES, package_json
 
 STUBS = Path(__file__).parent / "stubs"
 LAYER = Path(__file__).parent / "layer"

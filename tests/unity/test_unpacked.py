@@ -11,10 +11,10 @@ from trunkline.errors import InputError
 from trunkline.kinematics.dataset.gravities import spread
 from trunkline.kinematics.reachability.workspace_surface import WorkspaceSurfaces
 from trunkline.twin.package import MANIFEST, package_digest, read_package
-from trunkline.unity.package import write_tarball
 from trunkline.unity.reach_maps import convert_grids, convert_sheets, describe_reach
 from trunkline.unity.rounding import rounded
 from trunkline.unity.unpacked import maps_of
+from trunkline.unity.upm_package import write_tarball
 
 RNG = np.random.default_rng(0)
 ARRAYS = {

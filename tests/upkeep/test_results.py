@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 from trunkline.errors import InputError
-from trunkline.unity.package import write_tarball
+from trunkline.unity.upm_package import write_tarball
 from upkeep.origin import READS, code_of, reads_of
 from upkeep.results import (
     ARCHIVES,

@@ -164,8 +164,8 @@ def environment(package: str) -> dict[str, str]:
 
     Dask's `get_versions` would import each library, and knows nothing of code.
     """
-    asked = [line for line in requires(LIBRARY) or [] if "extra ==" not in line or '"teleop"' in line.replace("'", '"')]
-    names = [LIBRARY, *sorted(re.split(r"[^\w.-]", line)[0] for line in asked)]
+    lines = [line for line in requires(LIBRARY) or [] if "extra ==" not in line or '"teleop"' in line.replace("'", '"')]
+    names = [LIBRARY, *sorted(re.split(r"[^\w.-]", line)[0] for line in lines)]
     parts = {"Python": platform.python_version()} | {name: _version(name) for name in names}
     return parts | {f"code of {name}": _digest(name) for name in (LIBRARY, package)}
 

@@ -6,6 +6,8 @@ from pathlib import Path
 import mujoco
 
 from trunkline.errors import InputError
+from trunkline.identification.diagnostics.cross_validation import cross_validate
+from trunkline.identification.diagnostics.trial_diagnostics import trial_diagnostics
 from trunkline.identification.evaluation.baselines import references
 from trunkline.identification.evaluation.error_tables import TABLED, trial_table
 from trunkline.identification.evaluation.evaluation import Prediction, halved_step, replay
@@ -28,8 +30,6 @@ from trunkline.identification.results.scoring import Compared, fingerprints, pre
 from trunkline.identification.simulate.checks import check_trials
 from trunkline.identification.simulate.experiment import Experiment
 from trunkline.identification.stages import MODEL, TABLE, read_table
-from trunkline.identification.uncertainty.cross_validation import cross_validate
-from trunkline.identification.uncertainty.trial_diagnostics import trial_diagnostics
 from trunkline.model.arm_model import BACKLASH, CAPSTAN_FRICTION, RATE_LIMIT, ArmModel
 from trunkline.model_files import read_spec
 from trunkline.pipeline.stage import output_folder, write_json, write_metrics

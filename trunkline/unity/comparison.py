@@ -7,13 +7,13 @@ import numpy as np
 import pandas as pd
 
 from trunkline.twin.package import MANIFEST
+from trunkline.unity.assemble import Trajectory
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import Laws, compile_with
 from trunkline.unity.manifest import Manifest
-from trunkline.unity.package import MODEL
 from trunkline.unity.roundtrip import curl, deviation, simulate
-from trunkline.unity.twin import Trajectory
 from trunkline.unity.unsupported import without_unsupported
+from trunkline.unity.upm_package import MODEL
 
 
 @dataclass

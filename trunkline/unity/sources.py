@@ -6,7 +6,7 @@ from pathlib import Path
 from trunkline.errors import InputError, existing
 from trunkline.identification.stages import MODEL, TABLE, read_table
 from trunkline.identification.stages import STAGES as IDENTIFYING
-from trunkline.unity.twin import Sources
+from trunkline.unity.assemble import Sources
 from trunkline.version import __version__
 
 STAGES = ("ingest", "filter", "build_mjcf", *IDENTIFYING, "fk_dataset", "train_ik", "reachability")

@@ -10,9 +10,9 @@ import pytest
 
 from trunkline.ar.drivers import driver_client
 from trunkline.ar.drivers.driver import CONNECTING
-from trunkline.ar.drivers.driver_client import CLOSING, SILENT, DriverClient, panda
+from trunkline.ar.drivers.driver_client import CLOSING, DRIVER_TIMEOUT, DriverClient, panda
 from trunkline.ar.drivers.driver_frames import DriverState, FrameSocket, Setpoint
-from trunkline.ar.drivers.driver_host import STARTING, start_driver
+from trunkline.ar.drivers.local_driver_process import STARTING, start_driver
 from trunkline.ar.drivers.motors import HOMING, MotorsOnBus
 from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.pipeline.config import PROJECT, load_folder
@@ -67,7 +67,7 @@ def ready(driver):
 
 
 def test_a_driver_process_that_tells_of_itself_is_no_fault_however_long(ready):
-    for now in np.arange(BEGUN, BEGUN + 100.0, 0.5 * SILENT):
+    for now in np.arange(BEGUN, BEGUN + 100.0, 0.5 * DRIVER_TIMEOUT):
         ready.process.tell(now)
         ready.turn(now)
     assert ready.fault == ""
@@ -77,7 +77,7 @@ def test_a_driver_process_that_tells_of_itself_is_no_fault_however_long(ready):
 
 @pytest.mark.parametrize(
     ("silent", "fault"),
-    [(0.0, ""), (SILENT - NEAR, ""), (SILENT + NEAR, "its adapter is silent for 100 ms"),
+    [(0.0, ""), (DRIVER_TIMEOUT - NEAR, ""), (DRIVER_TIMEOUT + NEAR, "its adapter is silent for 100 ms"),
      (10.0, "its adapter is silent for 10000 ms")],
 )  # fmt: skip
 def test_a_driver_process_that_is_silent_is_a_fault_after_so_long(ready, silent, fault):
@@ -87,7 +87,7 @@ def test_a_driver_process_that_is_silent_is_a_fault_after_so_long(ready, silent,
 
 def test_what_it_told_long_ago_does_not_count_as_told_when_it_is_heard(ready):
     ready.process.tell(BEGUN + 1.0)
-    ready.turn(BEGUN + 1.0 + SILENT + NEAR)
+    ready.turn(BEGUN + 1.0 + DRIVER_TIMEOUT + NEAR)
     assert ready.fault == "its adapter is silent for 100 ms"
 
 
@@ -166,7 +166,7 @@ def test_a_fault_lasts_and_is_the_first(ready):
 def test_what_is_sent_comes_to_the_driver_process(ready):
     for number in range(3):
         ready.send(BEGUN + 0.001 * number, READY + number)
-    setpoints = [Setpoint.unpack(frame) for frame in ready.process.line.heard()]
+    setpoints = [Setpoint.unpack(frame) for frame in ready.process.line.received()]
     assert setpoints == [Setpoint(BEGUN + 0.001 * number, tuple(READY + number)) for number in range(3)]
 
 
@@ -190,7 +190,7 @@ def test_a_driver_process_that_does_not_end_is_killed_after_a_while(clock, ends)
     driver = DriverClient(["adapter"], 7)
     driver.process.ends = ends
     driver.close()
-    driver.process.line.heard()
+    driver.process.line.received()
     assert not driver.process.line.open
     assert driver.process.waited[0] == CLOSING
     assert driver.process.killed == (not ends)
@@ -204,14 +204,14 @@ def test_ctrl_c_is_for_whoever_sends_and_not_for_the_driver_process(driver):
 
 def test_a_robots_joint_may_be_as_far_off_as_the_settings_say(clock):
     """A Panda's: 0.05 rad."""
-    assert SETTINGS.arm.astray == ASTRAY
+    assert SETTINGS.panda.astray == ASTRAY
     for off, fault in ((ASTRAY - NEAR, ""), (ASTRAY + NEAR, "joint 4: found 0.05 rad from where it is sent, ")):
-        driver = panda(SETTINGS.arm, "panda")
+        driver = panda(SETTINGS.panda, "panda")
         assert driver.process.command[1:5] == [
             "-m",
-            "trunkline.ar.drivers.driver_process",
+            "trunkline.ar.drivers.panda_process",
             "panda",
-            SETTINGS.arm.address,
+            SETTINGS.panda.address,
         ]
         driver.process.tell(BEGUN, READY + off * np.eye(7)[3])
         driver.turn(BEGUN)
@@ -222,7 +222,7 @@ def test_a_robots_joint_may_be_as_far_off_as_the_settings_say(clock):
 
 @pytest.mark.parametrize(
     ("driver_of", "patience"),
-    [(lambda: panda(SETTINGS.arm, "fr3"), CONNECTING),
+    [(lambda: panda(SETTINGS.panda, "fr3"), CONNECTING),
      (lambda: start_driver(MotorsOnBus(SETTINGS.motors, "can0", "socketcan")), HOMING + STARTING),
      (lambda: start_driver(SETTINGS.ros), CONNECTING + STARTING)],
 )  # fmt: skip

@@ -7,16 +7,15 @@ import numpy as np
 import pytest
 
 from tests.support.motors import TICK, homed, motor_settings
-from trunkline.ar.drivers import hardware_robot, ros_arm
+from trunkline.ar.drivers import hardware_robot, ros_panda
 from trunkline.ar.drivers.driver import CONNECTING
 from trunkline.ar.drivers.gm6020 import MOST_AMPERES, Feedback, command_frames, commanded
 from trunkline.ar.drivers.hardware_robot import LEAD, HardwareRobot
-from trunkline.ar.drivers.motors import PRESENT, MotorGroup
-from trunkline.ar.drivers.motors import SILENT as UNHEARD
-from trunkline.ar.drivers.ros_arm import RosArm
+from trunkline.ar.drivers.motors import FEEDBACK_TIMEOUT, PRESENT, MotorGroup
+from trunkline.ar.drivers.ros_panda import JOINT_STATE_TIMEOUT, RosPanda
 from trunkline.ar.drivers.setpoint_filter import ROUNDING
 from trunkline.ar.drivers.settings import ExecutionConfig
-from trunkline.ar.drivers.watchdog import SILENT, Watchdog
+from trunkline.ar.drivers.watchdog import SETPOINT_TIMEOUT, Watchdog
 from trunkline.ar.drivers.winch import Winch
 from trunkline.errors import InputError
 from trunkline.kinematics.panda.limits import VELOCITY
@@ -37,7 +36,7 @@ def heard_at(now, motors, numbers=(1, 2, 3), celsius=30):
 
 
 @pytest.mark.parametrize("number", [1, 2, 3])
-@pytest.mark.parametrize(("silent", "faulty"), [(UNHEARD - NEAR, False), (UNHEARD + NEAR, True)])
+@pytest.mark.parametrize(("silent", "faulty"), [(FEEDBACK_TIMEOUT - NEAR, False), (FEEDBACK_TIMEOUT + NEAR, True)])
 def test_a_motor_may_be_silent_for_so_long(number, silent, faulty):
     motors = MotorGroup(motor_settings(), 100.0)
     heard_at(100.0, motors)
@@ -118,7 +117,7 @@ def test_the_current_of_a_loop_ends_at_what_the_settings_allow_either_way(side, 
 # --- setpoints
 
 
-@pytest.mark.parametrize(("silent", "late"), [(SILENT - NEAR, False), (SILENT + NEAR, True)])
+@pytest.mark.parametrize(("silent", "late"), [(SETPOINT_TIMEOUT - NEAR, False), (SETPOINT_TIMEOUT + NEAR, True)])
 def test_a_watchdog_barks_after_so_long_and_not_before_the_first_setpoint(silent, late):
     dog = Watchdog()
     assert dog.late(1e9) == ""
@@ -150,14 +149,14 @@ class Link:
 @pytest.fixture
 def link(monkeypatch):
     made = Link()
-    monkeypatch.setattr(ros_arm, "link_of", lambda settings: made)
-    monkeypatch.setattr(ros_arm.time, "monotonic", lambda: 100.0)
+    monkeypatch.setattr(ros_panda, "link_of", lambda settings: made)
+    monkeypatch.setattr(ros_panda.time, "monotonic", lambda: 100.0)
     return made
 
 
 @pytest.fixture
 def arm(link):
-    arm = RosArm(ROS)
+    arm = RosPanda(ROS)
     arm.turn(100.0)
     assert arm.ready
     return arm
@@ -184,7 +183,9 @@ def test_a_joint_whose_place_is_no_number_is_a_fault(arm, link, joint):
     assert arm.fault.startswith(f"{ROS.names[joint]}: found nan rad")
 
 
-@pytest.mark.parametrize(("silent", "faulty"), [(ros_arm.SILENT - NEAR, False), (ros_arm.SILENT + NEAR, True)])
+@pytest.mark.parametrize(
+    ("silent", "faulty"), [(JOINT_STATE_TIMEOUT - NEAR, False), (JOINT_STATE_TIMEOUT + NEAR, True)]
+)
 def test_joints_have_to_be_told_of_so_often(arm, link, silent, faulty):
     link.joints = None
     arm.turn(100.0 + silent)
@@ -198,7 +199,7 @@ def test_a_controller_has_to_be_there_within_its_time(link, missing, late, fault
         link.listeners = 0
     else:
         link.joints = None
-    arm = RosArm(ROS)
+    arm = RosPanda(ROS)
     arm.turn(100.0 + late)
     assert not arm.ready
     side = "found nobody who listens" if missing == "listeners" else "found no state of panda_joint1 and others"
@@ -211,7 +212,7 @@ def test_a_controller_has_to_be_there_within_its_time(link, missing, late, fault
 def test_no_joint_is_sent_faster_than_it_may_go(link, joint, sign):
     for share, faulty in ((1 - 1e-4, False), (1 + 1e-4, True)):
         link.joints, link.sent = READY, []
-        arm = RosArm(ROS)
+        arm = RosPanda(ROS)
         arm.turn(100.0)
         there = READY + sign * share * ROUNDING * VELOCITY[joint] * LEAD * np.eye(7)[joint]
         arm.send(100.02 + LEAD, there)
@@ -285,9 +286,9 @@ def test_a_robot_begins_once_both_drivers_are_ready(waits):
     assert (arm.turns, motors.turns) == (3, 3)
 
 
-@pytest.mark.parametrize(("driver", "fault"), [("arm", "robot: no robot"), ("motors", "motors: no robot")])
+@pytest.mark.parametrize(("driver", "fault"), [("panda", "robot: no robot"), ("motors", "motors: no robot")])
 def test_a_robot_whose_driver_fails_does_not_begin(waits, driver, fault):
-    drivers = {"arm": FailedDriver(ready=False), "motors": FailedDriver(ready=False)}
+    drivers = {"panda": FailedDriver(ready=False), "motors": FailedDriver(ready=False)}
     waits += [lambda: setattr(drivers[driver], "fault", "no robot")]
     with pytest.raises(InputError, match=f"^{fault}$"):
         HardwareRobot(**drivers, straight=np.full(3, 0.5), clock=lambda: 100.0).begin(np.ones(7))

@@ -9,7 +9,7 @@ import pytest
 from trunkline.ar.drivers.driver_frames import Setpoint
 from trunkline.ar.drivers.setpoint_filter import LIMITS, NEAR, ROUNDING, SetpointFilter
 from trunkline.ar.drivers.time_scaling import TimeScaledRobot
-from trunkline.ar.drivers.watchdog import SILENT
+from trunkline.ar.drivers.watchdog import SETPOINT_TIMEOUT
 from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.plan import Plan
 from trunkline.ar.teleop.trajectory import MotionLimits
@@ -124,7 +124,7 @@ def test_a_setpoint_that_is_no_number_is_refused(place, value):
     assert stream.fault == "setpoint: found values that are not finite"
 
 
-@pytest.mark.parametrize(("silent", "braked"), [(SILENT - 1e-6, False), (SILENT + 1e-6, True)])
+@pytest.mark.parametrize(("silent", "braked"), [(SETPOINT_TIMEOUT - 1e-6, False), (SETPOINT_TIMEOUT + 1e-6, True)])
 def test_setpoints_that_do_not_come_are_missed_after_so_long(silent, braked):
     """Though those that are there reach further."""
     stream = SetpointFilter(READY, LIMITS["panda"])

@@ -7,7 +7,7 @@ import pytest
 
 from tests.support.motors import PLANTS, Workbench, homed, motor_settings
 from trunkline.ar.drivers.gm6020 import Feedback
-from trunkline.ar.drivers.motors import PRESENT, SILENT, MotorGroup
+from trunkline.ar.drivers.motors import FEEDBACK_TIMEOUT, PRESENT, MotorGroup
 from trunkline.ar.drivers.simulated_motors import WATCHDOG, MotorParameters
 from trunkline.ar.drivers.winch import Winch
 
@@ -94,7 +94,7 @@ def test_a_motor_that_is_silent_ends_it_for_all():
     bench = homed()
     bench.rest(0.3, pull=0.01)
     bench.simulated.motors[1].silent = True
-    bench.rest(SILENT - 0.002, pull=0.01)
+    bench.rest(FEEDBACK_TIMEOUT - 0.002, pull=0.01)
     assert bench.motors.fault == ""
     bench.rest(0.004, pull=0.01)
     assert bench.currents == [0.0, 0.0, 0.0]

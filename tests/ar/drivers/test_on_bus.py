@@ -12,7 +12,7 @@ from tests.support import waiting
 from tests.support.motors import PLANTS, TICK, Workbench, homed, motor_settings
 from trunkline.ar.drivers import on_bus
 from trunkline.ar.drivers.gm6020 import Feedback
-from trunkline.ar.drivers.motors import SILENT
+from trunkline.ar.drivers.motors import FEEDBACK_TIMEOUT
 from trunkline.ar.drivers.on_bus import (
     FILTERS,
     BusMotors,
@@ -109,7 +109,7 @@ def test_a_bus_that_gives_nothing_but_errors_ends_all_current_at_once(driven):
     assert driven.currents.max() == 0.0
     assert driven.driver.fault == "bus: gone"
     assert driven.bus.sent[-1] == (0x1FE, bytes(8))
-    driven.turn(SILENT / 2)
+    driven.turn(FEEDBACK_TIMEOUT / 2)
     assert driven.driver.motors.fault == ""
     assert driven.currents.max() == 0.0
     driven.bus.hears = True
@@ -132,7 +132,7 @@ def test_a_bus_that_takes_nothing_is_a_fault_and_no_current_is_sent_once_it_does
 
 def test_a_motor_that_is_silent_ends_all_current(driven):
     driven.bench.simulated.motors[0].silent = True
-    driven.turn(SILENT - TICK)
+    driven.turn(FEEDBACK_TIMEOUT - TICK)
     assert driven.driver.fault == ""
     assert driven.currents.min() > 0.0
     driven.turn(3 * TICK)
@@ -156,7 +156,7 @@ def test_of_the_frames_of_a_motor_that_wait_the_newest_counts(driven):
     assert len(driven.bus.waiting) == 15
     driven.driver.turn([0.01] * 3, [0.0] * 3)
     np.testing.assert_allclose(driven.bench.motors.pulls, driven.bench.pulls, atol=3e-4)
-    assert {winch.heard for winch in driven.bench.motors.winches} == {driven.bench.now}
+    assert {winch.last_feedback for winch in driven.bench.motors.winches} == {driven.bench.now}
 
 
 def test_an_error_frame_is_no_feedback(monkeypatch):
@@ -165,7 +165,7 @@ def test_an_error_frame_is_no_feedback(monkeypatch):
     waits = [frame, None]
     played.bus.recv = lambda timeout: waits.pop(0)
     played.driver.turn([0.0] * 3, [0.0] * 3)
-    assert played.bench.motors.winches[0].heard is None
+    assert played.bench.motors.winches[0].last_feedback is None
 
 
 def test_a_closed_driver_leaves_no_current_and_no_bus(driven):

@@ -9,7 +9,7 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
-from trunkline.ar.drivers.ros_arm import PERIOD, RosArm
+from trunkline.ar.drivers.ros_panda import PERIOD, RosPanda
 from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT, load_folder
@@ -105,9 +105,9 @@ def stub(monkeypatch):
 
 @pytest.fixture
 def arm(stub):
-    arm = RosArm(SETTINGS)
+    arm = RosPanda(SETTINGS)
     stub.say(READY)
-    arm.turn(arm._heard)
+    arm.turn(arm._state_time)
     assert arm.ready
     yield arm
     arm.close()
@@ -116,7 +116,7 @@ def arm(stub):
 def test_a_node_sends_one_point_for_when_it_is_due(stub, arm):
     assert stub.domain == SETTINGS.domain
     np.testing.assert_array_equal(arm.sent, READY)
-    now = arm._heard
+    now = arm._state_time
     for step in (0.04, 0.05):  # of those that wait the newest is sent
         arm.send(now + 1.5, READY + step)
     arm.turn(now)
@@ -139,7 +139,7 @@ def test_what_it_hears_is_the_newest(stub, arm):
 
 
 def test_its_faults_are_those_of_the_other_link(stub, arm):
-    now = arm._heard
+    now = arm._state_time
     arm.turn(now + 0.3)
     assert arm.fault == "/joint_states: silent for 300 ms"
     arm.fault = ""
@@ -164,7 +164,7 @@ def test_its_faults_are_those_of_the_other_link(stub, arm):
 
 
 def test_it_ends_its_node_and_its_context(stub):
-    RosArm(SETTINGS).close()
+    RosPanda(SETTINGS).close()
     assert stub.spins.is_set()
     assert stub.ended == ["node", "context"]
 
@@ -173,4 +173,4 @@ def test_no_rclpy_is_one_line(monkeypatch):
     monkeypatch.setitem(sys.modules, "rclpy", None)
     monkeypatch.delitem(sys.modules, LINK, raising=False)
     with pytest.raises(InputError, match=r"^ros\.link: found no rclpy \(.*\), expected ROS 2 to be sourced, or dds$"):
-        RosArm(SETTINGS)
+        RosPanda(SETTINGS)

@@ -10,7 +10,7 @@ import pytest
 
 from trunkline.ar.drivers.driver_frames import DriverState, FrameSocket, Setpoint
 from trunkline.ar.drivers.setpoint_filter import LIMITS, SetpointFilter
-from trunkline.ar.drivers.watchdog import SILENT
+from trunkline.ar.drivers.watchdog import SETPOINT_TIMEOUT
 
 READY = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])
 DT, LEAD, BEGINS, SECONDS = 0.001, 0.03, 0.1, 2.0
@@ -99,7 +99,7 @@ def test_silence_counts_though_setpoints_far_ahead_were_sent():
     stream = SetpointFilter(READY, PANDA)
     for step in range(1000):
         stream.hear(Setpoint(step * DT, tuple(READY)), 0.0)
-    for step in range(round(SILENT / DT) + 2):
+    for step in range(round(SETPOINT_TIMEOUT / DT) + 2):
         stream.cycle(step * DT, DT)
     assert stream.fault == "heard no setpoint for 51 ms, expected one every 1 ms"
 
@@ -224,11 +224,11 @@ def test_frames_are_cut_however_they_come(line):
     data, frames = b"".join(Setpoint(n, tuple(READY)).pack() for n in range(9)), []
     for begin in range(0, len(data), 50):
         theirs.send(data[begin : begin + 50])
-        frames += ours.heard()
+        frames += ours.received()
     assert [Setpoint.unpack(frame).due for frame in frames] == list(range(9))
     assert ours.open
     theirs.close()
-    assert ours.heard() == []
+    assert ours.received() == []
     assert not ours.open
 
 

@@ -6,7 +6,7 @@ import pytest
 from tests.support.motors import TICK, PlayedMotors, Workbench, homed
 from trunkline.ar.drivers.motors import HOMING
 from trunkline.ar.drivers.tendon_driver import TendonDriver
-from trunkline.ar.drivers.watchdog import SILENT
+from trunkline.ar.drivers.watchdog import SETPOINT_TIMEOUT
 
 LEAD = 0.03  # s
 
@@ -44,7 +44,7 @@ def test_they_are_where_they_are_sent_when_it_is_due():
 def test_where_setpoints_end_they_hold_and_follow_no_more():
     played = Played(homed())
     played.play(0.5, lambda t: 0.03 * t)
-    played.play(LEAD + SILENT)
+    played.play(LEAD + SETPOINT_TIMEOUT)
     assert played.cables.fault.startswith("heard no setpoint for 5")
     pulls = played.cables.sent
     np.testing.assert_allclose(pulls, 0.015, atol=1e-6)

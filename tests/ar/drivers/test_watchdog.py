@@ -9,7 +9,7 @@ from trunkline.ar.drivers.watchdog import Watchdog
 
 def test_before_the_first_setpoint_none_is_late():
     watchdog = Watchdog()
-    assert watchdog.heard == math.inf
+    assert watchdog.last_setpoint == math.inf
     assert watchdog.late(1e9) == ""
 
 

@@ -51,7 +51,7 @@ from trunkline.ar.session.server import Composition, Server
 from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.teleop.alignment import base_quaternion
 from trunkline.ar.teleop.core import Teleoperation
-from trunkline.ar.teleop.executor import SimulatedRobot
+from trunkline.ar.teleop.executor import PlanFollower
 from trunkline.ar.teleop.following import Following, sought
 from trunkline.ar.teleop.messages import ExecutorReport, Obstacle, PlanReport, Targets, WorldObject
 from trunkline.ar.teleop.planner import Planner
@@ -124,7 +124,7 @@ class Robot:
     """Where its plan says, in real time."""
 
     def __init__(self, figure: Figure) -> None:
-        self.figure, self.robot = figure, SimulatedRobot(np.array(READY_JOINTS), STRAIGHT, LIMITS, PACKAGE)
+        self.figure, self.robot = figure, PlanFollower(np.array(READY_JOINTS), STRAIGHT, LIMITS, PACKAGE)
         self.start, self.stop, self.hear = self.robot.start, self.robot.stop, self.robot.hear
         self.last, self.fault = time.monotonic(), ""
         self.frozen: RobotState | None = None
@@ -235,7 +235,7 @@ async def obey(server: Server, robot: Robot, runner: web.AppRunner, port: int, l
 
 
 async def serve(port: int, folder: Path) -> None:
-    lease.SILENCE = PATIENCE
+    lease.LEASE_TIMEOUT = PATIENCE
     figure, token, log = Figure(), make_token(), []
     robot, planning = Robot(figure), Planning(figure)
     core = config().core

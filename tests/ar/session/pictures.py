@@ -193,7 +193,7 @@ async def session(package: Path) -> dict[Mode, bytes]:
     config, teleop = load_folder(SessionConfig, PROJECT / "conf/live"), load_folder(Teleop, PROJECT / "conf/teleop")
     safety = replace(teleop.core.safety, silence=SILENCE, plan_wait=PATIENCE)
     teleop = replace(teleop, core=replace(teleop.core, safety=safety))
-    lease.SILENCE, robot_process.STALE = SILENCE, STALE
+    lease.LEASE_TIMEOUT, robot_process.STALE = SILENCE, STALE
     with tempfile.TemporaryDirectory() as logs:
         config = replace(config, journal=replace(config.journal, folder=logs))
         async with opened(package, ADDRESS, lambda line: None, config=config, teleop=teleop) as (server, made):

@@ -17,12 +17,12 @@ from trunkline.ar.session import messages
 from trunkline.ar.session.binary import HAND, Received
 from trunkline.ar.session.controller import MOST_INPUTS, SessionController
 from trunkline.ar.session.controller_input import controllers
-from trunkline.ar.session.follow import SILENT
+from trunkline.ar.session.follow import PLANNER_TIMEOUT
 from trunkline.ar.session.log_writer import LogWriter
 from trunkline.ar.session.previewer import InlinePreviewer, PlanAnswer, PredictionAnswer, PreviewBegun, PreviewPiece
 from trunkline.ar.session.robot_process import RobotState
 from trunkline.ar.teleop.core import Teleoperation
-from trunkline.ar.teleop.executor import FOLLOWS, SimulatedRobot
+from trunkline.ar.teleop.executor import FOLLOWS, PlanFollower
 from trunkline.ar.teleop.messages import Controller, ExecutorReport, Intent, Obstacle, PlanReport, Pose
 from trunkline.ar.teleop.plan import Plan
 
@@ -217,7 +217,7 @@ def test_an_older_fault_is_not_replaced_by_a_newer_one():
     assert controller._fault == "it has come to rest by itself"
 
 
-@pytest.mark.parametrize("silent", [SILENT - 0.01, SILENT + 0.01])
+@pytest.mark.parametrize("silent", [PLANNER_TIMEOUT - 0.01, PLANNER_TIMEOUT + 0.01])
 def test_as_it_follows_a_process_that_plans_has_to_answer(silent):
     robot = ToldRobot("running")
     controller = controller_of(robot)
@@ -226,8 +226,9 @@ def test_as_it_follows_a_process_that_plans_has_to_answer(silent):
     controller._follow.advance(silent)
     robot.calls.clear()
     controller._drive(intent("follow", motion="follow"))
-    assert robot.calls == (["permit"] if silent < SILENT else ["stop"])
-    assert controller._fault == ("" if silent < SILENT else "the process that plans has not answered for 1.01 s")
+    assert robot.calls == (["permit"] if silent < PLANNER_TIMEOUT else ["stop"])
+    fault = "" if silent < PLANNER_TIMEOUT else "the process that plans has not answered for 1.01 s"
+    assert controller._fault == fault
 
 
 @pytest.mark.parametrize("alignment", [None, BASE])
@@ -237,7 +238,7 @@ def test_whoever_takes_over_finds_a_robot_that_was_told_to_stop_and_nothing_of_w
     controller.hear(*received(1.0))
     controller.control(alignment, "not sure")
     assert robot.calls == ["stop"]
-    assert not controller._heard
+    assert not controller._inputs
     assert (controller.alignment, controller.unfit) == (alignment, "not sure")
     assert controller.hear(*received(0.5)) == ""  # another clock
 
@@ -277,7 +278,7 @@ def test_of_more_inputs_than_a_tick_takes_the_oldest_are_left_out():
     controller = controller_of(ToldRobot())
     for number in range(MOST_INPUTS + 3):
         controller.hear(*received(1.0 + number))
-    assert [heard.stamp for heard in controller._heard] == [1.0 + number for number in range(3, MOST_INPUTS + 3)]
+    assert [heard.stamp for heard in controller._inputs] == [1.0 + number for number in range(3, MOST_INPUTS + 3)]
 
 
 # --- what has been shown
@@ -315,14 +316,14 @@ SHOWN = [
 @pytest.mark.parametrize(("changes", "digest", "after", "reason"), SHOWN)
 def test_what_counts_as_shown_to_its_end(changes, digest, after, reason):
     controller = previewed(**changes)
-    assert controller.shown(digest, 10.0 + after) == reason
-    assert controller._shown == ("" if reason else DIGEST)
+    assert controller.preview_shown(digest, 10.0 + after) == reason
+    assert controller._shown_digest == ("" if reason else DIGEST)
 
 
 @pytest.mark.parametrize(("serial", "counts"), [(2, False), (3, True), (4, False)])
 def test_only_an_answer_to_what_was_asked_for_last_counts(serial, counts):
     controller = controller_of(ToldRobot())
-    controller._asked = 3
+    controller._requested = 3
     plan, prediction = some_plan(), messages.PredictionMessage(DIGEST, None, None, None, (), (), (), 0.9, 12)
     answers = [
         PlanAnswer(PlanReport(serial, plan.digest(), "", PACKAGE, "world"), plan),
@@ -341,7 +342,7 @@ def test_only_an_answer_to_what_was_asked_for_last_counts(serial, counts):
 
 def test_a_process_that_plans_and_has_ended_is_a_refusal():
     controller = controller_of(ToldRobot())
-    controller._asked = 3
+    controller._requested = 3
     assert not controller.answered(None, 0.0)
     assert (controller.report.serial, controller.report.refused) == (3, "the process that plans has ended")
 
@@ -349,7 +350,7 @@ def test_a_process_that_plans_and_has_ended_is_a_refusal():
 # --- a whole session, tick by tick
 
 
-class PlayedRobot(SimulatedRobot):
+class PlayedRobot(PlanFollower):
     """As its plan says; it brakes by itself where nobody `permit`s it at a tick. `permits`, `stops`: how often."""
 
     def __init__(self):
@@ -412,7 +413,7 @@ class Played:
         self.until(lambda intent: intent.mode == "preview")
         self.right = {"grip": 1.0}
         self.wait(PREVIEW + 0.1)
-        assert self.controller.shown(self.controller.intent.preview, self.now) == ""
+        assert self.controller.preview_shown(self.controller.intent.preview, self.now) == ""
         self.until(lambda intent: intent.mode == "ready")
         self.right = {"grip": 1.0, "trigger": 1.0}
         self.until(lambda intent: intent.mode == "execute")
@@ -448,7 +449,7 @@ def test_from_hands_to_a_robot_that_has_arrived(session):
 def test_what_runs_is_still_known_where_its_preview_breaks_off_meanwhile(session):
     """Else the world would not hear at its end of what it grasped."""
     controller, plan = session.executing().controller, session.controller.plan
-    refusal = PlanReport(controller._asked, refused="preview: ValueError: it diverged")
+    refusal = PlanReport(controller._requested, refused="preview: ValueError: it diverged")
     assert not controller.answered(PlanAnswer(refusal), session.now)
     assert controller.plan is plan
     session.until(lambda intent: intent.mode == "aim")
@@ -472,7 +473,7 @@ def hidden(session):
 
 
 def rested(session):
-    SimulatedRobot.stop(session.robot)
+    PlanFollower.stop(session.robot)
     session.wait(0.3)
 
 
@@ -535,7 +536,7 @@ def test_as_it_follows_it_goes_after_the_targets_and_holds_as_soon_as_nobody_ans
     session.wait(1.0)
     assert session.robot.state() == ExecutorReport("running", FOLLOWS)
     session.planning.poll = list
-    session.wait(SILENT - 0.2)
+    session.wait(PLANNER_TIMEOUT - 0.2)
     assert session.controller.intent.motion == "follow"
     intent = session.wait(0.5)
     assert (intent.mode, intent.motion) == ("stopped", "hold")

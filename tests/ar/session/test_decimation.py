@@ -9,7 +9,7 @@ from trunkline.ar.session.decimation import AFTER, BEFORE, SELDOM, STILL, LogDec
 from trunkline.ar.session.log_format import JOINTS_SENT, POSES
 from trunkline.ar.session.robot_process import RobotState
 from trunkline.recordings.logs.joint_stream import joint_stream
-from trunkline.recordings.logs.log import read_log
+from trunkline.recordings.logs.mcap_log import read_log
 
 RATE, MOVES, STOPS, LASTS = 72.0, 20.0, 21.0, 60.0  # Hz, s
 TIMES = np.arange(round(RATE * LASTS)) / RATE

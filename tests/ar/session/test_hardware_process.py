@@ -87,8 +87,8 @@ class Rig:
         rows = gentle(here, here + TURN * np.eye(10)[0] - PULL * np.eye(10)[8], limits, 0.002, SECONDS)
         self.plan = Plan(0.002, rows[:, :7], rows[:, 7:], (("approach", 0),), PACKAGE, "world")
         self.rest(0.1)
-        self.channel.plans.put((1, self.plan.digest(), self.plan, self.channel.asked[STOPS]))
-        self.channel.asked[PERMITTED] = 1
+        self.channel.plans.put((1, self.plan.digest(), self.plan, self.channel.requests[STOPS]))
+        self.channel.requests[PERMITTED] = 1
         self.begun = self.now
         until(lambda: self.loop.serial == 1, each=lambda: self.loop.turn(self.now))
 
@@ -100,7 +100,7 @@ class Rig:
         """A ms of both limbs, in which the loop turns `turns` times."""
         self.now = self.bench.now = self.now + TICK
         if self.permitted:
-            self.channel.asked[PERMIT] = self.now
+            self.channel.requests[PERMIT] = self.now
         for frame in self.bench.simulated.advance(self.now):
             self.bench.hear(frame)
         for _ in range(turns):
@@ -148,7 +148,7 @@ def test_both_drivers_run_the_plan_on_one_clock(rig):
 
 def test_a_stop_brings_both_to_rest_on_the_plan(rig):
     rig.rest(0.7)
-    rig.channel.asked[STOPS] += 1
+    rig.channel.requests[STOPS] += 1
     rig.rest(BRAKE + LATE + 0.05)
     assert rig.mode == "idle"
     rig.rest(0.2)
@@ -200,7 +200,7 @@ def test_a_fault_of_the_arm_halts_the_motors_and_they_hold(rig):
 def test_a_fault_lasts(rig):
     rig.arm.fault = "reflex"
     rig.rest(0.5)
-    rig.channel.plans.put((2, rig.plan.digest(), rig.plan, rig.channel.asked[STOPS]))
+    rig.channel.plans.put((2, rig.plan.digest(), rig.plan, rig.channel.requests[STOPS]))
     until(lambda: rig.loop.serial == 2, each=rig.tick)
     assert rig.mode == "fault"
     assert rig.channel.hear()[1] == "robot: reflex"
@@ -209,11 +209,11 @@ def test_a_fault_lasts(rig):
 
 def test_both_drivers_follow_and_rest_as_they_are_let_go(rig):
     """Seen from another place than where its plan would have led."""
-    rig.channel.asked[STOPS] += 1
+    rig.channel.requests[STOPS] += 1
     rig.rest(BRAKE + LATE + 0.05)
-    stops, here = rig.channel.asked[STOPS], np.append(rig.sent[-1], STRAIGHT)
+    stops, here = rig.channel.requests[STOPS], np.append(rig.sent[-1], STRAIGHT)
     rig.channel.plans.put((2, FOLLOWS, Following(DELAY, 0.0, 0.05), stops))
-    rig.channel.asked[PERMITTED] = 2
+    rig.channel.requests[PERMITTED] = 2
     until(lambda: rig.loop.serial == 2, each=lambda: rig.loop.turn(rig.now))
     goal = here + 0.1 * np.eye(10)[0] - 0.02 * np.eye(10)[8]
     for _ in range(20):

@@ -98,7 +98,7 @@ def log(tmp_path_factory):
             await asyncio.sleep(0.1)
 
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("trunkline.ar.session.lease.SILENCE", 60.0)
+        patched.setattr("trunkline.ar.session.lease.LEASE_TIMEOUT", 60.0)
         asyncio.run(session())
     log_writer.close()
     return path

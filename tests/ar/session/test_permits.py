@@ -31,7 +31,7 @@ from trunkline.ar.session.robot_process import (
     RobotProcess,
 )
 from trunkline.ar.session.simulated import LISTENS, Loop
-from trunkline.ar.teleop.executor import BRAKE, FOLLOWS, SimulatedRobot
+from trunkline.ar.teleop.executor import BRAKE, FOLLOWS, PlanFollower
 from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.messages import ExecutorReport
 from trunkline.ar.teleop.plan import Plan
@@ -55,18 +55,18 @@ class Played:
         self.channel = RobotChannel(multiprocessing.get_context("spawn"), 3, 0)
         self.channel.plans = queue.Queue()
         self.plant = Still()
-        self.robot = SimulatedRobot(START, STRAIGHT, LIMITS, PACKAGE)
+        self.robot = PlanFollower(START, STRAIGHT, LIMITS, PACKAGE)
         self.loop, self.now, self.serial = Loop(self.channel, self.robot, self.plant), BEGINS, 0
 
     def permit(self, serial=None, ago=0.0):
-        asked = self.channel.asked
+        asked = self.channel.requests
         asked[PERMIT], asked[PERMITTED] = self.now - ago, self.serial if serial is None else serial
 
     def begin(self, what, stops=None) -> "Played":
         """A plan, or to follow, permitted."""
         self.serial += 1
         digest = what.digest() if isinstance(what, Plan) else FOLLOWS
-        self.channel.plans.put((self.serial, digest, what, self.channel.asked[STOPS] if stops is None else stops))
+        self.channel.plans.put((self.serial, digest, what, self.channel.requests[STOPS] if stops is None else stops))
         self.permit()
         self.loop.turn(self.now)
         return self
@@ -137,7 +137,7 @@ def test_without_a_permit_it_brakes_after_so_long_and_goes_on_by_none(played):
 @pytest.mark.parametrize("times", [1, 2])
 def test_a_stop_counts_though_it_is_permitted(played, times):
     played.begin(plan_of()).turn(0.5)
-    played.channel.asked[STOPS] += times
+    played.channel.requests[STOPS] += times
     played.turn(TICK)
     assert played.report[0][HOLD_TIME] == played.now
     assert played.robot._pace < 1.0
@@ -147,8 +147,8 @@ def test_a_stop_counts_though_it_is_permitted(played, times):
 
 
 def test_a_stop_that_comes_before_what_it_stops_counts(played):
-    stops = played.channel.asked[STOPS]
-    played.channel.asked[STOPS] += 1
+    stops = played.channel.requests[STOPS]
+    played.channel.requests[STOPS] += 1
     played.begin(plan_of(), stops)
     assert played.mode == "fault"
     assert played.report[1] == "a stop came before it began"
@@ -164,7 +164,7 @@ def test_what_targets_ask_for_counts_for_what_follows_them_alone(played, ahead):
     goal = HERE + 0.05 * np.eye(10)[0]
     for serial in (played.serial + ahead, played.serial):
         for _ in range(10):
-            played.channel.plans.put((serial, FOLLOWS, Goal(played.now, goal), played.channel.asked[STOPS]))
+            played.channel.plans.put((serial, FOLLOWS, Goal(played.now, goal), played.channel.requests[STOPS]))
             played.loop.turn(played.now)
             played.turn(0.1)
         moved = played.robot.joints[0] - START[0]
@@ -175,7 +175,7 @@ def test_a_plan_is_looked_for_for_a_while_after_it_was_woken(played):
     played.loop.turn(played.now, woken=True)
     digest = plan_of().digest()
     for late, begun in ((LISTENS + NEAR, False), (LISTENS - NEAR, True)):
-        played.channel.plans.put((1, digest, plan_of(), played.channel.asked[STOPS]))
+        played.channel.plans.put((1, digest, plan_of(), played.channel.requests[STOPS]))
         played.serial = 1
         played.permit(ago=-1.0)
         played.loop.turn(played.now + late, woken=False)
@@ -206,7 +206,7 @@ def test_why_a_plan_does_not_begin(played, first):
     reasons = ["a stop came before it began", "motors: silent", "package: found digest bbbb"]
     plan = replace(plan_of(), package="b" * 64)
     played.plant.fault = "motors: silent" if first < 2 else ""
-    played.begin(plan, stops=played.channel.asked[STOPS] - (first < 1))
+    played.begin(plan, stops=played.channel.requests[STOPS] - (first < 1))
     assert played.report[1].startswith(reasons[first])
 
 
@@ -307,8 +307,8 @@ def test_a_start_is_on_its_way_until_the_robot_tells_of_it(robot, clock):
     plan = plan_of()
     assert robot.start(plan, plan.digest()) == ""
     serial, digest, asked, stops = robot.channel.plans.get_nowait()
-    assert (serial, digest, asked, stops) == (1, plan.digest(), plan, robot.channel.asked[STOPS])
-    assert (robot.channel.asked[PERMITTED], robot.channel.asked[PERMIT]) == (1, clock.now)
+    assert (serial, digest, asked, stops) == (1, plan.digest(), plan, robot.channel.requests[STOPS])
+    assert (robot.channel.requests[PERMITTED], robot.channel.requests[PERMIT]) == (1, clock.now)
     tell(robot, clock, "done", serial=0)
     assert robot.state() == ExecutorReport("idle", "")
     tell(robot, clock, "running", serial=1)
@@ -327,7 +327,7 @@ def test_what_is_not_started_is_not_sent_and_not_permitted(robot, clock):
     assert robot.start(plan, plan.digest()) == "busy: another plan runs"
     assert robot.follow(FOLLOWING) == "busy: another plan runs"
     assert robot.channel.plans.empty()
-    assert not robot.channel.asked.any()
+    assert not robot.channel.requests.any()
 
 
 def test_a_stop_takes_the_permit_back_and_is_counted(robot, clock):
@@ -335,11 +335,11 @@ def test_a_stop_takes_the_permit_back_and_is_counted(robot, clock):
     robot.start(plan, plan.digest())
     clock.now += 0.01
     robot.permit()
-    assert (robot.channel.asked[PERMIT], robot.channel.asked[PERMITTED]) == (clock.now, 1)
+    assert (robot.channel.requests[PERMIT], robot.channel.requests[PERMITTED]) == (clock.now, 1)
     for count in (1, 2):
         robot.stop()
-        assert robot.channel.asked[PERMITTED] == 0
-        assert robot.channel.asked[STOPS] == count
+        assert robot.channel.requests[PERMITTED] == 0
+        assert robot.channel.requests[STOPS] == count
 
 
 def test_what_is_started_knows_how_many_stops_there_were(robot, clock):
@@ -362,6 +362,6 @@ def test_a_process_is_ended_once_its_robot_rests_or_has_not_for_too_long(robot, 
 
     clock.sleep = sleeping
     robot.close()
-    assert robot.channel.asked[STOPS] == 1
+    assert robot.channel.requests[STOPS] == 1
     assert robot._process.ended
     assert clock.now - BEGINS == pytest.approx(0.1 if comes_to_rest else robot_process.RESTING, abs=2 * LOOKS)

@@ -38,7 +38,7 @@ from trunkline.ar.session.robot_process import (
 )  # fmt: skip
 from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.session.simulated import Loop, Simulation, TwinPlant, drive
-from trunkline.ar.teleop.executor import SimulatedRobot
+from trunkline.ar.teleop.executor import PlanFollower
 from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.plan import Plan
 from trunkline.ar.teleop.trajectory import gentle, limits_of, point_to_point
@@ -280,11 +280,11 @@ def test_where_its_server_is_gone_it_brakes_along_the_plan_before_it_ends():
     s, gone = simulation(), -1
     channel = RobotChannel(multiprocessing.get_context("spawn"), 3, 0)
     channel.plans = queue.Queue()
-    robot = SimulatedRobot(s.joints, s.commands, s.limits, PACKAGE, lambda joints, commands, dt: None)
+    robot = PlanFollower(s.joints, s.commands, s.limits, PACKAGE, lambda joints, commands, dt: None)
     loop = Loop(channel, robot, Still())
     drive(loop, gone)  # at rest, it ends at once
-    channel.plans.put((1, plan().digest(), plan(), channel.asked[STOPS]))
-    channel.asked[PERMIT], channel.asked[PERMITTED] = time.monotonic(), 1
+    channel.plans.put((1, plan().digest(), plan(), channel.requests[STOPS]))
+    channel.requests[PERMIT], channel.requests[PERMITTED] = time.monotonic(), 1
     loop.turn(time.monotonic())
     assert robot.state().mode == "running"
     began = time.monotonic()

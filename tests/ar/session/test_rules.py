@@ -13,7 +13,7 @@ from tests.support.links import clock_error
 from trunkline.ar.session.__main__ import parsed
 from trunkline.ar.session.auth import CODE_SECONDS, CODE_TRIES, PairingCode
 from trunkline.ar.session.clock import FORWARD, JUMP, LATEST, PINGS, ClientClock
-from trunkline.ar.session.lease import SILENCE, ControlLease
+from trunkline.ar.session.lease import LEASE_TIMEOUT, ControlLease
 from trunkline.ar.session.outbox import MOST_MESSAGES, WINDOW, Outbox
 from trunkline.ar.session.tls import fingerprint, make_certificate, tls_context
 from trunkline.errors import InputError
@@ -90,7 +90,7 @@ def test_before_a_round_is_over_no_input_counts():
     assert clock.fault(100.0, 100.0) == ""
 
 
-@pytest.mark.parametrize(("silent", "ends"), [(SILENCE - NEAR, False), (SILENCE + NEAR, True)])
+@pytest.mark.parametrize(("silent", "ends"), [(LEASE_TIMEOUT - NEAR, False), (LEASE_TIMEOUT + NEAR, True)])
 def test_a_lease_ends_by_its_holders_silence_alone(silent, ends):
     """Counted from its last input, or from when the lease began; of nobody's nothing ends."""
     control = ControlLease()
@@ -151,7 +151,7 @@ def test_one_controls_and_none_without_having_asked_or_been_given_it(steps):
         elif action == "hear":
             assert control.hear(client, now) == (client == before)
         else:
-            now += SILENCE + 0.1
+            now += LEASE_TIMEOUT + 0.1
             assert control.silent(now) == bool(before)
             if before:
                 assert control.holder != before or not control.asking

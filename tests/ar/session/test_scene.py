@@ -8,7 +8,7 @@ from point_cloud_utils import signed_distance_to_mesh
 
 from trunkline.ar.session.bodies import drawn_bodies
 from trunkline.ar.session.scene import MOST_TRIANGLES, SHELL_TRIANGLES, scene
-from trunkline.kinematics.panda.shipped import shipped_panda
+from trunkline.kinematics.panda.maker_model import shipped_panda
 
 XML = """
 <mujoco>

@@ -37,7 +37,7 @@ def test_an_answer_of_who_seeks_is_of_no_plan():
     """Whatever number it has."""
     controller, handed = controller_of(ToldRobot()), []
     controller._follow = SimpleNamespace(answer=handed.append)
-    answer = FollowAnswer(*[controller._asked] * len(fields(FollowAnswer)))
+    answer = FollowAnswer(*[controller._requested] * len(fields(FollowAnswer)))
     assert controller.answered(answer, 0.0) is False
     assert handed == [answer]
 
@@ -47,12 +47,12 @@ def test_what_was_planned_previewed_and_foreseen_is_noted():
     log_writer = SimpleNamespace(event=lambda name, **_: noted.append(name), piece=lambda *_: noted.append("piece"))
     controller, plan = controller_of(ToldRobot(), log_writer=log_writer), some_plan()
     for answer in (
-        PlanAnswer(PlanReport(controller._asked, plan.digest(), "", PACKAGE, "world"), plan),
-        PreviewBegun(controller._asked, messages.PreviewMessage(DIGEST, 0.02, 0.3, 0.02, ())),
-        PreviewPiece(controller._asked, 0, 0.0, np.zeros((1, 1, 7)), False),
-        PreviewPiece(controller._asked, 0, 0.0, np.zeros((0, 0, 7)), True),  # without frames
+        PlanAnswer(PlanReport(controller._requested, plan.digest(), "", PACKAGE, "world"), plan),
+        PreviewBegun(controller._requested, messages.PreviewMessage(DIGEST, 0.02, 0.3, 0.02, ())),
+        PreviewPiece(controller._requested, 0, 0.0, np.zeros((1, 1, 7)), False),
+        PreviewPiece(controller._requested, 0, 0.0, np.zeros((0, 0, 7)), True),  # without frames
         PredictionAnswer(
-            controller._asked, messages.PredictionMessage(DIGEST, None, None, None, (), (), (), 0.9, 12)
+            controller._requested, messages.PredictionMessage(DIGEST, None, None, None, (), (), (), 0.9, 12)
         ),
     ):
         assert controller.answered(answer, 0.0)
@@ -68,7 +68,7 @@ def test_a_robot_that_rests_needs_no_permit_and_is_held_by_none():
 
 def test_a_stop_is_over_once_it_was_obeyed():
     played = Played().begin(plan_of()).turn(0.1)
-    played.channel.asked[STOPS] += 1
+    played.channel.requests[STOPS] += 1
     played.turn(1.0)
     assert played.mode == "idle"
     here = played.robot.joints
@@ -81,7 +81,7 @@ def test_of_several_stops_the_last_is_told():
     """However long it has been held then."""
     played = Played().begin(plan_of()).turn(0.1)
     for _ in range(2):
-        played.channel.asked[STOPS] += 1
+        played.channel.requests[STOPS] += 1
         played.turn(2 * played.plant.tick)
         assert played.report[0][HOLD_TIME] == played.now - played.plant.tick
 
@@ -138,7 +138,7 @@ def test_a_stop_of_what_nobody_permits_any_more_is_told_as_the_later():
     played = Played().begin(plan_of()).turn(0.05)
     played.turn(DEAD_MAN + 3 * played.plant.tick, permits=False)
     ended = played.report[0][HOLD_TIME]
-    played.channel.asked[STOPS] += 1
+    played.channel.requests[STOPS] += 1
     played.turn(played.plant.tick, permits=False)
     assert played.mode == "running"  # it brakes still
     assert played.report[0][HOLD_TIME] == played.now > ended

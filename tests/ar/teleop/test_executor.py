@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.support.operator import READY_JOINTS, config
-from trunkline.ar.teleop.executor import AT_START, BRAKE, ROUNDING, SimulatedRobot
+from trunkline.ar.teleop.executor import AT_START, BRAKE, ROUNDING, PlanFollower
 from trunkline.ar.teleop.plan import Plan
 from trunkline.ar.teleop.trajectory import JOINTS, limits_of
 from trunkline.kinematics.panda.kinematics import Q_MAX, Q_MIN
@@ -27,8 +27,8 @@ def still(rows: int = 3) -> np.ndarray:
     return np.tile(HERE, (rows, 1))
 
 
-def robot(at: np.ndarray = HERE) -> SimulatedRobot:
-    return SimulatedRobot(at[:JOINTS], at[JOINTS:], LIMITS, PACKAGE)
+def robot(at: np.ndarray = HERE) -> PlanFollower:
+    return PlanFollower(at[:JOINTS], at[JOINTS:], LIMITS, PACKAGE)
 
 
 def moving(axis: int, speed: float, row: int = 1) -> np.ndarray:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from tests.support.operator import PACKAGE, REFERENCE, config
-from trunkline.ar.teleop.headset_loss import silence_fault
+from trunkline.ar.teleop.headset_silence import silence_fault
 from trunkline.ar.teleop.input_validation import UNIT, clock_fault, fault_of, setting_fault, swapped
 from trunkline.ar.teleop.messages import Controller, Input, Pose, World
 from trunkline.ar.teleop.tracked_controller import Hand

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from trunkline.ar.teleop.headset_loss import silence_fault
+from trunkline.ar.teleop.headset_silence import silence_fault
 from trunkline.ar.teleop.input_validation import clock_fault, fault_of, setting_fault, swapped
 from trunkline.ar.teleop.messages import Controller, Pose
 from trunkline.ar.teleop.tracked_controller import Hand

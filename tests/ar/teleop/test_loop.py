@@ -5,7 +5,7 @@ import pytest
 
 from tests.ar.teleop.test_plan import BENT, LIMITS, NETWORK, OFFSET, START, STRAIGHT
 from tests.support.operator import DT, PACKAGE, Operator
-from trunkline.ar.teleop.executor import SimulatedRobot
+from trunkline.ar.teleop.executor import PlanFollower
 from trunkline.ar.teleop.messages import PlanReport
 from trunkline.ar.teleop.planner import Planner
 from trunkline.ar.teleop.rigid_ik import RigidIK
@@ -19,7 +19,7 @@ class Desk:
     def __init__(self):
         self.operator = Operator()
         self.planner = Planner(RigidIK(OFFSET), NETWORK, STRAIGHT, LIMITS, OFFSET, step=0.005)
-        self.robot = SimulatedRobot(START, STRAIGHT, LIMITS, PACKAGE)
+        self.robot = PlanFollower(START, STRAIGHT, LIMITS, PACKAGE)
         self.plan, self.reports = None, {}
 
     def step(self, **changes):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.support.operator import READY_JOINTS, config
-from trunkline.ar.teleop.executor import SimulatedRobot
+from trunkline.ar.teleop.executor import PlanFollower
 from trunkline.ar.teleop.messages import Obstacle, Request, Target, Targets, World
 from trunkline.ar.teleop.planner import Planner
 from trunkline.ar.teleop.rigid_ik import RigidIK
@@ -172,7 +172,7 @@ def test_digest_tells_every_bit(planner):
 
 def robot(plan, **changes):
     arguments = {"joints": plan.joints[0], "commands": plan.commands[0], "limits": LIMITS, "package": PACKAGE} | changes
-    return SimulatedRobot(**arguments)
+    return PlanFollower(**arguments)
 
 
 def test_robot_runs_only_the_plan_of_the_digest(planner):

@@ -9,7 +9,7 @@ from mcap_ros2.decoder import DecoderFactory
 from tests.support.sessions import curl_truth, instruments, record
 from trunkline.recordings.logs.cdr import decode, parse_definition, short_name
 from trunkline.recordings.logs.definitions import JOINT_STATE, RIGID_BODIES
-from trunkline.recordings.logs.log import read_log
+from trunkline.recordings.logs.mcap_log import read_log
 from trunkline.recordings.logs.messages import JOINTS, POSES
 
 

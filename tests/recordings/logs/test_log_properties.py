@@ -18,7 +18,7 @@ from tests.support.sessions import curl_truth, instruments, record
 from trunkline.errors import InputError
 from trunkline.recordings.cleaning.checks import TrialLimits
 from trunkline.recordings.cleaning.loading import load_raw_trials
-from trunkline.recordings.logs.log import read_log
+from trunkline.recordings.logs.mcap_log import read_log
 from trunkline.recordings.logs.records import MAGIC
 from trunkline.recordings.session.session import read_session
 

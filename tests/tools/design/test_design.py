@@ -12,10 +12,10 @@ from tests.identification.test_stage import settings
 from tests.support.matched_plant import release, small_model, static_pull, tilt
 from tests.support.small_arm import small_spec
 from tests.support.workbench import workbench
+from trunkline.identification.diagnostics.identifiability import expected_identifiability, to_identify_from
 from trunkline.identification.fit.identify import with_parameters
 from trunkline.identification.parameters.parameters import PARAMETERS
 from trunkline.identification.parameters.per_session import make_room
-from trunkline.identification.uncertainty.identifiability import expected_identifiability, to_identify_from
 from trunkline.model.arm.joints import Joints, add_elements
 from trunkline.pipeline.config import load_folder
 from trunkline.recordings.session.session import read_session

@@ -14,14 +14,14 @@ from tests.support.matched_plant import curl, motion, release, small_model, stat
 from tests.support.small_arm import small_spec
 from tests.support.workbench import ROOT, workbench
 from trunkline.frames import STANDARD_GRAVITY, wxyz_from_rotation
-from trunkline.identification.fit.search import search
-from trunkline.identification.fit.setup import set_up
-from trunkline.identification.uncertainty.identifiability import (
+from trunkline.identification.diagnostics.identifiability import (
     described_lines,
     expected_identifiability,
     to_identify_from,
     unidentifiable,
 )
+from trunkline.identification.fit.search import search
+from trunkline.identification.fit.setup import set_up
 from trunkline.recordings.trials.inventory import missing_lines, recorded_lines
 from trunkline.recordings.trials.raw_trial import RawTrial
 from trunkline.recordings.trials.trial import Trial, write_trials

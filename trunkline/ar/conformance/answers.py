@@ -15,8 +15,8 @@ from trunkline.ar.teleop.reach import MapReach
 from trunkline.ar.teleop.settings import Teleop
 from trunkline.ar.teleop.targets import place
 from trunkline.kinematics.ik.inference import ask
-from trunkline.unity.package import NETWORK
 from trunkline.unity.unpacked import maps_of
+from trunkline.unity.upm_package import NETWORK
 
 PACKAGE = "a" * 64  # stands for the package's digest, which depends on the shared vectors
 DIGITS = 7  # after the point, of the network's answers: its numbers are of 32 bits

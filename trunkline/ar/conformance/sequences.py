@@ -40,7 +40,7 @@ def sequences(core: Teleoperation, joints: Joints, rigid: Vector, tip: Vector) -
     for name, script in scripts.items():
         recorder = Recorder(core, first_input, DT)
         script(recorder)
-        recorded[name] = [(dt, heard) for dt, heard, _ in recorder.steps]
+        recorded[name] = [(dt, message) for dt, message, _ in recorder.steps]
     return recorded
 
 

@@ -20,9 +20,9 @@ from trunkline.ar.teleop.messages import Input, Joints, to_json
 from trunkline.ar.teleop.settings import Teleop
 from trunkline.kinematics.panda.mounts import PandaRobot
 from trunkline.twin.package import MANIFEST, robot_of
+from trunkline.unity.assemble import sealed
 from trunkline.unity.manifest import Manifest
-from trunkline.unity.package import without_metas
-from trunkline.unity.twin import sealed
+from trunkline.unity.upm_package import without_metas
 
 FOLDER = "Tests/Vectors"
 STEPS = f"{FOLDER}/steps.json"
@@ -76,7 +76,7 @@ def steps_file(core: Teleoperation, recorded: dict[str, list[tuple[float, Input]
 def cases_file(answers: Answers, name: str, questions: list[Case]) -> bytes:
     """Questions that `answers` answers by this name, each with its answer."""
     answer = getattr(answers, name)
-    lines = (b'{"question":%b,"answer":%b}' % (_json(asked), _json(answer(**asked))) for asked in questions)
+    lines = (b'{"question":%b,"answer":%b}' % (_json(question), _json(answer(**question))) for question in questions)
     return b'{"cases":%b}\n' % _lines(lines)
 
 

@@ -11,7 +11,7 @@ from trunkline.ar.session.log_reader import LogReader, read_session_log, tip_pat
 from trunkline.ar.teleop.messages import Input, Intent, from_json
 from trunkline.errors import InputError
 from trunkline.recordings.logs.joint_stream import joint_stream
-from trunkline.recordings.logs.log import Log, read_log
+from trunkline.recordings.logs.mcap_log import Log, read_log
 
 
 class AxisSeries(NamedTuple):

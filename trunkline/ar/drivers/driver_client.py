@@ -20,16 +20,16 @@ from pydantic import Field
 
 from trunkline.ar.drivers.driver import CONNECTING
 from trunkline.ar.drivers.driver_frames import DriverState, FrameSocket, Setpoint
-from trunkline.ar.drivers.driver_process import AXES
+from trunkline.ar.drivers.panda_process import AXES
 from trunkline.errors import InputError
 
 ROOT = Path(__file__).parents[3]
-SILENT = 0.1  # s without a frame of the driver process
+DRIVER_TIMEOUT = 0.1  # s without a frame of the driver process
 CLOSING = 3.0  # s
 
 
 @dataclass(frozen=True)
-class ArmSettings:
+class PandaSettings:
     """python: the Python of the environment with the robot's library, "" for this one. address: of the robot. astray:
     rad that a joint may be from where it is sent."""
 
@@ -95,7 +95,7 @@ class DriverClient:
             if now > self._until:
                 self._fail(f"its adapter is not ready after {self._patience:.0f} s{self._at}")
             return
-        if (silent := now - self.state.time) > SILENT:
+        if (silent := now - self.state.time) > DRIVER_TIMEOUT:
             self._fail(f"its adapter is silent for {1e3 * silent:.0f} ms")
 
     def close(self) -> None:
@@ -108,7 +108,7 @@ class DriverClient:
             self.process.wait()
 
     def _hear(self) -> None:
-        for frame in self.line.heard():
+        for frame in self.line.received():
             state = DriverState.unpack(frame)
             if state.fault:
                 self._fail(state.fault)
@@ -129,15 +129,15 @@ class DriverClient:
         self.fault = self.fault or fault
 
 
-def panda(settings: ArmSettings, robot: str) -> DriverClient:
+def panda(settings: PandaSettings, robot: str) -> DriverClient:
     """A robot, "panda", "fr3" or "fake".
 
     Raises:
         InputError: its Python is not there.
     """
     python = settings.python or sys.executable
-    command = [python, "-m", "trunkline.ar.drivers.driver_process", robot, settings.address]
+    command = [python, "-m", "trunkline.ar.drivers.panda_process", robot, settings.address]
     try:
         return DriverClient(command, AXES, astray=settings.astray, at=f", expected {robot} at {settings.address}")
     except OSError as error:
-        raise InputError(f"arm.python: found {python} ({error.strerror}), expected a Python") from error
+        raise InputError(f"panda.python: found {python} ({error.strerror}), expected a Python") from error

@@ -1,6 +1,6 @@
 """Frames between the robot's process and a driver process, over a socket: of one size each way, little-endian.
 
-This, `driver_process`, `driver`, `setpoint_filter` and `realtime_priority` run in an environment of the robot's own
+This, `panda_process`, `driver`, `setpoint_filter` and `realtime_priority` run in an environment of the robot's own
 library: they import the standard library, numpy, each other and `trunkline.kinematics.panda` alone.
 """
 
@@ -66,21 +66,21 @@ class FrameSocket:
 
     def __init__(self, channel: socket.socket, size: int) -> None:
         self._socket, self._size, self.open = channel, size, True
-        self._heard = self._unsent = b""
+        self._buffer = self._unsent = b""
         channel.setblocking(False)
 
-    def heard(self) -> list[bytes]:
+    def received(self) -> list[bytes]:
         """The whole frames that came."""
         try:
             while self.open:
                 data = self._socket.recv(1 << 16)
-                self._heard, self.open = self._heard + data, bool(data)
+                self._buffer, self.open = self._buffer + data, bool(data)
         except BlockingIOError:
             pass
         except OSError:
             self.open = False
-        whole, size = len(self._heard) // self._size * self._size, self._size
-        data, self._heard = self._heard[:whole], self._heard[whole:]
+        whole, size = len(self._buffer) // self._size * self._size, self._size
+        data, self._buffer = self._buffer[:whole], self._buffer[whole:]
         return [data[n : n + size] for n in range(0, whole, size)]
 
     def send(self, frame: bytes) -> None:

@@ -22,8 +22,8 @@ SMOOTH = 10  # ticks of each of the smoother's means
 
 
 class HardwareRobot:
-    """Of an `arm`, whose axes are joints, and `motors`, whose axes are pulls, or one of them; the cables' commands (K,)
-    where the arm is straight are `straight`, m.
+    """Of a `panda`, whose axes are joints, and `motors`, whose axes are pulls, or one of them; the cables' commands
+    (K,) where the soft arm is straight are `straight`, m.
 
     To be begun, then moved every TICK s.
     """
@@ -32,21 +32,21 @@ class HardwareRobot:
 
     def __init__(
         self,
-        arm: Driver | None,
+        panda: Driver | None,
         motors: Driver | None,
         straight: np.ndarray,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._arm, self._motors, self._straight, self._clock = arm, motors, np.array(straight, dtype=float), clock
-        self._drivers = {name: driver for name, driver in (("robot", arm), ("motors", motors)) if driver is not None}
+        self._panda, self._motors, self._straight, self._clock = panda, motors, np.array(straight, dtype=float), clock
+        self._drivers = {name: driver for name, driver in (("robot", panda), ("motors", motors)) if driver is not None}
         self._smoother: Smoother | None = None
         self._due, self._anew = 0.0, False
 
     def begin(self, joints: np.ndarray, left: Callable[[], bool] = lambda: False) -> np.ndarray:
-        """Take hold of all there is, which waits: the arm is under control, and the cables are homed.
+        """Take hold of all there is, which waits: the Panda is under control, and the cables are homed.
 
         Args:
-            joints: where the twin's arm is where there is no real one, (7,), rad.
+            joints: where the twin's Panda is if there is no real one, (7,), rad.
             left: whether whoever wants it is gone.
 
         Returns:
@@ -61,7 +61,7 @@ class HardwareRobot:
                 driver.turn(self._clock())
         if self.fault or left():
             raise InputError(self.fault or "the session is gone")
-        joints = np.array(joints if self._arm is None else self._arm.sent)
+        joints = np.array(joints if self._panda is None else self._panda.sent)
         self._smoother = Smoother(np.append(joints, self._straight), SMOOTH)
         return joints
 
@@ -78,8 +78,8 @@ class HardwareRobot:
         self._anew = self._due < now  # the first, or one that is late by more than LEAD
         if self._anew:
             self._due = now + LEAD
-        if self._arm is not None:
-            self._arm.send(self._due, wanted[:JOINTS])
+        if self._panda is not None:
+            self._panda.send(self._due, wanted[:JOINTS])
         if self._motors is not None:
             self._motors.send(self._due, self._straight - wanted[JOINTS:])
         for driver in self._drivers.values():
@@ -92,14 +92,14 @@ class HardwareRobot:
         return 0.0 if self._anew else math.inf
 
     def measured(self) -> np.ndarray:
-        """The arm's joints, rad (7,); NaN without an arm."""
-        return np.full(JOINTS, np.nan) if self._arm is None else self._arm.measured
+        """The Panda's joints, rad (7,); NaN without one."""
+        return np.full(JOINTS, np.nan) if self._panda is None else self._panda.measured
 
     def lengths(self) -> np.ndarray:
         """Of the cables, m (K,), as the motors' encoders have them; NaN without motors."""
         return self._straight - (np.nan if self._motors is None else self._motors.measured)
 
     def close(self) -> None:
-        """Give back all there is: the motors are without current, the arm brakes."""
+        """Give back all there is: the motors are without current, the Panda brakes."""
         with ThreadPoolExecutor() as pool:  # each waits for its own
             list(pool.map(lambda driver: driver.close(), self._drivers.values()))

@@ -13,7 +13,7 @@ from pydantic import Field
 from trunkline.ar.drivers.gm6020 import FEEDBACK, Feedback
 from trunkline.ar.drivers.winch import Winch, WinchSettings
 
-SILENT = 0.02  # s without feedback of a motor
+FEEDBACK_TIMEOUT = 0.02  # s without feedback of a motor
 HOMING = 60.0  # s
 PRESENT = 1.0  # s within which each must be heard at first
 
@@ -82,7 +82,7 @@ class MotorGroup:
         """A, by the motor's number, at `now`, s, so that the cables follow `pulls` (K,), m, moving at `speeds` (K,),
         m/s; until all are homed, so that they become so."""
         currents = dict.fromkeys(self._settings.numbers, 0.0)
-        if not self._heard(now):
+        if not self._all_respond(now):
             return currents
         wanted = zip(self._by_number.items(), pulls, speeds, strict=True)
         homed = self.homed
@@ -98,14 +98,14 @@ class MotorGroup:
                 self._fail(f"motor {number}: {winch.fault}")
         return dict.fromkeys(currents, 0.0) if self.fault else currents
 
-    def _heard(self, now: float) -> bool:
+    def _all_respond(self, now: float) -> bool:
         """Whether each is heard, and none failed."""
         for number, winch in self._by_number.items():
-            if winch.heard is None:
+            if winch.last_feedback is None:
                 if now - self._begun > PRESENT:
                     self._fail(f"motor {number}: found no feedback, expected it under the id {FEEDBACK + number:#x}")
                 return False
-            if (silent := now - winch.heard) > SILENT:
+            if (silent := now - winch.last_feedback) > FEEDBACK_TIMEOUT:
                 self._fail(f"motor {number}: silent for {1e3 * silent:.0f} ms, expected feedback every 1 ms")
         return not self.fault
 

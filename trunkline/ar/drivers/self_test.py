@@ -18,10 +18,9 @@ import numpy as np
 from trunkline.ar.drivers.gm6020 import COUNTS, RATE
 from trunkline.ar.drivers.motors import MotorSettings
 from trunkline.ar.drivers.on_bus import BusMotors, SimulatedMotorsThread
-from trunkline.ar.drivers.settings import ExecutionConfig
+from trunkline.ar.drivers.settings import read_execution_config
 from trunkline.ar.drivers.simulated_motors import MotorParameters
 from trunkline.errors import InputError, in_one_line
-from trunkline.pipeline.config import PROJECT, load_folder
 
 DEPTH, SECONDS = 0.09, 2.0  # m and s of a pull
 LOST = 0.01
@@ -110,8 +109,8 @@ def measures(settings: MotorSettings) -> list[Row]:
 
         trial.turns.clear()
         rms, most = errors(trial, zeros)
-        asked, result = f"{1e3 * DEPTH:.0f} mm pull in {SECONDS:g} s, and its release", format_errors(rms, most)
-        rows.append((asked, "≤ 0.5 mm rms", result, rms <= 5e-4))
+        what, result = f"{1e3 * DEPTH:.0f} mm pull in {SECONDS:g} s, and its release", format_errors(rms, most)
+        rows.append((what, "≤ 0.5 mm rms", result, rms <= 5e-4))
         periods = np.diff(trial.turns)
         rate, late = 1 / periods.mean(), 1e3 * np.quantile(periods, (0.5, 0.99, 1.0))
         result = f"{rate:.0f} Hz; periods {late[0]:.2f} / {late[1]:.2f} / {late[2]:.2f} ms median, 99 %, most"
@@ -155,7 +154,7 @@ def silence(trial: MotorTrial, each: Callable[[], None]) -> float:
 
 def table(rows: list[Row]) -> str:
     """In Markdown."""
-    lines = [f"| {asked} | {wanted} | {result} | {'yes' if so else 'NO'} |" for asked, wanted, result, so in rows]
+    lines = [f"| {what} | {wanted} | {result} | {'yes' if so else 'NO'} |" for what, wanted, result, so in rows]
     return "\n".join(["| asked | wanted | found | |", "|---|---|---|---|", *lines])
 
 
@@ -164,7 +163,7 @@ def main(arguments: list[str]) -> int:
     if arguments:
         print((__doc__ or "").strip())
         return 0 if arguments in (["-h"], ["--help"]) else 2
-    rows = measures(load_folder(ExecutionConfig, PROJECT / "conf/execution").motors)
+    rows = measures(read_execution_config().motors)
     print(table(rows))
     return 0 if all(so for *_, so in rows) else 1
 

@@ -116,7 +116,7 @@ class SetpointFilter:
         joints = np.array(setpoint.axes)
         if not (math.isfinite(setpoint.due) and np.isfinite(joints).all()):
             self.brake("setpoint: found values that are not finite")
-        elif math.isinf(self._watchdog.heard) and (off := float(np.abs(joints - self.joints).max())) > NEAR:
+        elif math.isinf(self._watchdog.last_setpoint) and (off := float(np.abs(joints - self.joints).max())) > NEAR:
             self.brake(f"setpoint: starts {off:.3g} rad from where the robot is, expected at most {NEAR:g}")
         elif not self._queue or setpoint.due > self._queue[-1].due:
             self._queue.append(setpoint)
@@ -167,7 +167,7 @@ class SetpointFilter:
             queue.popleft()
         if len(queue) == 1:
             if self._clock > queue[0].due:
-                late = 1e3 * (now - self._watchdog.heard)
+                late = 1e3 * (now - self._watchdog.last_setpoint)
                 self.brake(f"setpoints have run out, the last came {late:.0f} ms ago")
                 return None
             return np.array(queue[0].axes)
@@ -190,8 +190,8 @@ class SetpointFilter:
             over = np.abs(rates) / (ROUNDING * most)
             if over.max() > 1:
                 joint = int(over.argmax())
-                asked = f"asks for {abs(rates[joint]):.3g} {unit}, expected at most {most[joint]:.3g}"
-                self.brake(f"setpoint: joint {joint + 1} {asked}")
+                demand = f"asks for {abs(rates[joint]):.3g} {unit}, expected at most {most[joint]:.3g}"
+                self.brake(f"setpoint: joint {joint + 1} {demand}")
                 return
         outside = np.maximum(limits.low - place, place - limits.high)
         if outside.max() > 0:

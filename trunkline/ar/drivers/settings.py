@@ -1,15 +1,31 @@
 """All settings of conf/execution/config.yaml."""
 
-from trunkline.ar.drivers.driver_client import ArmSettings
+from pathlib import Path
+
+from trunkline.ar.drivers.driver_client import PandaSettings
 from trunkline.ar.drivers.motors import MotorSettings
 from trunkline.ar.drivers.ros_settings import RosSettings
-from trunkline.settings import settings
+from trunkline.pipeline.config import PROJECT, compose_settings, validated
+from trunkline.settings import rename_keys, settings
+
+RENAMED = {"arm": "panda"}  # keys of the release before
 
 
 @settings
 class ExecutionConfig:
-    """Of real machines: the robot's `arm`, or a controller of `ros`, the tendons' `motors`."""
+    """Of real machines: the `panda` (or an FR3), or a controller of `ros`; the tendons' `motors`."""
 
-    arm: ArmSettings
+    panda: PandaSettings
     ros: RosSettings
     motors: MotorSettings
+
+
+def read_execution_config(folder: Path = PROJECT / "conf/execution") -> ExecutionConfig:
+    """The settings of a folder, also under the names of the release before.
+
+    Raises:
+        InputError: one line that names the folder and key, what was found and what was expected.
+    """
+    values = compose_settings(folder, {}, str(folder))
+    rename_keys(values, RENAMED, str(folder))
+    return validated(ExecutionConfig, values, folder)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from trunkline.ar.drivers.setpoint_filter import RobotLimits
-from trunkline.ar.teleop.executor import BRAKE, SimulatedRobot
+from trunkline.ar.teleop.executor import BRAKE, PlanFollower
 from trunkline.ar.teleop.following import Follower, Following
 from trunkline.ar.teleop.plan import Plan
 from trunkline.ar.teleop.trajectory import JOINTS, MotionLimits
@@ -16,8 +16,8 @@ LEAST = 0.3  # of them, whatever the plan itself accelerates there
 STRIDE = 0.005  # s between the places that a robot seeks as it follows; it goes evenly from one to the next
 
 
-class TimeScaledRobot(SimulatedRobot):
-    """A `SimulatedRobot` that keeps the limits of `robot`: no plan leaves its range, no stop its accelerations.
+class TimeScaledRobot(PlanFollower):
+    """A `PlanFollower` that keeps the limits of `robot`: no plan leaves its range, no stop its accelerations.
 
     Along the plan q(s), time slows as ds/dt = p. The joints accelerate by q'' p² + q' dp/dt, so
 

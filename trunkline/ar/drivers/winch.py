@@ -50,8 +50,8 @@ class Winch:
 
     Attributes:
         pull: m; before homing has ended, since the first reading. speed: m/s. tension: N, smoothed, of what the motor
-            says of its current; friction is in it. heard: s at which it was last read, None if never. homed: whether
-            zero is known. fault: why it cannot be homed.
+            says of its current; friction is in it. last_feedback: s at which it was last read, None if never. homed:
+            whether zero is known. fault: why it cannot be homed.
     """
 
     def __init__(self, settings: WinchSettings, side: int) -> None:
@@ -59,7 +59,7 @@ class Winch:
         omega, self._mass = 2 * math.pi * settings.crossover, settings.inertia / settings.radius**2
         self._gains = omega, 0.4 * omega**2, 0.08 * omega**3
         self.pull = self.speed = self.tension = 0.0
-        self.heard: float | None = None
+        self.last_feedback: float | None = None
         self.homed, self.fault = False, ""
         self._angle, self._integral, self._stepped = 0, 0.0, None
         self._goal, self._leg = 0.0, "in"  # of homing
@@ -67,15 +67,15 @@ class Winch:
 
     def read(self, feedback: Feedback, now: float) -> None:
         """What the motor says at `now`, s. Between two readings it turns by less than half a turn."""
-        if self.heard is not None:
+        if self.last_feedback is not None:
             counts = (feedback.angle - self._angle + COUNTS // 2) % COUNTS - COUNTS // 2
             moved = self._side * counts / COUNTS * 2 * math.pi * self._settings.radius
-            dt = now - self.heard
+            dt = now - self.last_feedback
             self.pull += moved
             self.speed += (moved - self.speed * dt) / max(SMOOTH, dt)
             force = self._side * feedback.current * TORQUE / self._settings.radius
             self.tension += (force - self.tension) * min(dt / SETTLED, 1.0)
-        self._angle, self.heard = feedback.angle, now
+        self._angle, self.last_feedback = feedback.angle, now
 
     def current(self, pull: float, speed: float, now: float) -> float:
         """A, so that the cable is at `pull`, m, and moves at `speed`, m/s."""

@@ -23,8 +23,8 @@ from trunkline.ar.hybrid.objects import GraspObject
 from trunkline.ar.hybrid.worlds import WorldGeometry
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
+from trunkline.kinematics.panda.maker_model import JOINTS
 from trunkline.kinematics.panda.mounts import Robot
-from trunkline.kinematics.panda.shipped import JOINTS
 from trunkline.model.arm.contact_geometry import add_touch
 
 # It comes as often as such a spec is compiled or saved; nothing else in the parts is called as anything in the arm.

@@ -26,7 +26,7 @@ from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.identification.parameters.parameters import candidate_fields, parameter_named
 from trunkline.identification.parameters.saving import ELEMENTS
-from trunkline.kinematics.panda.shipped import JOINTS
+from trunkline.kinematics.panda.maker_model import JOINTS
 from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.motion import batch_of, hold, move
 from trunkline.model.simulation.winch import Winches

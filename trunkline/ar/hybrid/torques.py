@@ -14,7 +14,7 @@ import numpy as np
 
 from trunkline.ar.hybrid.compose import panda_joints
 from trunkline.errors import InputError
-from trunkline.kinematics.panda.shipped import JOINTS
+from trunkline.kinematics.panda.maker_model import JOINTS
 
 
 def joint_torques(

@@ -28,7 +28,7 @@ from trunkline.model.simulation.rest import settle
 from trunkline.model.statics.chain import Chain, read_chain
 from trunkline.twin import package
 from trunkline.unity import unpacked
-from trunkline.unity.package import MODEL
+from trunkline.unity.upm_package import MODEL
 
 PACKAGES = Path("artifacts/package_unity")
 

@@ -70,7 +70,7 @@ class Broadcast:
         return state
 
 
-def piece(shown: PreviewPiece) -> bytes:
+def piece(frames: PreviewPiece) -> bytes:
     """Of a preview."""
-    flags = {"last"} if shown.last else set()
-    return binary.frame("preview", flags, shown.poses.shape[1], shown.first, shown.time, shown.poses)
+    flags = {"last"} if frames.last else set()
+    return binary.frame("preview", flags, frames.poses.shape[1], frames.first, frames.time, frames.poses)

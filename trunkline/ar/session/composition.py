@@ -25,7 +25,7 @@ from trunkline.ar.teleop.messages import Obstacle
 from trunkline.ar.teleop.rigid_ik import RigidIK
 from trunkline.ar.teleop.trajectory import limits_of
 from trunkline.ar.teleop.vectors import DOWN
-from trunkline.kinematics.panda.shipped import JOINTS
+from trunkline.kinematics.panda.maker_model import JOINTS
 from trunkline.model.arm_model import ArmModel
 from trunkline.unity import unpacked
 from trunkline.version import __version__

@@ -98,10 +98,10 @@ class SessionController:
         self.report: PlanReport | None = None
         self.pieces: list[PreviewPiece] = []
         self.intent: Intent | None = None
-        self._heard: deque[HandInput] = deque(maxlen=MOST_INPUTS)
+        self._inputs: deque[HandInput] = deque(maxlen=MOST_INPUTS)
         self._last, self._fresh = self._nobody, True
-        self._stop, self._fault, self._shown, self._since, self._believed = False, "", "", 0.0, ""
-        self._asked, self._ordered, self._started, self._ran = 0, False, "", False
+        self._stop, self._fault, self._shown_digest, self._since, self._believed = False, "", "", 0.0, ""
+        self._requested, self._ordered, self._started, self._ran = 0, False, "", False
         self._logged: tuple = ()
         self._follow = FollowControl(previewer.submit, robot.hear)
 
@@ -119,11 +119,11 @@ class SessionController:
 
     def hear(self, stamp: float, left: Controller, right: Controller) -> str:
         """An input of whom controls, `stamp` s by its own clock; why it does not count, "" where it does."""
-        last = self._heard[-1] if self._heard else self._last
+        last = self._inputs[-1] if self._inputs else self._last
         if stamp <= last.stamp and not self._fresh:
             return f"input: stamp {stamp:.6g} s is not after {last.stamp:.6g} s: heard before"
         self._fresh = False
-        self._heard.append(HandInput(stamp, left, right))
+        self._inputs.append(HandInput(stamp, left, right))
         return ""
 
     def stop(self) -> None:
@@ -135,7 +135,7 @@ class SessionController:
 
     def control(self, alignment: Pose | None, unfit: str = "") -> None:
         """Somebody else controls now, or nobody, who is aligned so."""
-        self._heard.clear()
+        self._inputs.clear()
         self._last, self._fresh = self._nobody, True
         self.align(alignment, unfit)
         self.robot.stop()
@@ -145,7 +145,7 @@ class SessionController:
         may."""
         self.alignment, self.unfit = alignment, unfit
 
-    def shown(self, digest: str, now: float) -> str:
+    def preview_shown(self, digest: str, now: float) -> str:
         """A preview has been shown to its end; why that does not count, "" where it does."""
         preview = self.preview
         expected = self.intent.preview if self.intent is not None else ""
@@ -157,7 +157,7 @@ class SessionController:
             return "shown: its preview is not simulated to its end yet"
         if now - self._since < preview.duration:
             return f"shown: its preview lasts {preview.duration:.2f} s, found {now - self._since:.2f} s"
-        self._shown = digest
+        self._shown_digest = digest
         self.log_writer.event("shown", digest=digest)
         return ""
 
@@ -169,13 +169,13 @@ class SessionController:
     def answered(self, answer: Answer | None, now: float) -> bool:
         """An answer of the previewer, None if it has ended; whether it is of the plan that is wanted."""
         if answer is None:
-            self.report = PlanReport(self._asked, refused="the process that plans has ended")
+            self.report = PlanReport(self._requested, refused="the process that plans has ended")
             return False
         if isinstance(answer, FollowAnswer):
             self._follow.answer(answer)
             return False
         serial = answer.report.serial if isinstance(answer, PlanAnswer) else answer.serial
-        if serial != self._asked:
+        if serial != self._requested:
             return False
         if isinstance(answer, PlanAnswer):
             if self._started:  # its preview breaks off, but it runs already
@@ -202,17 +202,17 @@ class SessionController:
         if self.state.mode in ("hold", "aim"):
             self._believe(robot_state, executor)
         joints: Joints = tuple(float(q) for q in robot_state.joints)  # type: ignore[assignment]
-        steps = list(self._heard) or [self._last]
-        self._heard.clear()
-        for heard in steps:
+        steps = list(self._inputs) or [self._last]
+        self._inputs.clear()
+        for hands in steps:
             executor = ExecutorReport("fault", "", self._fault) if self._fault else executor
             offer = self.foreseen.offer if self.foreseen is not None else None
-            left, right = heard.left, heard.right
+            left, right = hands.left, hands.right
             if self._stop:
                 left, self._stop = replace(left, secondary=True), False
             core_input = Input(
-                heard.stamp, left, right, self.alignment, joints, self.world, self.core.package, self.report,
-                self._shown, executor, offer,
+                hands.stamp, left, right, self.alignment, joints, self.world, self.core.package, self.report,
+                self._shown_digest, executor, offer,
             )  # fmt: skip
             self.state, intent = self.core.step(self.state, core_input, dt / len(steps))
             self._ask(intent, robot_state)
@@ -266,9 +266,9 @@ class SessionController:
 
     def _ask(self, intent: Intent, robot_state: RobotState) -> None:
         request = intent.request
-        if request is not None and request.serial != self._asked:
-            self._asked, self.report, self.plan, self.preview = request.serial, None, None, None
-            self.foreseen, self.pieces, self._shown = None, [], ""
+        if request is not None and request.serial != self._requested:
+            self._requested, self.report, self.plan, self.preview = request.serial, None, None, None
+            self.foreseen, self.pieces, self._shown_digest = None, [], ""
             self._ordered = True
             self.log_writer.event("request", request=request)
             here = robot_state.joints, robot_state.commands, robot_state.hangs

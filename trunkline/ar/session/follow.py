@@ -10,7 +10,7 @@ from trunkline.ar.teleop.messages import Targets, World
 from trunkline.ar.teleop.targets import why_not
 from trunkline.ar.teleop.trajectory import JOINTS
 
-SILENT = 1.0  # s; a busy machine answers within 0.5
+PLANNER_TIMEOUT = 1.0  # s without an answer of the process that plans; a busy machine answers within 0.5
 ROUNDING = 1e-6  # s, of a sum of ticks
 
 
@@ -37,7 +37,7 @@ class FollowControl:
         """Why the robot must not go on following, "" where it may: a process that plans and comes back after a while
         would send it to where the targets are by then."""
         silent = self._now - min(self._times.values(), default=self._now)
-        return f"the process that plans has not answered for {silent:.2f} s" if silent > SILENT else ""
+        return f"the process that plans has not answered for {silent:.2f} s" if silent > PLANNER_TIMEOUT else ""
 
     def advance(self, dt: float) -> None:
         """Let `dt` s pass."""

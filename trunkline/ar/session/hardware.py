@@ -1,17 +1,20 @@
 """What of a session's robot is real: nothing, unless it is named."""
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trunkline.ar.drivers.driver_client import ArmSettings
+from trunkline.ar.drivers.driver_client import PandaSettings
 from trunkline.ar.drivers.motors import MotorSettings
 from trunkline.ar.drivers.ros_settings import RosSettings
 from trunkline.ar.drivers.setpoint_filter import LIMITS, RobotLimits
-from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.ar.drivers.simulated_motors import SIMULATED
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.errors import InputError
+
+if TYPE_CHECKING:
+    from trunkline.ar.drivers.settings import ExecutionConfig  # composes settings, which no robot's process does
 
 ROBOTS = ("simulated", "panda", "fr3", "ros2")
 MOTORS = ("simulated", "gm6020")
@@ -24,7 +27,7 @@ class Hardware:
     `SIMULATED` for simulated ones. interface: of python-can."""
 
     robot: str
-    arm: ArmSettings
+    panda: PandaSettings
     ros: RosSettings
     bus: str
     interface: str
@@ -56,14 +59,14 @@ class Hardware:
 
     def words(self) -> str:
         """What will move."""
-        where = self.ros.trajectory if self.robot == "ros2" else self.arm.address
+        where = self.ros.trajectory if self.robot == "ros2" else self.panda.address
         robot = f"the robot {self.robot} at {where}" if self.robot else "no real robot"
         numbers = ", ".join(map(str, self.motors.numbers))
         motors = f"motors {numbers} on the bus {self.bus}" if self.real_motors else "no real motors"
         return f"{robot}, {motors}"
 
 
-def hardware_of(robot: str, motors: str, bus: str, interface: str, config: ExecutionConfig) -> Hardware | None:
+def hardware_of(robot: str, motors: str, bus: str, interface: str, config: "ExecutionConfig") -> Hardware | None:
     """What the options name; None where all is simulated. interface: of python-can, "" for the usual one.
 
     Raises:
@@ -74,4 +77,4 @@ def hardware_of(robot: str, motors: str, bus: str, interface: str, config: Execu
     if robot == "simulated" and not bus:
         return None
     interface = interface or ("virtual" if bus == SIMULATED else "socketcan")
-    return Hardware("" if robot == "simulated" else robot, config.arm, config.ros, bus, interface, config.motors)
+    return Hardware("" if robot == "simulated" else robot, config.panda, config.ros, bus, interface, config.motors)

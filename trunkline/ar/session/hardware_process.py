@@ -17,8 +17,8 @@ from threadpoolctl import threadpool_limits
 
 from trunkline.ar.drivers.driver import Driver
 from trunkline.ar.drivers.driver_client import panda
-from trunkline.ar.drivers.driver_host import start_driver
 from trunkline.ar.drivers.hardware_robot import HardwareRobot
+from trunkline.ar.drivers.local_driver_process import start_driver
 from trunkline.ar.drivers.motors import MotorsOnBus
 from trunkline.ar.drivers.realtime_priority import raise_priority
 from trunkline.ar.drivers.time_scaling import TimeScaledRobot
@@ -30,7 +30,7 @@ from trunkline.ar.teleop.messages import ExecutorReport
 from trunkline.ar.teleop.trajectory import MotionLimits
 from trunkline.compute.processes import end_with_parent, leave_signals_to_parent, parent_pid
 from trunkline.errors import InputError
-from trunkline.kinematics.panda.shipped import JOINTS
+from trunkline.kinematics.panda.maker_model import JOINTS
 
 DELAY, MEAN = 0.15, 0.1  # s that the twin is behind the machine, and over which it takes the mean of what it hears
 RESTS, STILL, LEAST = 2.0, 2e-4, 1e-9  # s in which no pose (m) and no axis (rad, m) changes by more: the twin rests
@@ -109,8 +109,8 @@ def run(channel: RobotChannel, hardware: Hardware, begins: Beginning) -> None:
     threadpool_limits(1)
     machine = None
     try:
-        arm = arm_of(hardware)
-        machine = HardwarePlant(arm, motors_of(hardware), begins.commands)
+        panda_driver = panda_of(hardware)
+        machine = HardwarePlant(panda_driver, motors_of(hardware), begins.commands)
         joints = machine.begin(begins.joints, lambda: os.getppid() != parent)
         moved = machine
         robot = TimeScaledRobot(
@@ -127,11 +127,11 @@ def run(channel: RobotChannel, hardware: Hardware, begins: Beginning) -> None:
             machine.close()
 
 
-def arm_of(hardware: Hardware) -> Driver | None:
+def panda_of(hardware: Hardware) -> Driver | None:
     """The robot, None where none is named."""
     if hardware.robot == "ros2":
         return start_driver(hardware.ros)
-    return panda(hardware.arm, hardware.robot) if hardware.robot else None
+    return panda(hardware.panda, hardware.robot) if hardware.robot else None
 
 
 def motors_of(hardware: Hardware) -> Driver | None:

@@ -1,22 +1,22 @@
 """Who controls: one does, all watch. The rules, without clock and sockets.
 
-The lease is asked for, released and given away. It ends after SILENCE s without a sound input, or when its holder
+The lease is asked for, released and given away. It ends after LEASE_TIMEOUT s without a sound input, or when its holder
 leaves; then the first who asked has it. It never comes back by itself. The stop does not ask for it.
 """
 
 from dataclasses import dataclass, field
 
-SILENCE = 1.0  # s
+LEASE_TIMEOUT = 1.0  # s without a sound input
 
 
 @dataclass
 class ControlLease:
-    """`holder`: a client's id, "" for nobody. `asking`: who wants it, in their order. `heard`: s of the last input, or
-    of when the lease began."""
+    """`holder`: a client's id, "" for nobody. `asking`: who wants it, in their order. `last_input`: s at which the last
+    input came, or the lease began."""
 
     holder: str = ""
     asking: list[str] = field(default_factory=list)
-    heard: float = 0.0
+    last_input: float = 0.0
 
     def ask(self, client: str, now: float) -> bool:
         """Whether `client` has it now; else it waits."""
@@ -47,16 +47,16 @@ class ControlLease:
         """Whether an input of `client` counts."""
         if not client or client != self.holder:
             return False
-        self.heard = now
+        self.last_input = now
         return True
 
     def silent(self, now: float) -> bool:
         """Let time pass; whether the lease ended by its holder's silence."""
-        if not self.holder or now - self.heard <= SILENCE:
+        if not self.holder or now - self.last_input <= LEASE_TIMEOUT:
             return False
         return self.release(self.holder, now)
 
     def _take(self, client: str, now: float) -> None:
-        self.holder, self.heard = client, now
+        self.holder, self.last_input = client, now
         if client in self.asking:
             self.asking.remove(client)

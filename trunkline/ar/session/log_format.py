@@ -164,8 +164,8 @@ def run(
 
 def write(log: LogFormat, pipe, written, period: float) -> None:
     """All that comes, on the disk every `period` s."""
-    due, heard = time.monotonic() + period, 0
-    written.value = heard
+    due, received = time.monotonic() + period, 0
+    written.value = received
     while True:
         if pipe.poll(max(due - time.monotonic(), 0.0)):
             try:
@@ -174,8 +174,8 @@ def write(log: LogFormat, pipe, written, period: float) -> None:
                 return
             for record in records:
                 log.write(record)
-            heard += 1
+            received += 1
         if time.monotonic() >= due:
             log.flush()
-            written.value = heard
+            written.value = received
             due = time.monotonic() + period

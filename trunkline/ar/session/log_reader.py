@@ -12,7 +12,7 @@ from trunkline.ar.session.log_format import EVENTS, INPUT, INTENT, JOINTS, POSES
 from trunkline.errors import InputError
 from trunkline.recordings.logs.cdr import HEADER
 from trunkline.recordings.logs.joint_stream import JointStream, joint_stream
-from trunkline.recordings.logs.log import Log, read_log
+from trunkline.recordings.logs.mcap_log import Log, read_log
 from trunkline.recordings.logs.pose_stream import PoseStream, pose_stream
 
 INPUT_KEY = b',"given":'
@@ -88,10 +88,10 @@ def read_session_log(path: Path) -> LogReader:
 def _steps(log: Log) -> list[LogStep]:
     """A last input whose intent was lost is left out."""
     steps, since = [], None
-    for (heard, logged), (intent, _) in zip(_texts(log, INPUT), _texts(log, INTENT), strict=False):
-        before, there, input = heard.partition(INPUT_KEY)
+    for (text, logged), (intent, _) in zip(_texts(log, INPUT), _texts(log, INTENT), strict=False):
+        before, there, input = text.partition(INPUT_KEY)
         if not there:
-            raise ValueError(f"{INPUT}: found no input in {heard[:40]!r}")
+            raise ValueError(f"{INPUT}: found no input in {text[:40]!r}")
         since = logged if since is None else since
         steps.append(LogStep(1e-9 * (logged - since), float(before.removeprefix(b'{"dt":')), input[:-1], intent))
     return steps

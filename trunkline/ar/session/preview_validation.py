@@ -21,7 +21,7 @@ from trunkline.ar.session.log_format import SIMULATED, WRIST
 from trunkline.ar.session.log_reader import LogReader, read_session_log, tip_path
 from trunkline.errors import in_one_line
 from trunkline.kinematics.panda.kinematics import FLANGE, mount_pose
-from trunkline.kinematics.panda.shipped import JOINTS
+from trunkline.kinematics.panda.maker_model import JOINTS
 
 LATEST = 0.25  # s that a robot may need to begin
 FEWEST = 5  # poses of a path that is compared
@@ -63,9 +63,9 @@ def executions(log: LogReader) -> Iterator[Execution]:
         digest, since = event["digest"], event["time"]
         later = [other for other in events[index + 1 :]]
         end, until = _end(later, digest, float(times[-1]) if len(times) else since)
-        preview, shown = _preview(events[:index], digest, rows, place)
+        frame_times, preview = _preview(events[:index], digest, rows, place)
         done = end == "done"
-        seconds, median, worst, delay, last = _compared(times - since, path, preview, shown, until - since, done)
+        seconds, median, worst, delay, last = _compared(times - since, path, frame_times, preview, until - since, done)
         prediction = next((e["foreseen"] for e in reversed(events[:index]) if _is_of(e, "foreseen", digest)), None)
         within = None
         if visible and prediction is not None and last is not None and prediction["spread"]:
@@ -130,25 +130,25 @@ def _end(later: list[dict], digest: str, last: float) -> tuple[str, float]:
 
 
 def _compared(
-    times: np.ndarray, tips: np.ndarray, shown: np.ndarray, path: np.ndarray, until: float, done: bool
+    times: np.ndarray, tips: np.ndarray, frame_times: np.ndarray, path: np.ndarray, until: float, done: bool
 ) -> tuple[float, float, float, float, np.ndarray | None]:
     """s compared, median and largest distance, delay, and where the tip was at the preview's end, if it came there."""
-    if len(shown) < FEWEST:
+    if len(frame_times) < FEWEST:
         return 0.0, np.nan, np.nan, np.nan, None
 
     def away(delay: float) -> np.ndarray:
-        rows = (times - delay >= shown[0]) & (times - delay <= shown[-1]) & (times <= until)
-        foreseen = np.stack([np.interp(times[rows] - delay, shown, axis) for axis in path.T], axis=1)
+        rows = (times - delay >= frame_times[0]) & (times - delay <= frame_times[-1]) & (times <= until)
+        foreseen = np.stack([np.interp(times[rows] - delay, frame_times, axis) for axis in path.T], axis=1)
         return np.linalg.norm(tips[rows] - foreseen, axis=1)
 
     if len(away(0.0)) < FEWEST or len(away(LATEST)) < FEWEST:
         return 0.0, np.nan, np.nan, np.nan, None
     fit = minimize_scalar(lambda delay: float(np.mean(away(delay) ** 2)), bounds=(0.0, LATEST), method="bounded")
     far, delay = away(float(fit.x)), float(fit.x)
-    seconds = min(until, float(times[-1])) - delay - float(shown[0])
-    arrived = done and times[-1] >= shown[-1] and until >= shown[-1]
-    last = tips[np.searchsorted(times, shown[-1])] if arrived else None
-    return min(seconds, float(shown[-1] - shown[0])), float(np.median(far)), float(far.max()), delay, last
+    seconds = min(until, float(times[-1])) - delay - float(frame_times[0])
+    arrived = done and times[-1] >= frame_times[-1] and until >= frame_times[-1]
+    last = tips[np.searchsorted(times, frame_times[-1])] if arrived else None
+    return min(seconds, float(frame_times[-1] - frame_times[0])), float(np.median(far)), float(far.max()), delay, last
 
 
 def _grasped(before: list[dict], later: list[dict]) -> bool:

@@ -175,7 +175,7 @@ class PreviewPlanner:
         yield PreviewBegun(serial, messages.PreviewMessage(digest, step, way.duration, step, phases))
         go_on()
         if self.bodies:
-            yield from self._shown(serial, twin(), way, go_on)
+            yield from self._pieces_of(serial, twin(), way, go_on)
         else:
             yield PreviewPiece(serial, 0, 0.0, np.empty((0, 0, 7), dtype=np.float32), True)
         for prediction in self._foreseen(order, plan, twin, way, go_on):
@@ -202,7 +202,7 @@ class PreviewPlanner:
         self._composed = (world.obstacles, object), twin
         return twin
 
-    def _shown(
+    def _pieces_of(
         self, serial: int, twin: ComposedTwin, way: CommandTrajectory, go_on: Callable[[], None]
     ) -> Iterator[Answer]:
         poses, first, piece_answer = BodyPoses(twin.model, self.bodies), 0, None
@@ -289,8 +289,8 @@ def prediction_message(digest: str, prediction: PlanPrediction) -> messages.Pred
 def _beside(order: Order) -> WorldObject | None:
     """What the twin may touch: one object, the one that is meant, else any; none that the arm holds."""
     objects = [object for object in order.world.objects if object.support != "held"]
-    meant = [object for object in objects if object.name == order.request.targets.object]
-    return (meant or objects or [None])[0]
+    targeted = [object for object in objects if object.name == order.request.targets.object]
+    return (targeted or objects or [None])[0]
 
 
 def _held_object(order: Order) -> WorldObject | None:

@@ -16,7 +16,7 @@ from multiprocessing.context import SpawnContext
 
 import numpy as np
 
-from trunkline.ar.teleop.executor import FOLLOWS, SimulatedRobot
+from trunkline.ar.teleop.executor import FOLLOWS, PlanFollower
 from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.messages import ExecutorReport
 from trunkline.ar.teleop.plan import Plan
@@ -42,18 +42,19 @@ def next_report_time(due: float, reported: float) -> float:
 
 
 class RobotChannel:
-    """What both processes share. One writes `told` whole, with a number that is odd meanwhile; the other, `asked`."""
+    """What both processes share. The robot's writes its numbers whole, with a count that is odd meanwhile; the other
+    writes `requests`."""
 
     def __init__(self, context: SpawnContext, tendons: int, bodies: int) -> None:
         self.tendons, self.bodies = tendons, bodies
         self.size = 5 + 2 * (JOINTS + tendons) + POSE * (1 + bodies)
         self._numbers, self._number = context.RawArray(ctypes.c_double, self.size), context.RawValue(ctypes.c_uint64, 0)
-        self._asked, self._fault = context.RawArray(ctypes.c_double, 3), context.RawArray(ctypes.c_char, TEXT)
+        self._requests, self._fault = context.RawArray(ctypes.c_double, 3), context.RawArray(ctypes.c_char, TEXT)
         self.plans, self.wake = context.Queue(), context.Semaphore(0)
 
     @property
-    def asked(self) -> np.ndarray:
-        return np.ctypeslib.as_array(self._asked)
+    def requests(self) -> np.ndarray:
+        return np.ctypeslib.as_array(self._requests)
 
     def tell(self, numbers: np.ndarray, fault: str) -> None:
         """Of the robot's process."""
@@ -142,7 +143,7 @@ class RobotProcess:
 
     def check(self, plan: Plan) -> str:
         now = self.robot_state()
-        return SimulatedRobot(now.joints, now.commands, self._limits, self._package).check(plan)
+        return PlanFollower(now.joints, now.commands, self._limits, self._package).check(plan)
 
     def start(self, plan: Plan, digest: str) -> str:
         """As `Executor.start`; what the robot's process finds besides is in its state."""
@@ -164,24 +165,25 @@ class RobotProcess:
 
     def hear(self, age: float, axes: np.ndarray | None) -> None:
         """What targets asked for `age` s ago, (7 + K,); None for the last ones still."""
-        self.channel.plans.put((self._serial, FOLLOWS, Goal(time.monotonic() - age, axes), self.channel.asked[STOPS]))
+        goal = Goal(time.monotonic() - age, axes)
+        self.channel.plans.put((self._serial, FOLLOWS, goal, self.channel.requests[STOPS]))
         self.channel.wake.release()
 
-    def _begin(self, asked: Plan | Following, digest: str) -> None:
+    def _begin(self, motion: Plan | Following, digest: str) -> None:
         self._serial, self._digest, self._begun = self._serial + 1, digest, time.monotonic()
         self.permit()
-        self.channel.plans.put((self._serial, digest, asked, self.channel.asked[STOPS]))
+        self.channel.plans.put((self._serial, digest, motion, self.channel.requests[STOPS]))
         self.channel.wake.release()
 
     def permit(self) -> None:
         """The robot may go on with what was started last, for another DEAD_MAN s."""
-        asked = self.channel.asked
-        asked[PERMIT], asked[PERMITTED] = time.monotonic(), self._serial
+        requests = self.channel.requests
+        requests[PERMIT], requests[PERMITTED] = time.monotonic(), self._serial
 
     def stop(self) -> None:
-        asked = self.channel.asked
-        asked[PERMITTED] = 0
-        asked[STOPS] += 1
+        requests = self.channel.requests
+        requests[PERMITTED] = 0
+        requests[STOPS] += 1
         self.channel.wake.release()
 
     def state(self) -> ExecutorReport:

@@ -183,8 +183,8 @@ class Server:
             say(messages.tell(controller.state_message(self.lease.holder)))
             if controller.preview is not None and controller.intent.mode in PREVIEWED:
                 say(messages.tell(controller.preview))
-                for shown in controller.pieces:
-                    client.outbox.piece(piece(shown))
+                for frames in controller.pieces:
+                    client.outbox.piece(piece(frames))
         if controller.foreseen is not None:
             say(messages.tell(controller.foreseen))
         if self.broadcast.shell:
@@ -282,7 +282,7 @@ class Server:
             self._align(client, message)
         elif isinstance(message, messages.PreviewShown):
             reason = "shown: you do not control" if client.id != self.lease.holder else ""
-            if reason := reason or self.controller.shown(message.digest, now):
+            if reason := reason or self.controller.preview_shown(message.digest, now):
                 self._refuse(client, reason)
         else:
             self._refuse(client, "hello: was said before")

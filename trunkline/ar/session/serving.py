@@ -15,7 +15,7 @@ from pathlib import Path
 
 from aiohttp import web
 
-from trunkline.ar.drivers.settings import ExecutionConfig as Execution
+from trunkline.ar.drivers.settings import read_execution_config
 from trunkline.ar.session.anchors import Anchors
 from trunkline.ar.session.auth import CODE_SECONDS, Origins, make_token
 from trunkline.ar.session.composition import SessionParts, make
@@ -139,10 +139,8 @@ async def serve(options: argparse.Namespace, names: list[str], context: ssl.SSLC
         if signal.getsignal(number) is not signal.SIG_IGN:  # `nohup` has it ignored
             asyncio.get_running_loop().add_signal_handler(number, task.cancel)
     log = functools.partial(print, flush=True)
-    hardware = hardware_of(
-        options.robot, options.motors, options.bus, options.interface,
-        load_folder(Execution, PROJECT / "conf/execution"),
-    )  # fmt: skip
+    execution = read_execution_config()
+    hardware = hardware_of(options.robot, options.motors, options.bus, options.interface, execution)
     if hardware is not None and hardware.real:
         log(f"REAL: {hardware.words()}. Nobody has tried this on real ones yet (docs/hardware.md).")
         if hardware.real_motors:

@@ -23,12 +23,12 @@ from trunkline.ar.hybrid.rollouts import ComposedTwin
 from trunkline.ar.hybrid.torques import servo_commands
 from trunkline.ar.session.bodies import BodyPoses
 from trunkline.ar.session.robot_process import DEAD_MAN, MODES, PERMIT, PERMITTED, STOPS, TELLS, Goal, RobotChannel
-from trunkline.ar.teleop.executor import FOLLOWS, SimulatedRobot
+from trunkline.ar.teleop.executor import FOLLOWS, PlanFollower
 from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.plan import Plan
 from trunkline.ar.teleop.trajectory import MotionLimits
 from trunkline.compute.processes import leave_signals_to_parent, parent_pid
-from trunkline.kinematics.panda.shipped import JOINTS
+from trunkline.kinematics.panda.maker_model import JOINTS
 from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.capstan import REFRESH, capstan_friction_of
 from trunkline.model.simulation.motion import batch_of, hold
@@ -152,10 +152,10 @@ class MovingPlant(Protocol):
 class Loop:
     """Plans in, motion out; what the process does at each turn. `robot` moves the `plant`."""
 
-    def __init__(self, channel: RobotChannel, robot: SimulatedRobot, plant: MovingPlant) -> None:
+    def __init__(self, channel: RobotChannel, robot: PlanFollower, plant: MovingPlant) -> None:
         self.channel, self.robot, self.plant = channel, robot, plant
         self.serial, self.fault, self.hold_time = 0, "", 0.0
-        self._stops, self._holds, self._listens = channel.asked[STOPS], False, 0.0
+        self._stops, self._holds, self._listens = channel.requests[STOPS], False, 0.0
 
     @property
     def moves(self) -> bool:
@@ -164,12 +164,12 @@ class Loop:
 
     def turn(self, now: float, woken: bool = True) -> None:
         """Obey what was asked since; plans are looked for where it was `woken` of late."""
-        asked = self.channel.asked
-        stopped = asked[STOPS] != self._stops
-        permitted = asked[PERMITTED] == self.serial and now - asked[PERMIT] <= DEAD_MAN
+        requests = self.channel.requests
+        stopped = requests[STOPS] != self._stops
+        permitted = requests[PERMITTED] == self.serial and now - requests[PERMIT] <= DEAD_MAN
         holds = stopped or (self.moves and not permitted)
         if holds:
-            self._stops = asked[STOPS]
+            self._stops = requests[STOPS]
             self.robot.stop()
         if stopped or (holds and not self._holds):
             self.hold_time = now
@@ -198,23 +198,23 @@ class Loop:
 
     def _hear(self, now: float) -> None:
         try:
-            serial, digest, asked, stops = self.channel.plans.get_nowait()
+            serial, digest, motion, stops = self.channel.plans.get_nowait()
         except Empty:
             return
-        if isinstance(asked, Goal):
+        if isinstance(motion, Goal):
             if serial == self.serial:
-                self.robot.hear(now - asked.time, asked.axes)
+                self.robot.hear(now - motion.time, motion.axes)
             return
         self.serial = serial
-        overtaken = "a stop came before it began" if stops != self.channel.asked[STOPS] else ""
-        self.fault = overtaken or self.plant.fault or self._begin(asked, digest)
+        overtaken = "a stop came before it began" if stops != self.channel.requests[STOPS] else ""
+        self.fault = overtaken or self.plant.fault or self._begin(motion, digest)
 
-    def _begin(self, asked: Plan | Following, digest: str) -> str:
+    def _begin(self, motion: Plan | Following, digest: str) -> str:
         """Why it does not begin, "" where it does."""
         robot = self.robot
-        if isinstance(asked, Plan):
-            return robot.start(asked, digest)
-        return robot.follow(asked, self.plant.tick)
+        if isinstance(motion, Plan):
+            return robot.start(motion, digest)
+        return robot.follow(motion, self.plant.tick)
 
 
 def drive(loop: Loop, parent: int, behind: Callable[[], float] = lambda: BEHIND) -> None:
@@ -248,7 +248,7 @@ def run(channel: RobotChannel, simulation: Simulation) -> None:
     threadpool_limits(1)
     parent = parent_pid()
     plant = TwinPlant(simulation)
-    robot = SimulatedRobot(
+    robot = PlanFollower(
         simulation.joints, simulation.commands, simulation.limits, simulation.package,
         lambda joints, commands, _: plant.move(joints, commands, robot.state().digest != FOLLOWS),
     )  # fmt: skip

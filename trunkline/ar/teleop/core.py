@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 from trunkline.ar.teleop.alignment import Aligned, wrist_of
 from trunkline.ar.teleop.events import Ends, detect_events, looked_back, stopped_by
-from trunkline.ar.teleop.headset_loss import silence_fault
+from trunkline.ar.teleop.headset_silence import silence_fault
 from trunkline.ar.teleop.input_validation import clock_fault, fault_of, setting_fault, swapped
 from trunkline.ar.teleop.messages import Input, Intent, Motion, Pose, Request, Targets
 from trunkline.ar.teleop.reach import Reach
@@ -47,7 +47,7 @@ class Teleoperation:
         Args:
             dt: s since the step before, of the caller's clock; stamps are of the client's.
         """
-        state, lost, unheard = self._heard(state, message, dt)
+        state, lost, unheard = self._hands_after(state, message, dt)
         alignment = message.alignment
         if unheard and state.mode not in WATCHING:
             lost = lost or unheard
@@ -69,7 +69,7 @@ class Teleoperation:
         state, intent = self._after(state, message, events, notice, targets, dt, ends)
         return state, replace(intent, notice=unheard or intent.notice)
 
-    def _heard(self, state: TeleoperationState, message: Input, dt: float) -> tuple[TeleoperationState, str, str]:
+    def _hands_after(self, state: TeleoperationState, message: Input, dt: float) -> tuple[TeleoperationState, str, str]:
         """Both hands after this input; why nothing of it can be trusted; and who is not heard. Either is "" where
         nothing is wrong, and else the robot must hold."""
         same = message.stamp == state.stamp
@@ -174,7 +174,7 @@ class Teleoperation:
             running=mode == "execute" and (state.running or message.executor.mode == "running"),
         )
         if event == "ask":
-            state = self._asked(state, message)
+            state = self._request_plan(state, message)
             assert state.pinned is not None
             targets = state.pinned.request.targets
         elif event == "planned":
@@ -194,7 +194,7 @@ class Teleoperation:
             state = replace(state, following=state.following if why_not(wanted) else wanted)
         return state, self._intent(state, targets, ends)
 
-    def _asked(self, state: TeleoperationState, message: Input) -> TeleoperationState:
+    def _request_plan(self, state: TeleoperationState, message: Input) -> TeleoperationState:
         """Everything pinned to what the plan is asked for; both hands' targets are those of before the press."""
         wanted = looked_back(state, self.settings)
         assert wanted is not None

@@ -1,4 +1,4 @@
-"""What executes plans: four calls that a simulated and a real robot answer alike."""
+"""What executes plans: four calls that every robot answers alike, simulated or real."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -22,7 +22,11 @@ class Executor(Protocol):
     """A robot. Nothing but `start` moves it; `stop` may be called at any time, also twice."""
 
     def check(self, plan: Plan) -> str:
-        """Why the robot will not run `plan`, in one line; "" where it would."""
+        """Why the robot will not run `plan`, in one line; "" where it would.
+
+        It is the second gate before a start. The first is the planner's (`ar/teleop/plan_checks.py`), which knows
+        the obstacles; this one trusts no planner, and knows where the robot is now.
+        """
         ...
 
     def start(self, plan: Plan, digest: str) -> str:
@@ -38,9 +42,12 @@ class Executor(Protocol):
         ...
 
 
-class SimulatedRobot:
-    """A robot that is where its plan says, or a model that the caller moves: `move(joints, commands, dt)` is called
-    with what the axes shall be, at every `advance`.
+class PlanFollower:
+    """Setpoints along a plan, or after targets: an `Executor` whose time passes by `advance`, for simulated robots and,
+    as `TimeScaledRobot`, for real ones.
+
+    At every `advance`, `move(joints, commands, dt)` is called with what the axes shall be: rad (7,), m (K,), s. Without
+    `move`, the robot is where its plan says.
 
     A stop slows time down along the plan, to 0 within BRAKE s, so that it ends on the way that was checked. A robot
     that follows has no such way: it brakes as hard as its limits allow.

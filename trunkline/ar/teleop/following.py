@@ -7,8 +7,8 @@ What the targets ask for is heard at once and done `delay` s later, so that the 
 with g the axes that the targets of time s ask for. A mean about its own middle does not lag, and one over a period of
 a swing leaves nothing of it. Ruckig takes the axes there, with the velocity of x; so the first way, to where following
 begins, is as quick as the limits allow. That is meant: with a mean of it, too, the stand-in's tip stayed further from
-the twin's; an arm that comes slowly keeps more of its cables' friction (`studies.approach`). Without targets, or where
-they are refused, the last that were not hold: the robot comes to rest there.
+the twin's; an arm that comes slowly keeps more of its cables' friction (docs/results/approach.md). Without targets, or
+where they are refused, the last that were not hold: the robot comes to rest there.
 """
 
 from bisect import bisect_left

@@ -8,7 +8,7 @@ import numpy as np
 
 from trunkline.identification.simulate.experiment import Experiment, weights_for
 from trunkline.identification.simulate.loss import (
-    RESIDUALS,
+    LOSSES,
     LossWeights,
     internal_error,
     loss_of,
@@ -191,7 +191,7 @@ def errors_of(
     in_order = experiment.frame_step > 0  # else frames taken from here and there, or shapes at rest
     if loss is not None and weights is not None and (in_order or is_static(experiment.kind)):
         weights = weights_for(experiment, weights)
-        row["loss"] = float(loss_of(RESIDUALS[loss](positions[None], real, measured, weights))[0])
+        row["loss"] = float(loss_of(LOSSES[loss](positions[None], real, measured, weights))[0])
     if experiment.frames > 1 and in_order:
         row["e_velocity_mm_s"] = float(velocity_error(positions, real, measured, 1 / experiment.frame_step)) * 1e3
         swings = EXPERIMENTS[experiment.kind].hangs and np.ptp(positions[:, tip], axis=0).any()

@@ -7,9 +7,9 @@ import numpy as np
 
 from trunkline.compute.progress import progress
 from trunkline.identification.evaluation.evaluation import marker_positions
-from trunkline.identification.fit.certainty import Certainty, bootstrap, certainty
 from trunkline.identification.fit.fit import Fit, Refinement
 from trunkline.identification.fit.influence import Influence, influence
+from trunkline.identification.fit.intervals import Certainty, bootstrap, certainty
 from trunkline.identification.fit.linearisation import linearise
 from trunkline.identification.fit.optimizers import Optimizer
 from trunkline.identification.fit.problem import Problem

@@ -12,7 +12,7 @@ from pydantic import Field
 from trunkline.identification.parameters.parameters import candidate_fields, parameter_named
 from trunkline.identification.parameters.per_session import values_in
 from trunkline.identification.simulate.experiment import Experiment, weights_for
-from trunkline.identification.simulate.loss import RESIDUALS, LossWeights, loss_of
+from trunkline.identification.simulate.loss import LOSSES, LossWeights, loss_of
 from trunkline.identification.simulate.resting import RestShape, hang_in
 from trunkline.identification.simulate.simulated_sessions import Sessions
 from trunkline.model.arm_model import ArmModel
@@ -111,7 +111,7 @@ class Problem:
         blocks = []
         for positions, experiment, share in zip(simulated.positions, self.experiments, shares, strict=True):
             with np.errstate(invalid="ignore", over="ignore"):
-                block = share * RESIDUALS[self.loss](
+                block = share * LOSSES[self.loss](
                     positions, experiment.positions, experiment.measured, weights_for(experiment, self.weights)
                 )
             # a diverged candidate: every residual the same, and in sum the penalty

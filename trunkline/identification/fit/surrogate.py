@@ -79,7 +79,7 @@ class Surrogate:
         """Where the loss is least. Damped Newton steps from d = 0, for all weights (B, T) at once. Shape (B, P).
 
         A bootstrap asks for thousands of these small fits: scipy's trust-exact takes them one by one, to the same
-        answers. How many times as long: `python -m benchmarks.surrogate`.
+        answers. How many times as long: docs/measurements/speed.md.
         """
         grams = np.einsum("bt,tfg->bfg", weights, self.grams)
         squares = np.diag(self.grams.sum(axis=0))[1 : self.count + 1]

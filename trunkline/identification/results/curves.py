@@ -119,8 +119,8 @@ def shape_table(predictions: dict[str, Prediction], markers: tuple[str, ...]) ->
         shapes = {LABELS[model]: p.replay.positions[index] for model, p in predictions.items()}
         sources = {"measured": experiment.positions} | shapes
         from_first = np.linalg.norm(experiment.positions - experiment.positions[0], axis=2)  # (T, markers)
-        shown = int(np.nan_to_num(from_first).max(axis=1).argmax())
+        farthest = int(np.nan_to_num(from_first).max(axis=1).argmax())
         for source, positions in sources.items():
-            for marker, (x, _, z) in zip(markers, positions[shown] * 1e3, strict=True):
+            for marker, (x, _, z) in zip(markers, positions[farthest] * 1e3, strict=True):
                 rows.append((experiment.name, np.degrees(tilt_of_gravity(experiment.gravity)), source, marker, x, z))
     return pd.DataFrame(rows, columns=["trial", "tilt_deg", "source", "marker", "x_mm", "z_mm"])

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from trunkline.identification.fit.certainty import weakest_in_words
 from trunkline.identification.fit.identify import Identification
+from trunkline.identification.fit.intervals import weakest_in_words
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.parameters.parameters import SESSION_MARK, parameter_named
 

@@ -76,12 +76,12 @@ def position_residuals(
     return _residuals(simulated, real, distances(real), steps, measured, weights)
 
 
-RESIDUALS = {"distances": distance_residuals, "positions": position_residuals}
+LOSSES = {"distances": distance_residuals, "positions": position_residuals}
 
 if TYPE_CHECKING:
     LossName = str
 else:
-    LossName = Literal[tuple(RESIDUALS)]  # so that whoever names another is told which there are
+    LossName = Literal[tuple(LOSSES)]  # so that whoever names another is told which there are
 
 
 @dataclass(kw_only=True)

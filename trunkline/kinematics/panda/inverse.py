@@ -6,7 +6,7 @@ vector of the orientation error or, for a target that leaves the yaw free, the c
 directions.
 
 The maps ask for hundreds of targets at once, which cost far less together than one by one, or by mink
-(`python -m benchmarks.rigid_map`; docs/speed.md).
+(docs/measurements/kinematics.md).
 """
 
 from typing import NamedTuple

@@ -7,7 +7,7 @@ Each joint i follows Craig's modified Denavit-Hartenberg convention,
 and the mount of the soft arm lies `FLANGE + mount_offset` along z of frame 7. Frames are kept as their
 three axes and origin, each of shape (3, N) in the base frame, so that a million poses are a few array
 operations a joint: faster than `mujoco.batch` and `mj_geomDistance`, which give the same
-(`python -m benchmarks.rigid_map`; docs/speed.md).
+(docs/measurements/kinematics.md).
 """
 
 from typing import NamedTuple

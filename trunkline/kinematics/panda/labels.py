@@ -3,7 +3,7 @@
 The map comes from forward kinematics of exact samples; the labels come from a damped least-squares solver
 that knows nothing of them, and is not told what the map says: every point that the first starts do not reach gets
 the same further ones, but for points that the links' lengths rule out. Both stand on the same kinematics, limits and
-collisions; `python -m studies.rigid_labels` compares them with another solver on another Panda.
+collisions; docs/measurements/kinematics.md compares them with another solver on another Panda.
 """
 
 from typing import NamedTuple

@@ -16,7 +16,7 @@ from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.kinematics.panda.collision import MOUNT_RADIUS
 from trunkline.kinematics.panda.kinematics import FLANGE, Q_MAX, Q_MIN
 from trunkline.kinematics.panda.limits import TORQUE
-from trunkline.kinematics.panda.shipped import JOINTS, shipped_panda
+from trunkline.kinematics.panda.maker_model import JOINTS, shipped_panda
 from trunkline.model.arm.contact_geometry import ARM, ROBOT, WORLD
 
 Metres = Annotated[float, Field(ge=-10, le=10)]

@@ -81,7 +81,7 @@ def redistance(field: np.ndarray, spacing: float) -> np.ndarray:
     Values within one spacing of zero stay. From a lattice point x further out to the nearest point p across
     the surface it is |x - p| less the depth |field(p)| of p: off by at most three quarters of a spacing, a tenth in the
     root mean square. Fast marching halves the largest error, but moves values near zero by up to a third of a spacing
-    and takes longer (`python -m benchmarks.redistance`; docs/speed.md).
+    and takes longer (docs/measurements/kinematics.md).
     """
     inside = field < 0
     result = np.array(field, dtype=float)

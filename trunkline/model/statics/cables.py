@@ -36,7 +36,7 @@ def _cable_columns(pull, hessian, work):
 def solve_small(matrix, x):
     """Solve matrix x' = x in place by elimination with pivoting; `matrix` is overwritten.
 
-    For its speed at 3 unknowns (`python -m benchmarks.small_linear_algebra`); and np.linalg.solve would end a whole
+    For its speed at 3 unknowns (docs/measurements/kinematics.md); and np.linalg.solve would end a whole
     batch with an error where one matrix is singular.
     """
     n = x.shape[0]

@@ -7,7 +7,7 @@ products. So above its 2 x 2 blocks the Hessian is the upper part of a matrix of
 
 with row from left by the same steps as in a dense factor (Vandebril, Van Barel, Mastronardi 2008, "Matrix
 Computations and Semiseparable Matrices", chapter 4). How many times as fast it is as np.linalg.cholesky and
-np.linalg.solve in the same compiler: `python -m benchmarks.small_linear_algebra`.
+np.linalg.solve in the same compiler: docs/measurements/kinematics.md.
 """
 
 from typing import NamedTuple

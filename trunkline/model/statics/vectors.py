@@ -1,7 +1,7 @@
 """Vectors in space as tuples of three numbers, matrices as tuples of three rows: both stay in registers.
 
 Numba's np.cross and @ make an array for each result. How many times as slow that is:
-`python -m benchmarks.small_linear_algebra`.
+docs/measurements/kinematics.md.
 """
 
 import numpy as np

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from trunkline.errors import InputError
-from trunkline.recordings.logs.log import Log
+from trunkline.recordings.logs.mcap_log import Log
 from trunkline.recordings.signals.clock import FrameFit, LoggedOffset, OffsetFit
 from trunkline.recordings.trials.splits import IDENTIFY
 

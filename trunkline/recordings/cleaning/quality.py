@@ -8,7 +8,7 @@ import numpy as np
 from trunkline.recordings.cleaning.checks import Findings
 from trunkline.recordings.cleaning.clock_offset import MotorClock
 from trunkline.recordings.cleaning.session_checks import CheckedSession
-from trunkline.recordings.logs.log import Log
+from trunkline.recordings.logs.mcap_log import Log
 from trunkline.recordings.signals.smoothing import noise_level
 from trunkline.recordings.trials.raw_trial import RawTrial
 

@@ -54,8 +54,8 @@ def require_same_arm(sessions: dict[str, CheckedSession], distance: float) -> No
                 for session in (reference, other)
             )
             if ours and theirs and ours != theirs:
-                problem = f"session {name}: found {key} {_shown(theirs)}, expected those of the session {first}"
-                raise InputError(f"{problem}, {_shown(ours)}, as one arm is identified from both")
+                problem = f"session {name}: found {key} {_listed(theirs)}, expected those of the session {first}"
+                raise InputError(f"{problem}, {_listed(ours)}, as one arm is identified from both")
         ours, theirs = _along(reference), _along(other)
         off = np.abs(ours - theirs)
         if np.nanmax(off) > distance * np.nanmax(ours):
@@ -83,5 +83,5 @@ def _along(gathered: CheckedSession) -> np.ndarray:
     return np.diagonal(usual, 1)
 
 
-def _shown(names: list[str]) -> str:
+def _listed(names: list[str]) -> str:
     return ", ".join(names[:6]) + (", …" if len(names) > 6 else "")

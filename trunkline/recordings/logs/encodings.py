@@ -9,7 +9,7 @@ from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
 
 from trunkline.recordings.logs import cdr
-from trunkline.recordings.logs.log import Topic
+from trunkline.recordings.logs.mcap_log import Topic
 
 ENCODINGS = {"cdr": "ros2msg", "protobuf": "protobuf", "json": None}  # to the schema's encoding, None: any
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from trunkline.recordings.logs.cdr import short_name
 from trunkline.recordings.logs.encodings import decode
-from trunkline.recordings.logs.log import Topic
+from trunkline.recordings.logs.mcap_log import Topic
 from trunkline.recordings.logs.messages import JOINTS, READING
 from trunkline.recordings.logs.samples import union
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from trunkline.recordings.logs.cdr import short_name
 from trunkline.recordings.logs.encodings import decode
-from trunkline.recordings.logs.log import Topic
+from trunkline.recordings.logs.mcap_log import Topic
 from trunkline.recordings.logs.messages import POSES, READING, DecodedPoses
 from trunkline.recordings.logs.samples import PoseSamples, union
 from trunkline.recordings.logs.transforms import in_one_frame

@@ -9,7 +9,7 @@ import numpy as np
 from trunkline.errors import InputError
 from trunkline.recordings.logs.cdr import short_name
 from trunkline.recordings.logs.joint_stream import JointStream, joint_stream
-from trunkline.recordings.logs.log import Log, Topic, read_log
+from trunkline.recordings.logs.mcap_log import Log, Topic, read_log
 from trunkline.recordings.logs.messages import JOINTS, POSES
 from trunkline.recordings.logs.pose_stream import PoseStream, pose_stream
 from trunkline.recordings.session.source import COMMAND_WORDS, POSITION_WORDS, TWIN, choose, pose_topics, static_topics

@@ -8,7 +8,7 @@ from typing import TypeVar
 from trunkline.errors import InputError
 from trunkline.recordings.logs.cdr import short_name
 from trunkline.recordings.logs.joint_stream import JointStream, joint_stream
-from trunkline.recordings.logs.log import Log, Topic, read_log
+from trunkline.recordings.logs.mcap_log import Log, Topic, read_log
 from trunkline.recordings.logs.messages import JOINTS, POSES, TOPIC_PER_BODY
 from trunkline.recordings.logs.pose_stream import PoseStream, pose_stream
 from trunkline.recordings.session.session import Session

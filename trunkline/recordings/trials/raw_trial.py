@@ -17,7 +17,7 @@ BASE = "base"  # the base body's name in poses.parquet
 class RawTrial(TrialRecording):
     """T frames, S markers, K tendons; the motors have Tc commands and Tm measured positions.
 
-    name, experiment, split, level, load: as planned, see `Planned`. markers: S names, tendons: K names, as in the
+    name, experiment, split, level, load: as planned, see `PlannedTrial`. markers: S names, tendons: K names, as in the
     model.
     up: (3,) unit vector against gravity, 0 where there is none. time: (T,) s from the first frame.
     positions (T, S, 3) m, quaternions (T, S, 4) wxyz or None, base_positions (T, 3), base_quaternions (T, 4):

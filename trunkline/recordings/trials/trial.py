@@ -19,7 +19,7 @@ from trunkline.recordings.trials.tables import long_table, pose_table, read_tabl
 class Trial(TrialRecording):
     """One experiment of T frames, S markers and K tendons.
 
-    name, experiment, split, level, load: as planned, see `Planned`. markers: S names, tendons: K names, as in the
+    name, experiment, split, level, load: as planned, see `PlannedTrial`. markers: S names, tendons: K names, as in the
     model.
     gravity: (3,) m/s² in the base frame, measured from the base body.
     time: (T,) s, uniform. A static trial is averaged over time and has T = 1.

@@ -6,8 +6,8 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
+from trunkline.identification.diagnostics.identifiability import Identifiability
 from trunkline.identification.parameters.parameters import parameter_named
-from trunkline.identification.uncertainty.identifiability import Identifiability
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.report.certificate.poses import Conditions
 

@@ -5,7 +5,7 @@ that is off by a share s of each point's distance from the base, the information
 
     M_t = (NUMBERS / s²) J_tᵀ J_t,
 
-which is `trunkline.identification.uncertainty.identifiability` by the trial: over T trials Σ M_t is the inverse of its
+which is `trunkline.identification.diagnostics.identifiability` by the trial: over T trials Σ M_t is the inverse of its
 s² (JᵀJ)⁻¹ / (NUMBERS T). Trials are independent, so information adds. Where motors hold the arm at rest, friction holds
 it anywhere in a band, in whose middle the twin has it: there s² is more by the variance of a rectangular distribution
 over that band. All of it is of u = (z - middle) / half, z over half of its range: the `share` of `Identifiability`.
@@ -16,12 +16,12 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
+from trunkline.identification.diagnostics.identifiability import NUMBERS, TWO_SIDED, Identifiability
 from trunkline.identification.fit.fit import Fit
 from trunkline.identification.fit.linearisation import linearise
 from trunkline.identification.fit.settings import IdentificationSettings
 from trunkline.identification.fit.setup import fit_of, set_up, with_every
 from trunkline.identification.simulate.experiment import Experiment
-from trunkline.identification.uncertainty.identifiability import NUMBERS, TWO_SIDED, Identifiability
 from trunkline.model.arm_model import ArmModel
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_static
 from trunkline.recordings.trials.splits import IDENTIFY

@@ -3,8 +3,8 @@
 import numpy as np
 import yaml
 
+from trunkline.identification.diagnostics.identifiability import TWO_SIDED, Identifiability
 from trunkline.identification.parameters.parameters import parameter_named
-from trunkline.identification.uncertainty.identifiability import TWO_SIDED, Identifiability
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.recordings.trials.splits import IDENTIFY
 from trunkline.tools.design.candidates import Candidate

@@ -10,6 +10,12 @@ import sys
 from pathlib import Path
 
 from trunkline.errors import in_one_line
+from trunkline.identification.diagnostics.identifiability import (
+    described_lines,
+    expected_identifiability,
+    to_identify_from,
+    unidentifiable,
+)
 from trunkline.identification.fit.setup import check_parameters
 from trunkline.identification.parameters.per_session import (
     make_room,
@@ -18,12 +24,6 @@ from trunkline.identification.parameters.per_session import (
 )
 from trunkline.identification.simulate.checks import check_trials
 from trunkline.identification.stages import STAGES
-from trunkline.identification.uncertainty.identifiability import (
-    described_lines,
-    expected_identifiability,
-    to_identify_from,
-    unidentifiable,
-)
 from trunkline.model.arm.kinds import described_arm
 from trunkline.pipeline.config import own_or_project, settings_of
 from trunkline.program import program_name

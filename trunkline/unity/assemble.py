@@ -16,7 +16,13 @@ from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import compile_with, linearize
 from trunkline.unity.manifest import Hybrid, Manifest, Versions, describe_model, hashes
 from trunkline.unity.network import describe_network
-from trunkline.unity.package import (
+from trunkline.unity.pulls import as_pulls
+from trunkline.unity.reach_maps import convert_grids, convert_meshes, convert_sheets, describe_reach
+from trunkline.unity.roundtrip import curl, deviation, simulate
+from trunkline.unity.rules import Violation, lint_mjcf
+from trunkline.unity.time_steps import LONGEST_STEP, step_errors, with_steps
+from trunkline.unity.unsupported import without_unsupported
+from trunkline.unity.upm_package import (
     CALIBRATED,
     MODEL,
     NETWORK,
@@ -25,12 +31,6 @@ from trunkline.unity.package import (
     package_json,
     with_metas,
 )
-from trunkline.unity.pulls import as_pulls
-from trunkline.unity.reach_maps import convert_grids, convert_meshes, convert_sheets, describe_reach
-from trunkline.unity.roundtrip import curl, deviation, simulate
-from trunkline.unity.rules import Violation, lint_mjcf
-from trunkline.unity.time_steps import LONGEST_STEP, step_errors, with_steps
-from trunkline.unity.unsupported import without_unsupported
 
 CSHARP = Path(__file__).parent / "csharp"
 PLAIN_FOLDERS = ("Editor", "Samples~", "Tests")  # of CSHARP, which lie beside Runtime in the package, as Unity expects

@@ -6,12 +6,12 @@ import re
 import numpy as np
 import pytest
 
-from trunkline.ar.drivers import ros_arm
+from trunkline.ar.drivers import ros_panda
 from trunkline.ar.drivers.driver import TICK
-from trunkline.ar.drivers.ros_arm import PERIOD, RosArm
+from trunkline.ar.drivers.ros_panda import PERIOD, RosPanda
 from trunkline.ar.drivers.setpoint_filter import ROUNDING
 from trunkline.ar.drivers.settings import ExecutionConfig
-from trunkline.ar.drivers.watchdog import SILENT
+from trunkline.ar.drivers.watchdog import SETPOINT_TIMEOUT
 from trunkline.kinematics.panda.limits import VELOCITY
 from trunkline.pipeline.config import PROJECT, load_folder
 
@@ -52,11 +52,11 @@ class Played:
     beginning, s."""
 
     def __init__(self, monkeypatch, way):
-        monkeypatch.setattr(ros_arm.time, "monotonic", lambda: 0.0)
+        monkeypatch.setattr(ros_panda.time, "monotonic", lambda: 0.0)
         self.now, self._way, self._waiting = 0.0, way, []
         self.controller = Controller(self.now)
-        monkeypatch.setattr(ros_arm, "link_of", lambda settings: self.controller)
-        self.arm = RosArm(SETTINGS)
+        monkeypatch.setattr(ros_panda, "link_of", lambda settings: self.controller)
+        self.arm = RosPanda(SETTINGS)
         self.arm.turn(0.0)
         assert self.arm.ready
 
@@ -113,7 +113,7 @@ def test_where_either_process_is_late_it_is_a_fault_and_the_controller_stands(pl
 @pytest.mark.parametrize("who", ["sends", "turns"])
 def test_by_less_than_that_it_goes_on(played, who):
     played.play(LATE)
-    played.play(SILENT - 2 * TICK, **{who: False})
+    played.play(SETPOINT_TIMEOUT - 2 * TICK, **{who: False})
     played.play(0.5)
     assert played.arm.fault == ""
     assert played.turned == pytest.approx(played._way(played.now), abs=1e-6)

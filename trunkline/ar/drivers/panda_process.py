@@ -1,7 +1,7 @@
 """The Panda's driver process, in the environment of the robot's own library. It speaks to nothing but the robot and,
 over a socket, the process that started it.
 
-    python -m trunkline.ar.drivers.driver_process ROBOT ADDRESS DESCRIPTOR
+    python -m trunkline.ar.drivers.panda_process ROBOT ADDRESS DESCRIPTOR
 
 ROBOT: `panda` (panda-python, libfranka 0.9), `fr3` (pylibfranka) or `fake`, which is no robot. DESCRIPTOR: of the
 socket. `trunkline.ar.drivers.driver_client` starts it; by hand it is of no use.
@@ -93,7 +93,7 @@ class FakeDevice:
 DEVICES = {"panda": PandaPython, "fr3": PyLibfranka, "fake": FakeDevice}
 
 
-class DriverProcess:
+class PandaProcess:
     """Between the socket and the device."""
 
     def __init__(self, robot: str, channel: socket.socket) -> None:
@@ -112,7 +112,7 @@ class DriverProcess:
         now, stream = time.monotonic(), self._stream
         if rates is not None:
             stream.synchronize(desired, *rates)
-        for frame in self._line.heard():
+        for frame in self._line.received():
             stream.hear(Setpoint.unpack(frame), now)
         if not self._line.open:
             stream.brake("the machine's process is gone")
@@ -132,7 +132,7 @@ def main(arguments: list[str]) -> int:
     robot, address, descriptor = arguments
     signal.signal(signal.SIGTERM, signal.SIG_IGN)  # it ends once nobody is at the other end, and the joints rest
     with socket.socket(fileno=int(descriptor)) as channel:
-        adapter = DriverProcess(robot, channel)
+        adapter = PandaProcess(robot, channel)
         try:
             device = DEVICES[robot](address)
             raise_priority()

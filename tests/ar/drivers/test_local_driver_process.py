@@ -14,13 +14,13 @@ import pytest
 
 from tests.support import waiting
 from tests.support.motors import PlayedMotors, Workbench, homed, motor_settings
-from trunkline.ar.drivers import driver_client, driver_host
+from trunkline.ar.drivers import driver_client, local_driver_process
 from trunkline.ar.drivers.driver import TICK
-from trunkline.ar.drivers.driver_client import SILENT
+from trunkline.ar.drivers.driver_client import DRIVER_TIMEOUT
 from trunkline.ar.drivers.driver_frames import FrameSocket, Setpoint
-from trunkline.ar.drivers.driver_host import SETTLES, run_driver, start_driver
-from trunkline.ar.drivers.driver_process import TELL
+from trunkline.ar.drivers.local_driver_process import SETTLES, run_driver, start_driver
 from trunkline.ar.drivers.motors import MotorsOnBus
+from trunkline.ar.drivers.panda_process import TELL
 from trunkline.ar.drivers.simulated_motors import SIMULATED
 from trunkline.ar.drivers.tendon_driver import TendonDriver
 
@@ -40,7 +40,8 @@ class Played:
 
     def __init__(self, monkeypatch, bench):
         self.bench, self.motors, self.each = bench, PlayedMotors(bench), lambda now: None
-        monkeypatch.setattr(driver_host, "time", SimpleNamespace(monotonic=lambda: self.bench.now, sleep=self._sleep))
+        clock = SimpleNamespace(monotonic=lambda: self.bench.now, sleep=self._sleep)
+        monkeypatch.setattr(local_driver_process, "time", clock)
         monkeypatch.setattr(driver_client, "time", SimpleNamespace(monotonic=lambda: self.bench.now))
         monkeypatch.setattr(driver_client.subprocess, "Popen", self._popen)
         self.driver = TendonDriver(self.motors, bench.now)
@@ -142,7 +143,9 @@ def test_a_driver_process_that_is_killed_is_a_fault(played):
     assert played.client.fault == "its adapter has ended"
 
 
-@pytest.mark.parametrize(("late", "fault"), [(SILENT - 2 * TELL * TICK, ""), (SILENT, "its adapter is silent for")])
+@pytest.mark.parametrize(
+    ("late", "fault"), [(DRIVER_TIMEOUT - 2 * TELL * TICK, ""), (DRIVER_TIMEOUT, "its adapter is silent for")]
+)
 def test_a_driver_process_that_hangs_is_a_fault_after_a_while(played, late, fault):
     played.play(played.send(lambda t: 0.0), 0.1)
     assert played.client.fault == ""
@@ -170,7 +173,7 @@ def test_a_driver_process_that_is_late_tells_of_its_driver_and_goes_on(played):
     played.bench.now += 0.04
     played.play(send, 0.1)
     assert played.client.fault == ""
-    assert len(turns) <= round((0.1 + driver_host.LATE) / TICK) + 2
+    assert len(turns) <= round((0.1 + local_driver_process.LATE) / TICK) + 2
 
 
 # --- as a process
@@ -212,7 +215,7 @@ def test_their_process_hanging_is_a_fault(driver):
     until(lambda: driver.fault, lambda: driver.turn(time.monotonic()))
     os.kill(driver.process.pid, signal.SIGCONT)
     assert driver.fault.startswith("its adapter is silent for")
-    assert time.monotonic() - stopped > SILENT - TELL * TICK
+    assert time.monotonic() - stopped > DRIVER_TIMEOUT - TELL * TICK
 
 
 @pytest.mark.realtime
@@ -229,14 +232,14 @@ def test_a_bus_that_is_not_there_is_one_line():
 
 
 def test_a_robot_alone_needs_no_library_of_motors():
-    modules = "trunkline.ar.session.hardware_process, trunkline.ar.drivers.driver_host"
+    modules = "trunkline.ar.session.hardware_process, trunkline.ar.drivers.local_driver_process"
     code = f"import sys; sys.modules['can'] = None; import {modules}"
     subprocess.run([sys.executable, "-c", code], check=True, timeout=600)  # of a busy machine
 
 
 def test_a_library_that_is_not_there_is_one_line():
-    program = ("-c", "import sys; sys.modules['can'] = None; from trunkline.ar.drivers import driver_host; "
-               "sys.exit(driver_host.main(sys.argv[1:]))")  # fmt: skip
+    program = ("-c", "import sys; sys.modules['can'] = None; from trunkline.ar.drivers import local_driver_process; "
+               "sys.exit(local_driver_process.main(sys.argv[1:]))")  # fmt: skip
     client = start_driver(MotorsOnBus(motor_settings(), "can0", "socketcan"), program)
     until(lambda: client.fault, lambda: client.turn(time.monotonic()))
     assert client.fault == "found no library can, expected the extra motors to be installed"
@@ -259,11 +262,12 @@ class Failing:
 def test_a_driver_that_fails_is_given_back_before_anything_waits(monkeypatch):
     ours, theirs = socket.socketpair()
     done, settings = [], MotorsOnBus(motor_settings(), SIMULATED, "virtual")
-    monkeypatch.setattr(driver_host, "driver_of", lambda settings: Failing(done))
-    monkeypatch.setattr(driver_host, "raise_priority", lambda: None)
-    monkeypatch.setattr(driver_host.signal, "signal", lambda *_: None)
+    monkeypatch.setattr(local_driver_process, "driver_of", lambda settings: Failing(done))
+    monkeypatch.setattr(local_driver_process, "raise_priority", lambda: None)
+    monkeypatch.setattr(local_driver_process.signal, "signal", lambda *_: None)
     monkeypatch.setattr(FrameSocket, "end", lambda line, state: done.append(state.fault))
-    assert driver_host.main([driver_host.DRIVER_SETTINGS.dump_json(settings).decode(), str(theirs.detach())]) == 1
+    arguments = [local_driver_process.DRIVER_SETTINGS.dump_json(settings).decode(), str(theirs.detach())]
+    assert local_driver_process.main(arguments) == 1
     assert done == ["given back", "RuntimeError: no more"]
     ours.close()
 

@@ -36,7 +36,7 @@ def certainty(linear: Linearisation, prior_deviation: float = 0.0, around: Surro
 
     Residuals of one trial hang together (the model is wrong in the same way from frame to frame), so a formula for
     independent ones, as in `mujoco.sysid`, promises far too much: where a handful of trials tells a mean, its
-    intervals seldom hold the truth, these as often as they should (`python -m studies.intervals`). The sandwich over
+    intervals seldom hold the truth, these as often as they should (docs/results/intervals.md). The sandwich over
     trials (Liang, Zeger 1986) answers a trial's weight as if the others' curvature were all of it; a trial that weighs
     much has drawn the estimate to itself, and with a handful of trials that makes it too sure. Trials are taken as
     independent, with T - 1 degrees of freedom. What one trial alone determines has no interval.
@@ -89,8 +89,8 @@ def bootstrap(linear: Linearisation, seed: int, around: Surrogate | None = None)
 
     It cross-checks `certainty`: it takes no symmetry for granted, and no formula for what a trial's weight does.
     scipy's `bootstrap` (BCa) draws whole trials; with a handful of them it holds the truth too seldom
-    (`python -m studies.intervals`). What the fits to so many weights cost with `Surrogate.moves`, and would by scipy:
-    `python -m benchmarks.surrogate`.
+    (docs/results/intervals.md). What the fits to so many weights cost with `Surrogate.moves`, and would by scipy:
+    docs/measurements/speed.md.
     Draws scatter too little, by √((T - 1)/(T + 1)), and their percentiles know of no degrees of freedom. So these are
     taken further out, as Hesterberg (2015, expanded percentiles) does, where a mean of T numbers would get Student's
     interval: Φ(-√((T + 1)/(T - 1)) t). Below five trials that is further out than any draw, and too narrow.

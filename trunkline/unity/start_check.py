@@ -14,10 +14,10 @@ from trunkline.model.statics.equilibria import actuated
 from trunkline.twin.package import MANIFEST
 from trunkline.unity.importer import as_imported
 from trunkline.unity.manifest import Manifest, Model
-from trunkline.unity.package import MODEL
 from trunkline.unity.plugin import Imported, Scene
 from trunkline.unity.start import TwinComponent
 from trunkline.unity.time_steps import steps_taken
+from trunkline.unity.upm_package import MODEL
 
 DOWN = np.array([0.0, 0.0, -STANDARD_GRAVITY])
 PREFIX = "arm_"  # before an arm's names in the scene

@@ -18,7 +18,7 @@ from trunkline.ar.drivers.watchdog import Watchdog
 from trunkline.errors import InputError
 
 PERIOD = 0.01  # s between points
-SILENT = 0.2  # s without the joints' state
+JOINT_STATE_TIMEOUT = 0.2  # s without the joints' state
 VELOCITY = LIMITS["panda"].velocity  # (7,), rad/s
 
 
@@ -61,7 +61,7 @@ def link_of(settings: RosSettings) -> Link:
     return NodeLink(settings)
 
 
-class RosArm:
+class RosPanda:
     """A `Driver` of the Panda's joints, rad, that a controller moves, and whose states are told.
 
     After a fault nothing is sent: the controller stands at the last point, which is on the way, at most the setpoints'
@@ -71,11 +71,11 @@ class RosArm:
     def __init__(self, settings: RosSettings) -> None:
         self._settings, self.fault, self.ready = settings, "", False
         self.measured, self._sent = np.full(settings.axes, np.nan), np.full(settings.axes, np.nan)
-        self._heard, self._sent_at = time.monotonic(), 0.0
+        self._state_time, self._sent_at = time.monotonic(), 0.0
         self._next: tuple[float, np.ndarray] | None = None
         self._watchdog, self._fresh = Watchdog(), False  # whether setpoints came since the last turn
         self._way: tuple[float, np.ndarray] | None = None  # when the last point is due, and where it was gone to from
-        self._until = self._heard + CONNECTING
+        self._until = self._state_time + CONNECTING
         self.link = link_of(settings)
 
     @property
@@ -112,7 +112,7 @@ class RosArm:
             self._fresh = False
         if not self.link.listeners:
             self._fail(f"{settings.trajectory}: nobody listens any more")
-        if (silent := now - self._heard) > SILENT:
+        if (silent := now - self._state_time) > JOINT_STATE_TIMEOUT:
             self._fail(f"{settings.states}: silent for {1e3 * silent:.0f} ms")
         off = np.abs(self.measured - self.sent)
         if not off.max() <= settings.astray:  # or no number
@@ -125,8 +125,8 @@ class RosArm:
         speed = np.abs(joints - here) / max(due - now, TICK)
         joint = int((speed / VELOCITY).argmax())
         if speed[joint] > ROUNDING * VELOCITY[joint]:
-            asked = f"asks for {speed[joint]:.3g} rad/s, expected at most {VELOCITY[joint]:.3g}"
-            self._fail(f"setpoint: {self._settings.names[joint]} {asked}")
+            demand = f"asks for {speed[joint]:.3g} rad/s, expected at most {VELOCITY[joint]:.3g}"
+            self._fail(f"setpoint: {self._settings.names[joint]} {demand}")
             return
         self._sent_at, self._sent, self._next, self._way = now, joints, None, (due, here)
         try:
@@ -154,7 +154,7 @@ class RosArm:
         for names, positions in self.link.states():
             where = dict(zip(names, positions, strict=False))
             if all(name in where for name in self._settings.names):
-                self.measured, self._heard = np.array([where[name] for name in self._settings.names]), now
+                self.measured, self._state_time = np.array([where[name] for name in self._settings.names]), now
 
     def _fail(self, fault: str) -> None:
         self.fault = self.fault or fault

@@ -1,6 +1,6 @@
 """The driver process of hardware that runs in this environment: the tendons' motors, or a controller of ROS 2.
 
-    python -m trunkline.ar.drivers.driver_host SETTINGS DESCRIPTOR
+    python -m trunkline.ar.drivers.local_driver_process SETTINGS DESCRIPTOR
 
 SETTINGS: of either, as JSON. DESCRIPTOR: of the socket to the robot's process, which starts it; by hand it is of
 no use.
@@ -21,8 +21,8 @@ from pydantic import TypeAdapter
 from trunkline.ar.drivers.driver import CONNECTING, TICK, Driver
 from trunkline.ar.drivers.driver_client import DriverClient
 from trunkline.ar.drivers.driver_frames import DriverState, FrameSocket, Setpoint
-from trunkline.ar.drivers.driver_process import TELL
 from trunkline.ar.drivers.motors import HOMING, MotorsOnBus
+from trunkline.ar.drivers.panda_process import TELL
 from trunkline.ar.drivers.realtime_priority import raise_priority
 from trunkline.ar.drivers.ros_settings import RosSettings
 from trunkline.errors import InputError
@@ -36,7 +36,7 @@ DRIVER_SETTINGS: TypeAdapter[DriverSettings] = TypeAdapter(DriverSettings)
 
 
 def start_driver(
-    settings: DriverSettings, program: Sequence[str] = ("-m", "trunkline.ar.drivers.driver_host")
+    settings: DriverSettings, program: Sequence[str] = ("-m", "trunkline.ar.drivers.local_driver_process")
 ) -> DriverClient:
     """The driver of these settings, in a process of its own: Python's, which runs the `program`."""
     patience = CONNECTING if isinstance(settings, RosSettings) else HOMING
@@ -52,9 +52,9 @@ def driver_of(settings: DriverSettings) -> Driver:
     """
     try:
         if isinstance(settings, RosSettings):
-            from trunkline.ar.drivers.ros_arm import RosArm
+            from trunkline.ar.drivers.ros_panda import RosPanda
 
-            return RosArm(settings)
+            return RosPanda(settings)
         from trunkline.ar.drivers.on_bus import motors_on
         from trunkline.ar.drivers.tendon_driver import TendonDriver
     except ImportError as error:
@@ -67,7 +67,7 @@ def run_driver(driver: Driver, line: FrameSocket) -> None:
     """Turn the driver until nobody is at the other end, and SETTLES s more."""
     due, gone, turns, fault = time.monotonic(), math.inf, 0, ""
     while (now := time.monotonic()) - gone < SETTLES:
-        for frame in line.heard():
+        for frame in line.received():
             setpoint = Setpoint.unpack(frame)
             driver.send(setpoint.due, np.array(setpoint.axes))
         gone = gone if line.open else min(gone, now)

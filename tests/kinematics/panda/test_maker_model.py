@@ -8,7 +8,7 @@ import pytest
 
 from trunkline.kinematics.panda.kinematics import Q_MAX, Q_MIN, mount_pose
 from trunkline.kinematics.panda.limits import TORQUE
-from trunkline.kinematics.panda.shipped import shipped_panda
+from trunkline.kinematics.panda.maker_model import shipped_panda
 
 OFFSET = 0.05  # m
 

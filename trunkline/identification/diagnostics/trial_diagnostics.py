@@ -10,7 +10,7 @@ from trunkline.frames import tilt_of_gravity
 from trunkline.identification.evaluation.evaluation import replay
 from trunkline.identification.fit.fit import Fit
 from trunkline.identification.simulate.experiment import QUIET_FRAMES, Experiment, start_frames
-from trunkline.identification.simulate.loss import RESIDUALS, loss_of
+from trunkline.identification.simulate.loss import LOSSES, loss_of
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_static
 from trunkline.recordings.trials.start import robust_length
 from trunkline.recordings.trials.trial import Trial
@@ -135,4 +135,4 @@ def moving_start(trial: Trial, experiment: Experiment) -> str:
 
 
 def _loss(simulated: np.ndarray, positions: np.ndarray, measured: np.ndarray, fit: Fit) -> float:
-    return float(loss_of(RESIDUALS[fit.loss](simulated[None], positions, measured, fit.weights))[0])
+    return float(loss_of(LOSSES[fit.loss](simulated[None], positions, measured, fit.weights))[0])

@@ -11,7 +11,7 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
 from trunkline.errors import InputError
-from trunkline.recordings.logs.log import read_log
+from trunkline.recordings.logs.mcap_log import read_log
 
 COUNT = 120
 

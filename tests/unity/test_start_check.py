@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from trunkline.errors import InputError
-from trunkline.unity import proof
-from trunkline.unity.proof import WATCHED, recreated_error, start_error, started
+from trunkline.unity import start_check
+from trunkline.unity.start_check import WATCHED, recreated_error, start_error, started
 from trunkline.unity.time_steps import steps_taken
 
 REST = np.array([0.0, 0.1, -0.4])
@@ -80,7 +80,7 @@ def test_a_scene_compiled_anew_is_held_against_the_other_at_every_step(anew, err
     scene, other = Fallen(0.002, {0.0: 0.01}, anew), Fallen(0.002, {0.0: 0.01})
     assert recreated_error(scene, other) == pytest.approx(error)
     assert len(scene.looked) == len(other.looked) == 250
-    assert scene.controls == other.controls == {"motor_0": proof.PULL, "motor_1": -proof.PULL}
+    assert scene.controls == other.controls == {"motor_0": start_check.PULL, "motor_1": -start_check.PULL}
     assert other.time == pytest.approx(2 * WATCHED)
 
 
@@ -90,11 +90,11 @@ def package(monkeypatch):
 
     def say(errors: list[float | None], alone: float = 0.1):
         turns = list(range(len(errors)))
-        monkeypatch.setattr(proof, "turns", lambda tilts: turns)
-        monkeypatch.setattr(proof, "manifest_of", lambda files: SimpleNamespace(actuators=[]))
-        monkeypatch.setattr(proof, "at_rest", lambda model, turn, rest: None if errors[turn] is None else turn)
+        monkeypatch.setattr(start_check, "turns", lambda tilts: turns)
+        monkeypatch.setattr(start_check, "manifest_of", lambda files: SimpleNamespace(actuators=[]))
+        monkeypatch.setattr(start_check, "at_rest", lambda model, turn, rest: None if errors[turn] is None else turn)
         monkeypatch.setattr(
-            proof,
+            start_check,
             "scene_of",
             lambda files, turn, step, without=False: SimpleNamespace(turn=turn, step=step, off=without),
         )
@@ -104,8 +104,8 @@ def package(monkeypatch):
             assert errors[scene.turn] is not None
             return alone if scene.off else errors[scene.turn] * (1 if scene.step == slowest else 0.5)
 
-        monkeypatch.setattr(proof, "start_error", error)
-        monkeypatch.setattr(proof, "recreated_error", lambda scene, other: 2 * error(scene))
+        monkeypatch.setattr(start_check, "start_error", error)
+        monkeypatch.setattr(start_check, "recreated_error", lambda scene, other: 2 * error(scene))
         return started(None, {}, [0.0])  # type: ignore[arg-type]
 
     return say

@@ -8,9 +8,9 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 from tests.support.matched_plant import curl, markers_of, small_model
-from trunkline.identification.fit.certainty import bootstrap, certainty, weakest_in_words
 from trunkline.identification.fit.fit import CoarseSearch, Fit, Method, Refinement
 from trunkline.identification.fit.identify import identify
+from trunkline.identification.fit.intervals import bootstrap, certainty, weakest_in_words
 from trunkline.identification.fit.linearisation import Linearisation
 from trunkline.identification.fit.optimizers import LeastSquares
 from trunkline.identification.fit.problem import Bounds

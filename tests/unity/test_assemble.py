@@ -28,15 +28,15 @@ from trunkline.kinematics.reachability.workspace_surface import WorkspaceSurface
 from trunkline.model.arm.joints import Joints, MaxwellElement, add_elements
 from trunkline.twin.package import MANIFEST, read_tarball
 from trunkline.unity import manifest as schema
+from trunkline.unity.assemble import CSHARP, Label, Sources, Trajectory, assemble, compare
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import JointLaw, Laws, TendonLaw, compile_with
 from trunkline.unity.manifest import Manifest, Model, Names
-from trunkline.unity.package import MODEL, NETWORK, package_json, write_tarball
 from trunkline.unity.plugin import VERSION
 from trunkline.unity.readers import refusals
 from trunkline.unity.roundtrip import curl, simulate
 from trunkline.unity.sources import read_sources
-from trunkline.unity.twin import CSHARP, Label, Sources, Trajectory, assemble, compare
+from trunkline.unity.upm_package import MODEL, NETWORK, package_json, write_tarball
 
 ROOT = Path(__file__).parents[2]
 LABEL = Label("org.trunkline.twin", "1.2.3", "Twin", "A twin.", "6000.0")
@@ -368,7 +368,7 @@ def test_models_of_which_one_diverges_are_not_called_alike(sources, monkeypatch)
         motion.positions[-1] = np.nan
         return motion
 
-    monkeypatch.setattr("trunkline.unity.twin.simulate", diverging)
+    monkeypatch.setattr("trunkline.unity.assemble.simulate", diverging)
     with pytest.raises(InputError, match="found positions that are not finite"):
         compare(model, model, TRAJECTORY)
 

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 from tests.support.waiting import SOON, until
-from trunkline.ar.drivers import driver_process
-from trunkline.ar.drivers.driver_client import ArmSettings, panda
+from trunkline.ar.drivers import panda_process
+from trunkline.ar.drivers.driver_client import PandaSettings, panda
 from trunkline.ar.drivers.driver_frames import DriverState, FrameSocket, Setpoint
 from trunkline.ar.drivers.setpoint_filter import LIMITS
 from trunkline.errors import InputError
 
-SETTINGS = ArmSettings(python="", address="nowhere", astray=0.1)
+SETTINGS = PandaSettings(python="", address="nowhere", astray=0.1)
 ROOT = Path(__file__).parents[3]
-DT, LEAD, READY = 0.001, 0.03, driver_process.FakeDevice.READY
+DT, LEAD, READY = 0.001, 0.03, panda_process.FakeDevice.READY
 
 
 class Played:
@@ -28,8 +28,8 @@ class Played:
     def __init__(self, monkeypatch, robot="panda"):
         ours, theirs = socket.socketpair()
         self.line, self.theirs, self.now, self.states = FrameSocket(ours, DriverState.size(7)), theirs, 100.0, []
-        monkeypatch.setattr(driver_process, "time", SimpleNamespace(monotonic=lambda: self.now))
-        self.adapter, self.joints, self.ended = driver_process.DriverProcess(robot, theirs), list(READY), False
+        monkeypatch.setattr(panda_process, "time", SimpleNamespace(monotonic=lambda: self.now))
+        self.adapter, self.joints, self.ended = panda_process.PandaProcess(robot, theirs), list(READY), False
 
     def play(self, seconds, way=None):
         """Sent `way(t)`, (7,), rad, LEAD s ahead; nothing without it."""
@@ -40,7 +40,7 @@ class Played:
                 self.line.send(Setpoint(self.now + LEAD, tuple(way(self.now - begun))).pack())
             self.joints, self.ended = self.adapter.cycle(self.joints, self.joints, DT, None)
             if self.line.open:
-                self.states += [DriverState.unpack(frame) for frame in self.line.heard()]
+                self.states += [DriverState.unpack(frame) for frame in self.line.received()]
             if self.ended:
                 break
         return self
@@ -67,8 +67,8 @@ def test_it_plays_what_it_is_sent_and_tells_of_the_robot_as_often_as_it_should(p
     assert played.fault == ""
     np.testing.assert_allclose(played.joints, turning(0.5 - LEAD), atol=1e-3)
     times = [state.time for state in played.states]
-    np.testing.assert_allclose(np.diff(times), driver_process.TELL * DT)
-    np.testing.assert_allclose(played.states[-1].sent, played.joints, atol=driver_process.TELL * DT)
+    np.testing.assert_allclose(np.diff(times), panda_process.TELL * DT)
+    np.testing.assert_allclose(played.states[-1].sent, played.joints, atol=panda_process.TELL * DT)
 
 
 def test_where_setpoints_end_it_brakes_and_says_so(played):
@@ -118,7 +118,7 @@ def test_an_fr3_is_held_against_its_own_limits(monkeypatch):
 def test_why_control_has_ended_is_told_last(played):
     played.play(0.1)
     played.adapter.fail("ControlException: reflex")
-    (state,) = (DriverState.unpack(frame) for frame in played.line.heard())
+    (state,) = (DriverState.unpack(frame) for frame in played.line.received())
     assert state.fault == "ControlException: reflex"
     assert state.sent == tuple(played.joints)
 
@@ -138,14 +138,14 @@ def arm():
 @pytest.mark.realtime
 def test_it_brakes_when_setpoints_end(arm):
     for ahead in (0.02, 0.04):
-        arm.send(time.monotonic() + ahead, np.array(driver_process.FakeDevice.READY))
+        arm.send(time.monotonic() + ahead, np.array(panda_process.FakeDevice.READY))
     until(lambda: arm.fault, lambda: arm.turn(time.monotonic()))
     assert arm.fault.startswith("setpoints have run out")
 
 
 @pytest.mark.realtime
 def test_it_refuses_what_starts_elsewhere(arm):
-    arm.send(time.monotonic() + 0.03, np.array(driver_process.FakeDevice.READY) + 0.1)
+    arm.send(time.monotonic() + 0.03, np.array(panda_process.FakeDevice.READY) + 0.1)
     until(lambda: arm.fault, lambda: arm.turn(time.monotonic()))
     assert arm.fault.startswith("setpoint: starts 0.1 rad from where the robot is")
 
@@ -173,12 +173,12 @@ def test_a_library_that_is_not_there_is_one_line():
 
 
 def test_a_python_that_is_not_there_is_one_line():
-    with pytest.raises(InputError, match=r"^arm\.python: found /nowhere/python"):
-        panda(ArmSettings("/nowhere/python", "nowhere", 0.1), "panda")
+    with pytest.raises(InputError, match=r"^panda\.python: found /nowhere/python"):
+        panda(PandaSettings("/nowhere/python", "nowhere", 0.1), "panda")
 
 
 def test_it_imports_what_any_environment_has():
-    modules_of_it = ("driver_process", "driver", "driver_frames", "setpoint_filter", "realtime_priority", "watchdog")
+    modules_of_it = ("panda_process", "driver", "driver_frames", "setpoint_filter", "realtime_priority", "watchdog")
     for name in (*(f"drivers/{name}" for name in modules_of_it), "teleop/minimum_jerk"):
         tree = ast.parse((ROOT / f"trunkline/ar/{name}.py").read_text(encoding="utf-8"))
         modules = {node.module for node in tree.body if isinstance(node, ast.ImportFrom)}
@@ -204,7 +204,7 @@ class Library:
             self.q, self.motion_finished = q, False
 
     class State:
-        q, q_d, dq_d, ddq_d = driver_process.FakeDevice.READY, driver_process.FakeDevice.READY, (0.0,) * 7, (0.5,) * 7
+        q, q_d, dq_d, ddq_d = panda_process.FakeDevice.READY, panda_process.FakeDevice.READY, (0.0,) * 7, (0.5,) * 7
 
     class Duration:
         def to_sec(self):
@@ -232,7 +232,7 @@ class Robot:
 
 
 @pytest.mark.parametrize(
-    ("device", "rates"), [(driver_process.PandaPython, None), (driver_process.PyLibfranka, ((0.0,) * 7, (0.5,) * 7))]
+    ("device", "rates"), [(panda_process.PandaPython, None), (panda_process.PyLibfranka, ((0.0,) * 7, (0.5,) * 7))]
 )
 def test_both_libraries_are_called_in_their_own_way(device, rates):
     made, counted = object.__new__(device), []
@@ -245,4 +245,4 @@ def test_both_libraries_are_called_in_their_own_way(device, rates):
     made.control(cycle)
     assert [command.motion_finished for command in made._robot.sent] == [False, False, True]
     assert made._robot.sent[1].q == [0.2] * 7
-    assert counted[0] == (driver_process.FakeDevice.READY, driver_process.FakeDevice.READY, 0.001, rates)
+    assert counted[0] == (panda_process.FakeDevice.READY, panda_process.FakeDevice.READY, 0.001, rates)
