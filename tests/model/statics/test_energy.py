@@ -110,7 +110,7 @@ def test_lengths_and_their_gradients_are_mujocos(model, chain):
 
 def test_passive_torques_are_mujocos(model, chain):
     """Springs and gravity: minus the gradient without tendons, inside the limits."""
-    data, q = mujoco.MjData(model), bent(chain, seed=2, reach=0.25)
+    data, q = mujoco.MjData(model), bent(chain, seed=2, reach=0.18)
     model.opt.gravity[:] = GRAVITY
     data.qpos[:] = q
     mujoco.mj_forward(model, data)
