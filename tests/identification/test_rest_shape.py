@@ -60,6 +60,9 @@ def test_the_step_to_rest_is_half_the_time_constant_of_the_hardest_limit(spec):
     model.jnt_solref[2, 0] = 0.003
     model.jnt_solref[3] = [-1000.0, -10.0]  # stiffness and damping: no time constant
     assert longest_step(model) == pytest.approx(0.0015)
+    limited = spec.copy()
+    limited.add_tendon(limited=True, range=[-1, 1], solref_limit=[0.002, 1]).wrap_joint(limited.joints[0].name, 1)
+    assert longest_step(limited.compile()) == pytest.approx(0.001)
 
 
 def test_the_shape_is_saved(spec):

@@ -31,7 +31,7 @@ def stump() -> mujoco.MjModel:
 
 
 def hardening_stump() -> mujoco.MjModel:
-    """The stump with hardening, lopsided springs that rest bent, other limits, tilted hinge axes and diagonals:
+    """The stump with hardening, lopsided springs that rest bent, other limits, tilted hinge axes and diagonals with limits:
     everything that the plain one leaves at zero."""
     spec = stump_spec()
     rng = np.random.default_rng(7)
@@ -48,6 +48,8 @@ def hardening_stump() -> mujoco.MjModel:
             diagonal = spec.add_tendon(name=name, stiffness=[0, 0, number * first.stiffness[0]])
             diagonal.wrap_joint(first.name, 1)
             diagonal.wrap_joint(second.name, sign)
+            diagonal.limited, diagonal.range, diagonal.margin = True, [-0.4, 0.36 + 0.03 * number], 0.03
+            diagonal.solimp_limit = [0.4, 0.9, 0.06, 0.5, 2]
     return spec.compile()
 
 

@@ -1,4 +1,4 @@
-"""Joints that are round harden by their whole bend: in MuJoCo, in the statics, identified, and in the file."""
+"""Joints that are round harden and end by their whole bend: in MuJoCo, in the statics, identified, and in the file."""
 
 import mujoco
 import numpy as np
@@ -15,15 +15,31 @@ from trunkline.model.arm.joints import Joints, add_elements
 from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.rest import settle
 from trunkline.model.statics.chain import read_chain
+from trunkline.model.statics.energy import Pull, evaluate
 from trunkline.model.statics.equilibria import actuated
+from trunkline.model.statics.placement import new_state
 
-UNITS, HARDENING = 4, 3.0
+UNITS, HARDENING, END = 4, 3.0, 0.4
 
 
 @pytest.fixture(scope="module")
 def model():
     rest = {"rest_bend_x": 0.02, "rest_bend_y": -0.03}
     return with_parameters(small_model(UNITS, Joints(round=True)), {"hardening": HARDENING} | rest)
+
+
+def ending_model(rounded):
+    """Its joints end at `END`; those of so few units would at 180°."""
+    spec = small_spec(UNITS)
+    for joint in spec.joints:
+        joint.range = [-END, END]
+    add_elements(spec, Joints(round=rounded), 1e-5)
+    return spec.compile()
+
+
+@pytest.fixture(scope="module")
+def ending():
+    return ending_model(rounded=True)
 
 
 def torques(model, bend):
@@ -79,6 +95,88 @@ def test_the_statics_rest_where_mujoco_does(model):
     assert expected.rested.all()
     assert np.abs(expected.qpos).max() > 0.2
     np.testing.assert_allclose(result.position, expected.position, atol=1e-6)
+
+
+def end_of(model, direction, torque):
+    """How far the first joint bends under a torque, N m, towards `direction`, rad of its whole bend, without springs."""
+    chain = read_chain(model)
+    chain = chain._replace(stiffness=0 * chain.stiffness, diagonal=0 * chain.diagonal)
+    state, nothing = new_state(UNITS, 3), np.zeros((4, 3))
+    pull = Pull(*nothing, np.zeros((UNITS, 2)), 0.0, np.zeros((UNITS, 3)))
+    toward = np.array([np.cos(direction), np.sin(direction)])
+    low, high, q = 0.0, np.pi / 2, np.zeros(2 * UNITS)
+    for _ in range(50):
+        q[:2] = 0.5 * (low + high) * toward
+        evaluate(chain, q, np.zeros(3), pull, state)
+        low, high = (q[:2] @ toward, high) if state.gradient[:2] @ toward < torque else (low, q[:2] @ toward)
+    return low
+
+
+def test_a_joint_ends_at_the_same_bend_along_axes_and_diagonals_and_hardly_later_between_them(ending):
+    for torque in (0.01, 0.3, 3.0):
+        along = end_of(ending, 0.0, torque)
+        assert along > END
+        np.testing.assert_allclose([end_of(ending, k * np.pi / 4, torque) for k in range(1, 8)], along, rtol=1e-9)
+        for k in range(8):
+            between = end_of(ending, (k + 0.5) * np.pi / 4, torque) / along
+            assert 1.0 < between < 1 / np.cos(np.pi / 8), "an octagon, less than 8.3 % beyond the circle"
+
+
+def test_hinges_that_end_by_themselves_let_a_joint_bend_further_between_their_axes():
+    square = ending_model(rounded=False)
+    assert not square.tendon_limited.any()
+    assert end_of(square, np.pi / 4, 0.01) > 1.4 * end_of(square, 0.0, 0.01)
+
+
+@pytest.mark.parametrize("toward", np.radians([45, 135, -45, -135]))
+def test_an_arm_bent_along_a_diagonal_rests_in_mujoco_where_the_statics_say(ending, toward):
+    chain = read_chain(ending)
+    gravity = 150 * np.array([[np.cos(toward), np.sin(toward), 0.0]])  # a heavy arm that hangs sideways
+    loose = chain.straight_lengths + chain.length
+    result, expected = actuated(chain, loose[None], gravity), settle(ending, loose[None], gravity)
+    angles, end = expected.qpos.reshape(-1, 2), np.sqrt(2) * END
+    diagonals = np.abs(np.stack([angles.sum(axis=1), angles[:, 0] - angles[:, 1]]))
+    assert expected.rested.all()
+    assert np.abs(angles).max() < END, "no hinge is at its limit: only the diagonals are"
+    assert end < diagonals.max() < 1.1 * end
+    np.testing.assert_allclose(result.position, expected.position, atol=1e-6)
+
+
+@pytest.mark.parametrize(("turn", "within"), [(np.pi / 8, 0.08), (np.pi / 4, 0.04)])
+def test_a_pull_that_is_turned_about_the_axis_bends_the_arm_alike(ending, turn, within):
+    """Its units' whole bends, and how far the tip gets: where it gets to also depends on the twist of hinges in a row.
+    With the hinges' limits alone, bends differ by 40 % and the tip by 16 % of the arm's length."""
+    bends, reached = [], []
+    for direction in (0, turn):
+        gravity = 150 * np.array([[np.cos(direction), np.sin(direction), 0.0]])
+        chain = read_chain(ending)
+        result = actuated(chain, chain.straight_lengths[None] + chain.length, gravity)
+        bends.append(np.linalg.norm(result.qpos[0].reshape(-1, 2), axis=1)[:3])
+        reached.append([np.hypot(*result.position[0, :2]), result.position[0, 2]])
+    assert bends[0].min() > END, "the units are at their limits"
+    np.testing.assert_allclose(bends[1], bends[0], rtol=within)
+    np.testing.assert_allclose(reached[1], reached[0], atol=within * chain.length)
+
+
+@pytest.mark.parametrize("ends", [([-0.3, 0.3], [-0.4, 0.4]), ([-0.3, 0.4], [-0.3, 0.4])])
+def test_limits_with_a_preferred_axis_stay_those_of_the_hinges(ends):
+    spec = small_spec(UNITS)
+    for name, end in zip(("unit_02_x", "unit_02_y"), ends, strict=True):
+        spec.joint(name).range = end
+    add_elements(spec, Joints(round=True), 1e-5)
+    limited = {spec.tendons[t.id].name: bool(spec.compile().tendon_limited[t.id]) for t in spec.tendons}
+    assert [limited[f"unit_0{unit}_x_diagonal_1"] for unit in (1, 2, 3)] == [True, False, True]
+
+
+def test_limits_in_degrees_are_those_in_radians():
+    degrees = small_spec(UNITS)
+    degrees.compiler.degree = True
+    for joint in degrees.joints:
+        joint.range = [-np.degrees(END), np.degrees(END)]
+    add_elements(degrees, Joints(round=True), 1e-5)
+    model, (tendons, _) = degrees.compile(), ArmModel(degrees.compile()).diagonal_lengths(np.zeros(2 * UNITS))
+    np.testing.assert_allclose(model.tendon_range[tendons, 1], np.tile(np.sqrt(2) * model.jnt_range[::2, 1], 2))
+    np.testing.assert_allclose(model.jnt_range[:, 1], END)
 
 
 def test_a_rest_shape_is_where_the_arm_hangs(model):

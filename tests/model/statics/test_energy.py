@@ -53,7 +53,10 @@ def test_gradient_and_hessian_are_the_derivatives_of_the_energy(chain):
     energy.evaluate(chain, q, GRAVITY, pull, state)
     hessian = dense(energy.find_hessian(GRAVITY, pull, state))
     gradient = state.gradient.copy()
-    assert (np.abs(q) > 0.35).any(), "no joint is beyond its limit: the test would miss the limits"
+    angles = q.reshape(-1, 2)
+    beyond = np.stack([*angles.T, angles.sum(axis=1), angles[:, 0] - angles[:, 1]], axis=1)
+    below, above = (beyond < chain.limit[..., 0]).any(axis=0), (beyond > chain.limit[..., 1]).any(axis=0)
+    assert (below | above).all(), "one of the limits is not passed: the test would miss it"
     for j in range(len(q)):
         ahead, behind = q.copy(), q.copy()
         ahead[j] += step
@@ -110,7 +113,7 @@ def test_lengths_and_their_gradients_are_mujocos(model, chain):
 
 def test_passive_torques_are_mujocos(model, chain):
     """Springs and gravity: minus the gradient without tendons, inside the limits."""
-    data, q = mujoco.MjData(model), bent(chain, seed=2, reach=0.25)
+    data, q = mujoco.MjData(model), bent(chain, seed=2, reach=0.18)
     model.opt.gravity[:] = GRAVITY
     data.qpos[:] = q
     mujoco.mj_forward(model, data)
@@ -131,6 +134,22 @@ def test_limit_torque_is_mujocos_constraint_force_at_rest(model, chain, depth):
     assert list(data.efc_id[row]) == [joint]
     expected = data.efc_D[row[0]] * data.efc_aref[row[0]]
     gain, impedance = chain.limit_gain[joint // 2, joint % 2], chain.limit_impedance[joint // 2, joint % 2]
+    assert limit_torque(gain, impedance, depth)[0] == pytest.approx(expected, rel=1e-10)
+
+
+@pytest.mark.parametrize("depth", [1e-4, 0.015, 0.03, 0.2])
+@pytest.mark.parametrize("number", [0, 1])
+def test_the_limit_of_a_diagonal_is_mujocos_too(model, chain, number, depth):
+    """With the inverse inertia of the tendon, and along both hinges."""
+    data, unit = mujoco.MjData(model), 2
+    tendon = ArmModel(model).diagonals[number].tendon[unit]
+    half = (chain.limit[unit, 2 + number, 1] + depth) / 2
+    data.qpos[2 * unit : 2 * unit + 2] = half, (1 - 2 * number) * half
+    mujoco.mj_forward(model, data)
+    row = np.flatnonzero(data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON))
+    assert list(data.efc_id[row]) == [tendon]
+    expected = data.efc_D[row[0]] * data.efc_aref[row[0]]
+    gain, impedance = chain.limit_gain[unit, 2 + number], chain.limit_impedance[unit, 2 + number]
     assert limit_torque(gain, impedance, depth)[0] == pytest.approx(expected, rel=1e-10)
 
 

@@ -9,17 +9,25 @@ a band of shapes at rest, of which the model's statics are the middle.
 A round joint hardens by its whole bend, whichever way: its energy is K/2 (x² + y²) + K c/4 (x² + y²)². Two hinges that
 harden each by itself would be half as hard half-way between their axes. As 3 (x² + y²)² = 2 x⁴ + 2 y⁴ + ((x + y)⁴ +
 (x - y)⁴)/2, hinges have two thirds of K c, and two fixed tendons, the diagonals x + y and x - y, a sixth each.
+
+Nor has a round joint a side to which it bends further. Hinges that end at r each would let it bend by √2 r half-way
+between their axes; |x ± y| ≤ √2 r, the same r along the diagonals, make an octagon of that square, which lets it bend
+by r / cos 22.5°, 8 % beyond the circle, at most. MuJoCo divides a limit's force by the inverse inertia that it moves,
+w of a hinge and 2 w of a diagonal, whose length grows √2 times as fast as the bend: a torque √2 · √2 / 2 as large, the
+same. What is in rad of a hinge is √2 times that of a diagonal: range, margin, and the width in `solimp`.
 """
 
 from dataclasses import dataclass, field
 from typing import Annotated
 
 import mujoco
+import numpy as np
 from pydantic import Field
 
 from trunkline.errors import InputError
 from trunkline.model.arm_model import BRANCH, DIAGONAL, DIAGONAL_SHARE, HINGE_SHARE, SLIDER, TIE
 
+LIMIT_FIELDS = ("jnt_limited", "jnt_range", "jnt_margin", "jnt_solref", "jnt_solimp")
 LIGHT = 1e-9  # kg and kg m², what MuJoCo wants of a body that moves; its damping makes it follow, not its inertia
 
 Share = Annotated[float, Field(gt=0, le=10)]
@@ -45,7 +53,7 @@ class JenkinsElement:
 class Joints:
     """What each joint has beside its spring and damper: `branch` 1, 2, … and `slider` 1, 2, … in this order.
 
-    round: whether it hardens by its whole bend, in place of each of its two hinges by its own.
+    round: whether it hardens, and ends, by its whole bend, in place of each of its two hinges by its own.
     """
 
     branches: Annotated[list[MaxwellElement], Field(max_length=3)] = field(default_factory=list)
@@ -87,6 +95,7 @@ def add_elements(spec: mujoco.MjSpec, joints: Joints, armature: float) -> None:
 
 
 def _make_round(spec: mujoco.MjSpec) -> None:
+    model = spec.copy().compile()  # its limits are in rad, whatever the file's unit
     for body in spec.bodies:
         hinges = list(body.joints)
         if not hinges:
@@ -100,8 +109,22 @@ def _make_round(spec: mujoco.MjSpec) -> None:
             diagonal = spec.add_tendon(name=name, stiffness=[0, 0, DIAGONAL_SHARE * springs[0][2]])
             diagonal.wrap_joint(hinges[0].name, 1)
             diagonal.wrap_joint(hinges[1].name, sign)
+            _limit_diagonal(diagonal, model, [model.joint(hinge.name).id for hinge in hinges])
         for hinge in hinges:
             hinge.stiffness = [springs[0][0], 0, HINGE_SHARE * springs[0][2]]
+
+
+def _limit_diagonal(diagonal, model: mujoco.MjModel, hinges: list[int]) -> None:
+    """Let it end where two hinges of `model` do, in place, if these end alike on all four sides; else their limits have
+    a preferred axis."""
+    (low, high), outward = model.jnt_range[hinges[0]], np.sqrt(2)
+    alike = all(len(np.unique(getattr(model, name)[hinges], axis=0)) == 1 for name in LIMIT_FIELDS)
+    if not (alike and model.jnt_limited[hinges[0]] and low == -high):
+        return
+    diagonal.limited, diagonal.range = True, [outward * low, outward * high]
+    diagonal.margin = outward * model.jnt_margin[hinges[0]]
+    diagonal.solref_limit, diagonal.solimp_limit = model.jnt_solref[hinges[0]], model.jnt_solimp[hinges[0]]
+    diagonal.solimp_limit[2] *= outward
 
 
 def _light_body(spec: mujoco.MjSpec, name: str):

@@ -189,5 +189,5 @@ def longest_step(model: mujoco.MjModel) -> float:
 
     MuJoCo softens a joint limit whose time constant is less than two steps (flag refsafe).
     """
-    constants = model.jnt_solref[:, 0][model.jnt_solref[:, 0] > 0]  # the others are in another format
-    return min([LONGEST_STEP, *constants / 2])
+    constants = np.append(model.jnt_solref[:, 0], model.tendon_solref_lim[model.tendon_limited.astype(bool), 0])
+    return min([LONGEST_STEP, *constants[constants > 0] / 2])  # the others are in another format

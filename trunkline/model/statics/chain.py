@@ -12,7 +12,7 @@ import numpy as np
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.model.arm_model import ArmModel
-from trunkline.model.statics.limits import limit_angles, limit_energies, limit_gains, limit_impedances
+from trunkline.model.statics.limits import hinge_limits, limit_energies, tendon_limits
 from trunkline.model.statics.supported import require_supported
 from trunkline.model.statics.tendon_paths import tendon_crossings, tendon_holes
 
@@ -32,10 +32,11 @@ class Chain(NamedTuple):
         diagonal, slack: c and l of the torque -c (x - l)³ on the sum x of both angles, and on their difference, of
             joints that are round. Shape (n, 2).
         rest: spring references, rad. Shape (n, 2).
-        limit: lower and upper angle at which a limit starts to push, rad (infinite if none). Shape (n, 2, 2).
-        limit_gain: k / dof_invweight0, N m/rad: see `limits.limit_torque`. Shape (n, 2).
-        limit_impedance: solimp. Shape (n, 2, 5).
-        limit_energy: of a limit at the depth from which its impedance is constant, J. Shape (n, 2).
+        limit: lower and upper angle at which a limit starts to push, rad (infinite if none): of the hinges, of the sum
+            of both angles and of their difference. Shape (n, 4, 2).
+        limit_gain: k / invweight0, N m/rad: see `limits.limit_torque`. Shape (n, 4).
+        limit_impedance: solimp. Shape (n, 4, 5).
+        limit_energy: of a limit at the depth from which its impedance is constant, J. Shape (n, 4).
         hole_in: site on the unit before, from the unit's joint, m. Shape (n, K, 3).
         hole_out: site on the unit, from its joint, m. Shape (n, K, 3).
         crosses: 1 where the tendon crosses the unit's joint, else 0. Shape (n, K).
@@ -132,9 +133,10 @@ def read_chain(model: mujoco.MjModel, tip_site: str = "tip") -> Chain:
     mass, center = _unit_inertials(model, data, units)
     holes = tendon_holes(model, data, units)
     hole_in, hole_out, crosses, fixed_length = tendon_crossings(holes, data, base, to_base, anchors)
-    gains, impedances = limit_gains(model, joints), limit_impedances(model, joints)
     tip, tip_quaternion = _tip(model, data, tip_site, units, base, to_base)
-    diagonal, slack = _diagonals(model, joints)
+    diagonal, slack, tendons = _diagonals(model, joints)
+    both = zip(hinge_limits(model, joints), tendon_limits(model, tendons), strict=True)
+    limit, gains, impedances = (np.concatenate(pair, axis=1) for pair in both)
     return Chain(
         offset=np.diff(anchors, axis=0, prepend=0.0),
         axes=data.xaxis[joints] @ to_base.T,
@@ -145,7 +147,7 @@ def read_chain(model: mujoco.MjModel, tip_site: str = "tip") -> Chain:
         diagonal=diagonal,
         slack=slack,
         rest=model.qpos_spring[joints],
-        limit=limit_angles(model, joints),
+        limit=limit,
         limit_gain=gains,
         limit_impedance=impedances,
         limit_energy=limit_energies(gains, impedances),
@@ -173,14 +175,16 @@ def _unit_inertials(model: mujoco.MjModel, data: mujoco.MjData, units: np.ndarra
     return mass, center
 
 
-def _diagonals(model: mujoco.MjModel, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """`diagonal` and `slack` of units with the hinges `joints` (n, 2), see `Chain`."""
-    stiffness, slack = np.zeros(joints.shape), np.zeros(joints.shape)
+def _diagonals(model: mujoco.MjModel, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`diagonal` and `slack` of units with the hinges `joints` (n, 2), see `Chain`, and the numbers of their tendons,
+    -1 for none. Shape (n, 2)."""
+    stiffness, slack, tendons = np.zeros(joints.shape), np.zeros(joints.shape), np.full(joints.shape, -1)
     for column, group in enumerate(ArmModel(model).diagonals):
         units = np.searchsorted(joints[:, 0], group.hinge)
         stiffness[units, column] = model.tendon_stiffnesspoly[group.tendon, 1]
         slack[units, column] = model.tendon_lengthspring[group.tendon, 0]
-    return stiffness, slack
+        tendons[units, column] = group.tendon
+    return stiffness, slack, tendons
 
 
 def _max_tensions(arm: ArmModel) -> np.ndarray:

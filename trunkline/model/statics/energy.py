@@ -80,12 +80,11 @@ def evaluate(chain, q, gravity, pull, state):
         energy += x * (x * (a / 2 + x * (b / 3 + x * c / 4)) - extra[i, h])
         torque = x * (a + x * (b + x * c)) - extra[i, h]
         state.stiffness[j] = a + x * (2 * b + 3 * x * c)
-        depth = max(limit[i, h, 0] - q[j], q[j] - limit[i, h, 1])
-        if depth > 0:
-            energy += limit_energy(chain, i, h, depth)
-            push, slope = limit_torque(chain.limit_gain[i, h], chain.limit_impedance[i, h], depth)
+        if not limit[i, h, 0] <= q[j] <= limit[i, h, 1]:
+            stored, push, slope = _limit(chain, i, h, q[j])
+            energy += stored
+            torque += push
             state.stiffness[j] += slope
-            torque += push if q[j] > limit[i, h, 1] else -push
         for t in range(tensions.shape[0]):
             torque += tensions[t] * state.share[i, t] * jacobian[t, j]
         gradient[j] = torque
@@ -95,18 +94,38 @@ def evaluate(chain, q, gravity, pull, state):
 
 
 @kernel
+def _limit(chain, i, h, angle):
+    """Energy, J, torque, N m, and slope, N m/rad, of limit h of unit i at an angle beyond it."""
+    low, high = chain.limit[i, h, 0], chain.limit[i, h, 1]
+    depth = max(low - angle, angle - high)
+    push, slope = limit_torque(chain.limit_gain[i, h], chain.limit_impedance[i, h], depth)
+    return limit_energy(chain, i, h, depth), push if angle > high else -push, slope
+
+
+@kernel
 def _add_diagonals(chain, q, state):
-    """Add the torques of round joints' diagonals to the gradient, and how they change; return their energy, J."""
-    energy, diagonal, slack, gradient = 0.0, chain.diagonal, chain.slack, state.gradient
+    """Add the torques of round joints' diagonals, of springs and limits, to the gradient, and how they change; return
+    their energy, J."""
+    energy, diagonal, slack, limit, gradient = 0.0, chain.diagonal, chain.slack, chain.limit, state.gradient
     for i in range(diagonal.shape[0]):
-        both, apart = q[2 * i] + q[2 * i + 1] - slack[i, 0], q[2 * i] - q[2 * i + 1] - slack[i, 1]
-        torque_both, torque_apart = diagonal[i, 0] * both * both, diagonal[i, 1] * apart * apart
-        energy += 0.25 * (torque_both * both * both + torque_apart * apart * apart)
-        gradient[2 * i] += torque_both * both + torque_apart * apart
-        gradient[2 * i + 1] += torque_both * both - torque_apart * apart
-        state.stiffness[2 * i] += 3 * (torque_both + torque_apart)
-        state.stiffness[2 * i + 1] += 3 * (torque_both + torque_apart)
-        state.coupling[i] = 3 * (torque_both - torque_apart)
+        state.coupling[i] = 0.0
+        for d in range(2):
+            sign = 1 - 2 * d
+            length = q[2 * i] + sign * q[2 * i + 1]
+            x = length - slack[i, d]
+            rate = diagonal[i, d] * x * x
+            energy += 0.25 * rate * x * x
+            torque, slope = rate * x, 3 * rate
+            if not limit[i, 2 + d, 0] <= length <= limit[i, 2 + d, 1]:
+                stored, push, stiffness = _limit(chain, i, 2 + d, length)
+                energy += stored
+                torque += push
+                slope += stiffness
+            gradient[2 * i] += torque
+            gradient[2 * i + 1] += sign * torque
+            state.stiffness[2 * i] += slope
+            state.stiffness[2 * i + 1] += slope
+            state.coupling[i] += sign * slope
     return energy
 
 

@@ -1,4 +1,10 @@
-"""Joint limits as MuJoCo makes them: read from the model, and the torque and energy of each at rest, as kernels."""
+"""Joint limits as MuJoCo makes them: read from the model, and the torque and energy of each at rest, as kernels.
+
+A unit has up to four: of its two hinges and, if it is round, of its diagonals, the sum of both angles and their
+difference, which are limits of fixed tendons. MuJoCo makes both kinds alike, each from fields of its own.
+"""
+
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -12,34 +18,57 @@ _NODES = 0.5 * (np.polynomial.legendre.leggauss(10)[0] + 1)
 _WEIGHTS = 0.5 * np.polynomial.legendre.leggauss(10)[1]
 
 
-def limit_angles(model: mujoco.MjModel, joints: np.ndarray) -> np.ndarray:
-    """Angles at which the limit's distance falls below its margin."""
-    margin = model.jnt_margin[joints][..., None] * [1, -1]
-    limited = model.jnt_limited[joints][..., None].astype(bool)
-    return np.where(limited, model.jnt_range[joints] + margin, [-np.inf, np.inf])
+class Limits(NamedTuple):
+    """Limits of angles, or of the lengths of tendons that are sums of angles.
+
+    Attributes:
+        span: lower and upper angle at which the limit's distance falls below its margin, rad, infinite if there is no
+            limit. Shape (..., 2).
+        gain: k / invweight0, N m/rad, see `limit_torque`. Shape (...).
+        impedance: solimp as MuJoCo clamps it. Shape (..., 5).
+    """
+
+    span: np.ndarray
+    gain: np.ndarray
+    impedance: np.ndarray
 
 
-def limit_gains(model: mujoco.MjModel, joints: np.ndarray) -> np.ndarray:
-    """k / dof_invweight0 with k from solref (MuJoCo docs, "Solver parameters: Reference")."""
-    solref, d_width = model.jnt_solref[joints], limit_impedances(model, joints)[..., 1]
-    time_constant, damping_ratio = solref[..., 0], solref[..., 1]
+def hinge_limits(model: mujoco.MjModel, joints: np.ndarray) -> Limits:
+    """Those of hinges, in the shape of their numbers `joints`."""
+    return _limits(
+        model, model.jnt_limited[joints], model.jnt_range[joints], model.jnt_margin[joints], model.jnt_solref[joints],
+        model.jnt_solimp[joints], model.dof_invweight0[model.jnt_dofadr[joints]],
+    )  # fmt: skip
+
+
+def tendon_limits(model: mujoco.MjModel, tendons: np.ndarray) -> Limits:
+    """Those of tendons, in the shape of their numbers; none where that is less than 0."""
+    there, free = tendons >= 0, np.broadcast_to([-np.inf, np.inf], (*tendons.shape, 2))
+    limits = Limits(free.copy(), np.zeros(tendons.shape), np.zeros((*tendons.shape, mujoco.mjNIMP)))
+    numbers = tendons[there]
+    of_those = _limits(
+        model, model.tendon_limited[numbers], model.tendon_range[numbers], model.tendon_margin[numbers],
+        model.tendon_solref_lim[numbers], model.tendon_solimp_lim[numbers], model.tendon_invweight0[numbers],
+    )  # fmt: skip
+    for values, wanted in zip(limits, of_those, strict=True):
+        values[there] = wanted
+    return limits
+
+
+def _limits(model: mujoco.MjModel, limited, span, margin, solref, solimp, inverse_weight) -> Limits:
+    """k is from solref (MuJoCo docs, "Solver parameters: Reference")."""
+    impedance = solimp.copy()
+    impedance[..., [0, 1, 3]] = np.clip(solimp[..., [0, 1, 3]], MIN_IMPEDANCE, MAX_IMPEDANCE)
+    impedance[..., 2] = np.maximum(0, solimp[..., 2])
+    impedance[..., 4] = np.maximum(1, solimp[..., 4])
+    time_constant, damping_ratio, d_width = solref[..., 0], solref[..., 1], impedance[..., 1]
     if not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_REFSAFE:
         time_constant = np.where(time_constant > 0, np.maximum(time_constant, 2 * model.opt.timestep), time_constant)
     with np.errstate(divide="ignore"):
         standard = 1 / np.maximum(mujoco.mjMINVAL, (d_width * time_constant * damping_ratio) ** 2)
-    direct = -solref[..., 0] / d_width**2
-    k = np.where(solref[..., 0] > 0, standard, direct)
-    dofs = model.jnt_dofadr[joints]
-    return k / model.dof_invweight0[dofs]
-
-
-def limit_impedances(model: mujoco.MjModel, joints: np.ndarray) -> np.ndarray:
-    """solimp as MuJoCo clamps it."""
-    solimp = model.jnt_solimp[joints].copy()
-    solimp[..., [0, 1, 3]] = np.clip(solimp[..., [0, 1, 3]], MIN_IMPEDANCE, MAX_IMPEDANCE)
-    solimp[..., 2] = np.maximum(0, solimp[..., 2])
-    solimp[..., 4] = np.maximum(1, solimp[..., 4])
-    return solimp
+    k = np.where(solref[..., 0] > 0, standard, -solref[..., 0] / d_width**2)
+    free = np.where(limited[..., None].astype(bool), span + margin[..., None] * [1, -1], [-np.inf, np.inf])
+    return Limits(free, k / inverse_weight, impedance)
 
 
 @kernel
@@ -58,8 +87,9 @@ def _sigmoid(x, midpoint, power):
 def limit_torque(gain, impedance, depth):
     """Torque (N m) that a joint limit returns at rest, `depth` rad beyond it, and its slope (N m/rad).
 
-    The constraint force at zero acceleration is d/(1-d) · k d r / dof_invweight0, with the impedance d(r) of
-    solimp and the k of solref, k = 1/(d_w² t_c² ζ²); `gain` is k / dof_invweight0 (MuJoCo docs, "Solver parameters").
+    The constraint force at zero acceleration is d/(1-d) · k d r / invweight0, with the impedance d(r) of solimp and the
+    k of solref, k = 1/(d_w² t_c² ζ²); `gain` is k / invweight0, that of the dof or the tendon (MuJoCo docs, "Solver
+    parameters").
     """
     d0, dw, width = impedance[0], impedance[1], impedance[2]
     slope = 0.0
@@ -78,7 +108,7 @@ def limit_torque(gain, impedance, depth):
 
 @kernel
 def limit_energy(chain, i, h, depth):
-    """Integral of `limit_torque` from 0 to `depth`, J, hinge h of unit i; by quadrature where the impedance varies."""
+    """Integral of `limit_torque` from 0 to `depth`, J, limit h of unit i; by quadrature where the impedance varies."""
     gain, impedance, width = chain.limit_gain[i, h], chain.limit_impedance[i, h], chain.limit_impedance[i, h, 2]
     if impedance[0] == impedance[1] or width <= NARROW:
         return 0.5 * limit_torque(gain, impedance, depth)[0] * depth
@@ -99,10 +129,10 @@ def _energy_between(gain, impedance, start, end):
 
 
 def limit_energies(gains: np.ndarray, impedances: np.ndarray) -> np.ndarray:
-    """Energy (J) at the depth from which on the impedance is constant. Shapes (n, 2), (n, 2, 5) and (n, 2)."""
+    """Energy (J) at the depth from which on the impedance is constant. Shapes (n, 4), (n, 4, 5) and (n, 4)."""
     energies = np.zeros(gains.shape)
-    for joint in np.ndindex(gains.shape):
-        gain, impedance = gains[joint], impedances[joint]
+    for limit in np.ndindex(gains.shape):
+        gain, impedance = gains[limit], impedances[limit]
         width, knee = impedance[2], impedance[3] * impedance[2]
-        energies[joint] = _energy_between(gain, impedance, 0.0, knee) + _energy_between(gain, impedance, knee, width)
+        energies[limit] = _energy_between(gain, impedance, 0.0, knee) + _energy_between(gain, impedance, knee, width)
     return energies
