@@ -1,4 +1,4 @@
-"""Identify damping, relaxation and, once more, stiffness from releases."""
+"""Identify damping and relaxation from releases."""
 
 from pathlib import Path
 

@@ -29,8 +29,9 @@ VALUES = {
     "stiffness": 2.5, "hardening": 0.7, "joint_friction": 0.01, "damping": 0.02, "tendon_friction": 0.8,
     "friction_time": 0.03, "kp": 1500.0, "kp_ratio_2": 1.3, "kp_ratio_3": 0.8, "kv": 60.0, "force_range": 45.0,
     "time_constant": 0.08, "capstan_friction": 0.25,
-    "relaxation": 0.5, "relaxation_time": 0.7, "relaxation_2": 0.1, "relaxation_time_2": 3.0, "hysteresis": 0.4,
-    "yield_bend": 0.01, "hysteresis_2": 0.15, "yield_bend_2": 0.06, "hysteresis_3": 0.08, "yield_bend_3": 0.2,
+    "relaxation": 0.5, "relaxation_time": 0.7, "relaxation_2": 0.1, "relaxation_time_2": 3.0,
+    "relaxation_3": 0.2, "relaxation_time_3": 8.0, "hysteresis": 0.4, "yield_bend": 0.01,
+    "hysteresis_2": 0.15, "yield_bend_2": 0.06, "hysteresis_3": 0.08, "yield_bend_3": 0.2,
     "rest_bend_x": 0.01, "rest_bend_y": -0.02, "rest_gradient_x": -0.01, "rest_gradient_y": 0.03,
     "dead_time": 0.04, "rate_limit": 0.3, "backlash": 0.002,
     "mount_tilt_x": 0.03, "mount_tilt_y": -0.02, "mount_twist": 0.05,
@@ -41,7 +42,7 @@ VALUES = {
 
 
 SLIDERS = [JenkinsElement(0.2, 0.02), JenkinsElement(0.1, 0.05), JenkinsElement(0.05, 0.1)]
-ELEMENTS = Joints([MaxwellElement(0.3, 0.5), MaxwellElement(0.2, 2.0)], SLIDERS)
+ELEMENTS = Joints([MaxwellElement(0.3, 0.5), MaxwellElement(0.2, 2.0), MaxwellElement(0.1, 5.0)], SLIDERS)
 
 
 def full_spec() -> mujoco.MjSpec:

@@ -35,7 +35,8 @@ def files(tmp_path_factory):
     spec = small_spec(max_force=20)
     for joint in spec.joints:
         joint.stiffness = [2 * joint.stiffness[0], 0, 2 * joint.stiffness[0]]
-    add_elements(spec, Joints([MaxwellElement(0.2, 0.5), MaxwellElement(0.1, 0.05)], round=True), 1e-5)
+    branches = [MaxwellElement(0.2, 0.5), MaxwellElement(0.1, 0.05), MaxwellElement(0.05, 5.0)]
+    add_elements(spec, Joints(branches, round=True), 1e-5)
     spec.compile()
     sources = replace(sources_in(tmp_path_factory.mktemp("start")), mjcf=spec.to_xml())
     files, violations = assemble(LABEL, sources, TRAJECTORY, ROBOT)

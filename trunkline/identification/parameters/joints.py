@@ -228,6 +228,8 @@ JOINT_PARAMETERS: dict[str, Parameter] = {
     "relaxation_time": _relaxation_time(1),
     "relaxation_2": _share(BRANCH, 2),
     "relaxation_time_2": _relaxation_time(2),
+    "relaxation_3": _share(BRANCH, 3),
+    "relaxation_time_3": _relaxation_time(3),
     "hysteresis": _share(SLIDER, 1),
     "yield_bend": _yield_bend(1),
     "hysteresis_2": _share(SLIDER, 2),
