@@ -157,9 +157,9 @@ class Laboratory:
             truth = self._truth(trial, mount, motion, index, begin)
             if with_motors:
                 truth.tendons = tuple(f"tendon_{k + 1}" for k in range(self.plant.tendons))
-                first = bench.skipped * bench.stride
-                sampled = slice(first, first + len(truth.time) * bench.stride, bench.stride)
-                truth.command_time, truth.commands = truth.time, bench.commands[index, sampled]
+                samples = bench.skipped + len(truth.time)
+                truth.command_time = (np.arange(samples) - bench.skipped) / SAMPLE_RATE  # sent before the first frame
+                truth.commands = bench.commands[index, : samples * bench.stride : bench.stride]
                 truth.tendon_positions = motion.wound[index]
             truths.append(truth)
         return truths

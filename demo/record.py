@@ -66,6 +66,7 @@ def main(config: Config) -> None:
     measurements, starts, start = [], {}, 0.0
     with output_folder(SESSION) as folder, progress(len(truths), "record", "logs") as bar:
         for truth, rng in zip(truths, instrument_rng.spawn(len(truths)), strict=True):
+            start -= min(truth.command_time, default=0.0)  # commands may come before the first frame
             measurements.append(measure(truth, config.instruments, rng, start))
             if truth.begin:
                 starts[truth.name] = start_in_log(truth, measurements[-1], start, config.instruments)

@@ -15,7 +15,8 @@ class Truth(TrialRecording):
     begin: s, when the arm is let go or the first command leaves; 0 for a static trial.
     base_position (3,), base_quaternion (4,) wxyz: pose of the base in the world, constant in a trial.
     positions (T, S, 3), quaternions (T, S, 4) wxyz: the markers in the world.
-    command_time (Tc,) s, commands (Tc, K): m of pull, as sent. tendon_positions (T, K): m of pull, as wound.
+    command_time (Tc,) s, below 0 for what brought the arm to rest, commands (Tc, K): m of pull, as sent.
+    tendon_positions (T, K): m of pull, as wound.
     """
 
     begin: float = 0.0

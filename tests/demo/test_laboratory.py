@@ -229,7 +229,9 @@ def test_more_experiments_change_no_trial_of_the_table():
     assert [truth.name for truth in extended[8:]] == names
     assert loaded_tilt.load == loaded_release.load == 0.05
     assert np.abs(loaded_release.positions[-1] - extended[2].positions[-1]).max() > 1e-4
-    np.testing.assert_allclose(pull.commands, np.tile([0.02, -0.3, -0.005], (len(pull.commands), 1)))
+    resting = pull.commands[pull.command_time >= 0]
+    np.testing.assert_allclose(resting, np.tile([0.02, -0.3, -0.005], (len(pull.time), 1)))
+    assert pull.commands[:, 0].max() == pytest.approx(0.02 * SHORT.pull_beyond), "the way there is in the log too"
     assert len(pull.time) == round(SHORT.rest_duration * SAMPLE_RATE)
     start = motion.commands[motion.command_time < motion.begin]
     np.testing.assert_array_equal(start, np.full_like(start, -0.002))

@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 
 from tests.model.arm.test_sections import ACTUATION, SOLVER, arm
+from tests.support.matched_plant import markers_of
+from tests.support.small_arm import small_spec
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.identification.parameters.parameters import candidate_fields
 from trunkline.identification.simulate.at_rest import shapes_at_rest
 from trunkline.identification.simulate.experiment import Experiment
 from trunkline.identification.simulate.pose_fit import PoseFit
+from trunkline.model.arm.guide_holes import GuideHoles, add_holes
 from trunkline.model.arm.tendons import Tendon
 from trunkline.model.arm_model import PRELOAD, WINDING, ArmModel
 from trunkline.model.simulation.rest import settle
@@ -95,3 +98,38 @@ def test_commands_draw_in_what_the_model_says():
     np.testing.assert_allclose(places, tips(other, path_of(other, drawn)), atol=1e-9)
     as_searched = tips(other, path_of(other, PULLS), {"winding": 0.8, "preload_1": 0.001, "preload_3": -0.0005})
     np.testing.assert_allclose(places, as_searched, atol=1e-9)
+
+
+def rubbing() -> mujoco.MjModel:
+    """An arm with friction on its holes, three cables, and hinges that bend far."""
+    spec = small_spec(6)
+    add_holes(spec, GuideHoles(0.3, 2))
+    return spec.compile()
+
+
+def held(model: mujoco.MjModel, pulls: np.ndarray, approach: int) -> Experiment:
+    """Motors hold `pulls` (3,), m; `approach` is the side from which they brought the arm there."""
+    hinges = ArmModel(model).hinge_count
+    return Experiment(
+        name="pull", kind="static_pull", split="identify", gravity=DOWN, start=np.zeros(hinges),
+        velocity=np.zeros(hinges), lead=0.0, controls=(model.tendon_length0[ArmModel(model).cables] - pulls)[None],
+        positions=np.zeros((1, 1, 3)), measured=np.ones((1, 1), dtype=bool), frame_step=0.0,
+        fit=PoseFit(np.zeros(hinges), np.zeros(1), 0, True), approach=approach,
+    )  # fmt: skip
+
+
+def test_cables_rub_to_the_side_from_which_the_arm_came():
+    """Drawn in, it bends less than in mid-band, and more where it was let come back; each as the statics have it."""
+    model, pulls = rubbing(), np.array([0.01, -0.3, -0.3])
+    fields = candidate_fields(model, {"capstan_friction": np.array([0.2])})
+    sites = ArmModel(model).marker_sites(markers_of(model))
+    chain = read_chain(model)
+    bends = []
+    for approach in (1, 0, -1):
+        experiment = held(model, pulls, approach)
+        shape = shapes_at_rest(model, fields, [experiment], sites, None)
+        followed = actuated(chain._replace(capstan=0.2 * approach), experiment.controls, DOWN)
+        assert followed.converged.all()
+        np.testing.assert_allclose(shape.angles[0], followed.qpos, atol=1e-6)
+        bends.append(np.linalg.norm(shape.angles[0].reshape(-1, 2), axis=1).sum())
+    assert bends[0] < bends[1] < bends[2]

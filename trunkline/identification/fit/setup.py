@@ -13,6 +13,8 @@ from trunkline.identification.parameters.per_session import names_in
 from trunkline.identification.simulate.experiment import Experiment, prepare
 from trunkline.identification.simulate.markers import with_measured_markers
 from trunkline.identification.simulate.resting import resting_shape
+from trunkline.model.arm_model import CAPSTAN_FRICTION
+from trunkline.recordings.trials.experiments import is_static
 from trunkline.recordings.trials.trial import Trial, sessions_of
 
 EVERY_ANGLE = f"tendon_angle{EVERY}"
@@ -22,18 +24,24 @@ def set_up(
     config: IdentificationSettings, trials: list[Trial], model: mujoco.MjModel
 ) -> tuple[mujoco.MjModel, list[Experiment], Fit]:
     """What `identify` works on: the model to begin with, its markers where they were measured if that is asked for,
-    an experiment for each trial, and what to fit to those of the kinds to identify from."""
+    an experiment for each trial, and what to fit to those of the kinds to identify from.
+
+    The friction of cables is not among it where no log shows how its arm came to rest, and none moves: then all rest in
+    mid-band.
+    """
     if config.markers == "measured":
         model = with_measured_markers(model, [t for t in trials if t.experiment in config.experiments])
     experiments = [prepare(trial, model, config.frames, config.command_delay) for trial in trials]
     fit = fit_of(config, trials[0].markers)
     names = names_in(model, config.parameters)
     fit.parameters = fit.parameters | {name: config.parameters[shared] for name, shared in names.items()}
+    fitted = [e for e in experiments if e.kind in config.experiments]
+    if not any(e.approach or not is_static(e.kind) for e in fitted):
+        fit.parameters = {name: span for name, span in fit.parameters.items() if name != CAPSTAN_FRICTION}
     if config.rest_shape == "measured" and (others := sessions_of(trials)[1:]):
         expected = "expected one, or rest_shape: unchanged"
         raise InputError(f"rest_shape: measured: found {1 + len(others)} sessions, {expected}")
     if config.rest_shape == "measured":
-        fitted = [e for e in experiments if e.kind in config.experiments]
         fit.rest = resting_shape(model, fitted, fit.markers)
     return model, experiments, fit
 

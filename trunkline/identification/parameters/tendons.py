@@ -41,6 +41,11 @@ def _plays(kind: ExperimentKind) -> bool:
     return kind.needs_motors and (not kind.static or kind.stepwise)
 
 
+def _slides(kind: ExperimentKind) -> bool:
+    """Which way cables slide is known of motions, and of pulls at rest by how they were approached."""
+    return kind.needs_motors and not kind.stepwise
+
+
 def _of_all(
     unit: str, field: str, column: int | None = None, sign: float = 1.0, part: ArmPart = TENDONS,
     identifiable_from=pulled_and_moving,
@@ -126,7 +131,7 @@ TENDON_PARAMETERS: dict[str, Parameter] = {
     # the smallest speed at which a regularised friction yields falls with it: a slow one lets a hook creep straight
     "friction_time": _of_all("s", "tendon_solref_fri", 0, identifiable_from=moving),
     # μ of cables on the holes that they pass, in the capstan equation
-    "capstan_friction": number(CAPSTAN_FRICTION, "", HOLES),
+    "capstan_friction": number(CAPSTAN_FRICTION, "", HOLES, _slides),
     "kp": Parameter(
         "N/m", ("actuator_gainprm", "actuator_biasprm"), lambda m: float(m.actuator_gainprm[0, 0]), _write_kp,
         part=TENDONS, identifiable_from=pulled,

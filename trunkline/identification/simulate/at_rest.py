@@ -34,8 +34,8 @@ def shapes_at_rest(
 ) -> Shapes:  # fmt: skip
     """The stable equilibrium of every candidate to which Newton's method comes from where the trial was measured, or
     from `near`, as `Shapes.angles` has it; where it comes to none, and where every frame is a shape of its own, the one
-    that is reached from the arm without pull, or from its neighbours on the path. Cables do not rub: rest is in the
-    middle of what friction can hold.
+    that is reached from the arm without pull, or from its neighbours on the path. Cables rub as the trial's approach
+    has it; where that cannot be told they do not: rest is in the middle of what friction can hold.
 
     Args:
         fields: of the candidates, as `parameters.candidate_fields`.
@@ -48,20 +48,23 @@ def shapes_at_rest(
     if near is not None:
         nearby = np.concatenate(near)
         starts = np.where(np.isfinite(nearby), nearby, starts)
-    gravity, loads = (np.array([getattr(e, name) for e in experiments])[trial] for name in ("gravity", "load"))
+    gravity, loads, approaches = (
+        np.array([getattr(e, name) for e in experiments])[trial] for name in ("gravity", "load", "approach")
+    )
     places = np.full((count, len(trial), len(sites), 3), np.nan)
     angles, iterations = np.full((len(trial), arm.hinge_count), np.nan), 0
     for candidate in range(count):
         set_fields(candidate_model, fields, candidate)
         if "jnt_pos" in fields:  # what softens joint limits follows, as when such a model is compiled
             mujoco.mj_setConst(candidate_model, data)
-        chain = read_chain(candidate_model).smooth
+        chain = read_chain(candidate_model)
         mujoco.mj_kinematics(candidate_model, data)
         turned = gravity @ data.xmat[arm.base_body].reshape(3, 3)  # into the mount's frame, which may be tilted
         sent = np.concatenate([_sent(candidate_model, e) for e in experiments])
         qpos = np.full(angles.shape, np.nan)
-        for load in np.unique(loads):
-            chosen, loaded = np.flatnonzero(loads == load), chain.loaded(load)
+        for load, approach in sorted(set(zip(loads.tolist(), approaches.tolist(), strict=True))):
+            chosen = np.flatnonzero((loads == load) & (approaches == approach))
+            loaded = chain._replace(capstan=approach * chain.capstan).loaded(load)
             guessed = chosen[np.isfinite(starts[chosen]).all(axis=1)]
             solved = actuated_from(loaded, starts[guessed], sent[guessed], turned[guessed])
             qpos[guessed[solved.converged]] = solved.qpos[solved.converged]

@@ -44,6 +44,7 @@ class Experiment:
         fit: how well the start matches the measurement.
         repaired: whether `ingest` changed anything in the trial.
         session: to which the trial belongs.
+        approach: as in the trial: 1 if motors drew the arm to where it rests, -1 from beyond, 0 if that is unknown.
     """
 
     name: str
@@ -61,6 +62,7 @@ class Experiment:
     repaired: bool = False
     load: float = 0.0
     session: str = ""
+    approach: int = 0
 
     @property
     def frames(self) -> int:
@@ -116,6 +118,7 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
         repaired=trial.repairs > 0,
         load=trial.load,
         session=trial.session,
+        approach=trial.approach,
     )
 
 

@@ -98,7 +98,7 @@ def _raw_trial(
             positions, base_positions, base_quaternions = positions[part], base_positions[part], base_quaternions[part]
             quaternions = None if quaternions is None else quaternions[part]
             stretch = stretch.part(part)
-    motors = read_motors(source, session, stretch, limits, where, findings)
+    motors = read_motors(source, session, stretch, trial.experiment, limits, where, findings)
     if EXPERIMENTS[trial.experiment].needs_motors:
         check_motors(source, session, reference.joint_topics, motors, stretch, limits, where)
     raw = RawTrial(

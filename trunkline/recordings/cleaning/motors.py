@@ -11,8 +11,10 @@ from trunkline.recordings.logs.joint_stream import JointStream
 from trunkline.recordings.logs.messages import JOINTS
 from trunkline.recordings.session.session import Session
 from trunkline.recordings.session.source import LogSource
+from trunkline.recordings.trials.experiments import is_held
 
 ROLES = ("command", "tendon position")
+HISTORY = 60.0  # s before an arm at rest under its motors in which its last motion is looked for
 
 
 @dataclass
@@ -27,9 +29,11 @@ class MotorSignals:
 
 
 def read_motors(
-    source: LogSource, session: Session, stretch: Stretch, limits: TrialLimits, where: str, findings: Findings
-) -> MotorSignals:
-    """The messages near enough to the stretch, dated from its first frame.
+    source: LogSource, session: Session, stretch: Stretch, experiment: str, limits: TrialLimits, where: str,
+    findings: Findings,
+) -> MotorSignals:  # fmt: skip
+    """The messages near enough to the stretch, dated from its first frame; of commands that hold an arm at rest also
+    those that brought it there.
 
     Raises:
         InputError: the tendons of a topic are not those of session.yaml, or of the other topic.
@@ -57,7 +61,8 @@ def read_motors(
         pulls = stream.positions[rows][:, columns]
         if coupling is not None:
             pulls = pulls @ coupling.T
-        near = (seconds > -limits.clock_offset) & (seconds < stretch.time[-1] + limits.clock_offset)
+        earlier = HISTORY if role == "command" and is_held(experiment) else 0.0
+        near = (seconds > -limits.clock_offset - earlier) & (seconds < stretch.time[-1] + limits.clock_offset)
         finite = np.isfinite(pulls).all(axis=1)
         if not finite.all():
             findings.repairs.append(f"{int(np.sum(~finite))} {role} messages that are not finite dropped")
@@ -86,7 +91,7 @@ def check_motors(
         if name is not None and name not in joint_topics:
             raise InputError(f"{where}: topics.{key}: found {name!r}, which no log has, expected one of: {others}")
     streams = (source.commands, source.tendon_positions)
-    within = [motors.commands.size > 0, motors.tendon_positions.size > 0]
+    within = [bool(np.any(t > -limits.clock_offset)) for t in (motors.command_time, motors.tendon_time)]
     lost = [stream for stream, some in zip(streams, within, strict=True) if stream and len(stream.stamps) and not some]
     if any(within) and not lost:
         return

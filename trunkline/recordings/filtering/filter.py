@@ -10,10 +10,11 @@ from scipy.ndimage import binary_dilation
 
 from trunkline.errors import InputError
 from trunkline.frames import make_continuous, tilt_of_gravity
+from trunkline.recordings.filtering.approach import approach_of
 from trunkline.recordings.filtering.effect import Effect
 from trunkline.recordings.signals.base_frame import BasePose, average_base, gravity_from_up, to_base_frame
 from trunkline.recordings.signals.smoothing import bridged, fill_gaps, low_pass, outliers, resample
-from trunkline.recordings.trials.experiments import EXPERIMENTS, ExperimentKind
+from trunkline.recordings.trials.experiments import EXPERIMENTS, ExperimentKind, is_held
 from trunkline.recordings.trials.raw_trial import RawTrial
 from trunkline.recordings.trials.trial import Trial
 
@@ -77,6 +78,8 @@ def filter_raw_trial(raw: RawTrial, settings: Filter) -> tuple[Trial, Effect]:
     if kind.static:
         motion = float(np.sqrt(np.mean(np.var(trial.positions, axis=0))))
         trial = average_static(trial)
+        if is_held(raw.experiment):
+            trial.approach = approach_of(raw)
     trial = replace(trial, **start_of(trial, kind, settings))
     effect = Effect(
         samples=frames * count,

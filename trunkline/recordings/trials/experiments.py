@@ -131,3 +131,9 @@ def is_stepwise(experiment: str) -> bool:
 def is_static(experiment: str) -> bool:
     """Whether the arm rests throughout a trial of this kind."""
     return EXPERIMENTS[experiment].static
+
+
+def is_held(experiment: str) -> bool:
+    """Whether motors hold the arm in one shape at rest throughout a trial of this kind."""
+    kind = EXPERIMENTS[experiment]
+    return kind.static and kind.needs_motors and not kind.stepwise

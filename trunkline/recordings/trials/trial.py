@@ -31,6 +31,8 @@ class Trial(TrialRecording):
     in_motion: whether the arm moves at `start` already.
     swaying: whether a hand still moved it when it let go, so that it starts with the velocity that it had before.
     repairs: how many `ingest` made in it.
+    approach: of an arm that motors hold at rest, 1 if they drew it there, -1 if they let it come back from beyond, 0 if
+    the commands do not say so.
     """
 
     gravity: np.ndarray
@@ -40,6 +42,7 @@ class Trial(TrialRecording):
     in_motion: bool = False
     swaying: bool = False
     repairs: int = 0
+    approach: int = 0
 
 
 def sessions_of(trials: list[Trial]) -> list[str]:
@@ -64,6 +67,7 @@ def write_trials(folder: Path, trials: list[Trial]) -> None:
             "in_motion": trial.in_motion,
             "swaying": trial.swaying,
             "repairs": trial.repairs,
+            "approach": trial.approach,
             "frames": len(trial.time),
             "markers": list(trial.markers),
             "tendons": list(trial.tendons),
@@ -84,6 +88,7 @@ def write_trials(folder: Path, trials: list[Trial]) -> None:
             "in_motion": pa.bool_(),
             "swaying": pa.bool_(),
             "repairs": pa.int64(),
+            "approach": pa.int64(),
             "frames": pa.int64(),
             "markers": pa.list_(pa.string()),
             "tendons": pa.list_(pa.string()),
@@ -143,6 +148,7 @@ def read_trials(folder: Path, splits: tuple[str, ...]) -> list[Trial]:
                 in_motion=row["in_motion"],
                 swaying=row["swaying"],
                 repairs=row["repairs"],
+                approach=row["approach"],
             )
         )
     return [trial for trial in trials if trial.split in splits]
