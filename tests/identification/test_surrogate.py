@@ -47,6 +47,19 @@ class Jumping(BentResiduals):
         return [block + self.rng.normal(0, 0.02, block.shape) for block in super().residuals(vectors)]
 
 
+class JumpingBesideAnIdleOne(BentResiduals):
+    """Of three parameters the last is in no residual: it moves no jump either."""
+
+    parameters = (*BentResiduals.parameters, "force_range")
+    rubs = True
+
+    def residuals(self, vectors, near=None):
+        blocks = super().residuals(vectors[:, :2])
+        rngs = [np.random.default_rng(np.frombuffer(row.tobytes(), np.uint32)) for row in vectors[:, :2]]
+        jumps = np.stack([rng.normal(0, 0.02, (TRIALS, ROWS)) for rng in rngs], axis=1)
+        return [block + jump for block, jump in zip(blocks, jumps, strict=True)]
+
+
 def bent(curvature):
     rng = np.random.default_rng(5)
     bends = curvature * (np.eye(2) + rng.normal(size=(TRIALS, ROWS, 2, 2)))
@@ -118,6 +131,19 @@ def test_what_no_residual_depends_on_does_not_spoil_the_others():
     moves = second_order.moves(weights)
     assert (np.abs(moves[:, 1]) <= LONGEST).all()
     np.testing.assert_allclose(moves[:, 0], [problem.minimum(row)[0] - vector[0] for row in weights], atol=1e-5)
+
+
+def test_where_cables_rub_it_moves_nowhere():
+    """The least-squares fit gave it a slope, from the others' jumps, and the next descent took it to a bound."""
+    problem = bent(CURVATURE)
+    vector, smooth, _ = around(problem)
+    jumping = JumpingBesideAnIdleOne(problem.offsets, problem.slopes, problem.bends)
+    three = surrogate(jumping, np.append(vector, 0.0))
+    weights = np.concatenate([1 - np.eye(TRIALS), np.ones((1, TRIALS))])
+    assert (three.minima(weights)[:, 2] == 0).all()
+    np.testing.assert_array_equal(three.determines(np.ones(TRIALS)), [True, True, False])
+    error = three.moves(weights)[:, :2] - smooth.moves(weights)
+    assert np.abs(error).max() < 0.1 * np.abs(smooth.moves(weights)).max()
 
 
 def test_seen_from_another_place_losses_and_minima_are_the_same():

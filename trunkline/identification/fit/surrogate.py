@@ -24,6 +24,7 @@ LEAST_DAMPING, MOST_DAMPING = 1e-9, 1e6
 LONGEST = 3.0  # of a move, along each axis: nothing is known out there, nor of what no trial depends on
 ALONE = 1e-9  # share of a parameter's information: with less, trials do not tell it
 LEAST_COLUMN = 1e-12  # of the largest: what is shorter is taken for rounding
+LEAST_CHANGE = 1e-12  # of the squared residuals, by a parameter that they depend on; less is rounding
 SETTLED = 1e-12  # relative decrease of the loss
 
 
@@ -136,8 +137,19 @@ def _fitted(features: np.ndarray, products: np.ndarray, count: int) -> np.ndarra
         jumps = left.sum() / spare * np.square(solve).sum(axis=1)
         shares = np.clip(1 - jumps / np.maximum(np.diag(grams.sum(axis=0)), 1e-300), 0, 1)
         shares[: count + 1] = 1
+        slopes = slopes_at(np.ones((1, count)))[0]
+        shares[slopes[:, _without_effect(products, count)].any(axis=1)] = 0  # of all features that contain one of them
         grams = grams * np.outer(shares, shares)
     return grams
+
+
+def _without_effect(products: np.ndarray, count: int) -> np.ndarray:
+    """Which of P = `count` parameters leave the residuals as they are at both ends of their axis, of inner products
+    (T, N, N) at the places of `_composite`. Shape (P,)."""
+    total = products.sum(axis=0)
+    axes = np.arange(1, 2 * count + 1)
+    changes = total[axes, axes] - 2 * total[0, axes] + total[0, 0]
+    return (changes <= LEAST_CHANGE * total[0, 0]).reshape(2, count).all(axis=0)
 
 
 def reaches(problem: Problem) -> np.ndarray:
