@@ -3,8 +3,9 @@
 A small arm of known parameters makes noisy trials again and again (`tests/support/noisy_trials.py`). Each time its
 parameters are searched for as the stages do, by least squares, from a model whose own are drawn from the whole range,
 a tenth to ten times the truth, and get their intervals. They are those of params.yaml, but for `capstan_friction`, as
-the arm's cables do not rub. What may be 0 or less is searched for in the committed range, from 0. One stage is done for
-a second plant too, which is not the model: heavier, with dry friction in its joints.
+the arm's cables do not rub, and with `stiffness` from releases too, as for an arm without shapes at rest. What may be 0
+or less is searched for in the committed range, from 0. One stage is done for a second plant too, which is not the
+model: heavier, with dry friction in its joints.
 """
 
 import argparse
@@ -86,9 +87,9 @@ STAGES = {
 def bounds_of(name: str) -> dict[str, Bounds]:
     """The ranges of a stage's parameters: about the truth, and no wider than the committed ones that hold it, which
     keep a slow branch and a fast one apart."""
-    found = {}
+    found, ranges = {}, committed("identify_stiffness").parameters | committed(f"identify_{name}").parameters
     for key, value in STAGES[name].true.items():
-        own = committed(f"identify_{name}").parameters[key]
+        own = ranges[key]
         low = max(own.low, value / RANGE) if own.low < value else value / RANGE
         high = min(own.high, value * RANGE) if own.high > value else value * RANGE
         found[key] = own if parameter_named(key).signed else Bounds(low, high)
