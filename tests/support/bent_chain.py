@@ -31,8 +31,8 @@ def stump() -> mujoco.MjModel:
 
 
 def hardening_stump() -> mujoco.MjModel:
-    """The stump with hardening, lopsided springs that rest bent, other limits, tilted hinge axes and diagonals with limits:
-    everything that the plain one leaves at zero."""
+    """The stump with hardening, lopsided springs that rest bent, other limits, tilted hinge axes and diagonals with
+    limits: everything that the plain one leaves at zero."""
     spec = stump_spec()
     rng = np.random.default_rng(7)
     for joint in spec.joints:

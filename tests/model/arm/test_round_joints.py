@@ -98,7 +98,7 @@ def test_the_statics_rest_where_mujoco_does(model):
 
 
 def end_of(model, direction, torque):
-    """How far the first joint bends under a torque, N m, towards `direction`, rad of its whole bend, without springs."""
+    """How far the first joint bends under a torque, N m, towards `direction`: its whole bend, rad, without springs."""
     chain = read_chain(model)
     chain = chain._replace(stiffness=0 * chain.stiffness, diagonal=0 * chain.diagonal)
     state, nothing = new_state(UNITS, 3), np.zeros((4, 3))
