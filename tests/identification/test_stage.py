@@ -124,7 +124,7 @@ def test_a_missing_split_is_named(project):
 @pytest.mark.parametrize(
     ("experiments", "way_out"),
     [
-        (["static_tilt", "static_pull"], "static_pull .* `source: tilts` under identify_stiffness, and no `kp` there"),
+        (["static_tilt", "static_pull"], "static_pull .* under identify_stiffness, and no `kp` or `capstan_friction`"),
         (["release"], "no release trial with split identify, expected at least one$"),
         (["curl", "motion"], "`experiments: [curl]` under identify_control: data/raw/README.md"),
     ],

@@ -214,7 +214,10 @@ def test_a_mistaken_range_of_a_parameter(tmp_path, old, new, message):
 
 
 # of source: what it does not tell of the parameters in params.yaml
-UNTOLD = {"tilts": ("kp",), "releases": ("joint_place", "kp", "rest_bend", "rest_gradient")}
+UNTOLD = {
+    "tilts": ("kp", "capstan"), "releases": ("joint_place", "kp", "rest_bend", "rest_gradient", "capstan"),
+    "paths": ("capstan",),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("stage", STAGES)

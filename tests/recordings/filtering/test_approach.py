@@ -44,7 +44,7 @@ def test_the_last_motion_of_the_motors_that_pull_counts(columns, approach):
 
 def test_what_comes_after_the_rest_does_not_count():
     trial = held([0, 40, 40, 40])
-    trial.commands[BEFORE > 0.9 * TIME[-1]] = 0.02
+    trial.commands[0.9 * TIME[-1] < BEFORE] = 0.02
     assert filter_raw_trial(trial, SETTINGS)[0].approach == 1
 
 

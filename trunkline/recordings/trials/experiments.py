@@ -94,7 +94,7 @@ EXPERIMENTS: dict[str, ExperimentKind] = {
         static=True,
         needs_motors=True,
         words=("pull",),
-        without="`source: tilts` under identify_stiffness, and no `kp` there",
+        without="`source: tilts` under identify_stiffness, and no `kp` or `capstan_friction` there",
     ),
     "static_path": ExperimentKind(
         what="at rest in every frame, tendons moved a step in between",
