@@ -161,7 +161,7 @@ class RehearsedSession:
         plan."""
         self.previewer.predict()
         self.controller.poll(self.now)
-        return self.controller.foreseen
+        return self.controller.prediction
 
     def frame(self) -> View:
         """Let a frame pass."""
@@ -188,8 +188,8 @@ class RehearsedSession:
         view = View(self.now, intent, self.in_client_frame(self.place(self.now)), tip, None, controller.world)
         if intent.mode in ("preview", "ready", "delay"):
             view.previewed = self.previewed
-            if controller.foreseen is not None:
-                view.probability, view.offer = controller.foreseen.probability, controller.foreseen.offer
+            if controller.prediction is not None:
+                view.probability, view.offer = controller.prediction.probability, controller.prediction.offer
         return view
 
     def _end(self, plan: Plan | None, intent: Intent) -> np.ndarray | None:

@@ -1,6 +1,7 @@
 """What a run comes to, its rows in a table that is resumed, and rates with their intervals."""
 
 import csv
+from collections.abc import Sequence
 from dataclasses import MISSING, asdict, dataclass, fields
 from pathlib import Path
 
@@ -118,10 +119,15 @@ def grouped(results: list[Result]) -> dict[tuple[str, str], list[Result]]:
     return groups
 
 
+def share_of(outcomes: Sequence[float] | np.ndarray) -> tuple[int, float, float, float]:
+    """Of outcomes, 1 or 0, how many were 1, their share, and its Wilson interval."""
+    successes = int(sum(outcomes))
+    return successes, successes / len(outcomes), *wilson(successes, len(outcomes))
+
+
 def rate(results: list[Result]) -> tuple[float, float, float]:
     """Share of successes, and its Wilson interval."""
-    successes, count = sum(result.success for result in results), len(results)
-    return successes / count, *wilson(successes, count)
+    return share_of([result.success for result in results])[1:]
 
 
 def causes(results: list[Result]) -> dict[str, int]:
@@ -151,14 +157,12 @@ def summary(results: list[Result]) -> dict:
 
 
 def _summary_of(rows: list[Result]) -> dict:
-    share, low, high = rate(rows)
-    successes = sum(row.success for row in rows)
-    entry = {"runs": len(rows), "successes": successes, "rate": share, "low": low, "high": high, "causes": causes(rows)}
+    keys = ("successes", "rate", "low", "high")
+    entry = {"runs": len(rows), **dict(zip(keys, share_of([row.success for row in rows]), strict=True))}
+    entry["causes"] = causes(rows)
     judged = [row.clean for row in rows if np.isfinite(row.clean)]
     if judged:
-        clean, count = int(sum(judged)), len(judged)
-        low, high = wilson(clean, count)
-        entry["clean"] = {"runs": count, "successes": clean, "rate": clean / count, "low": low, "high": high}
+        entry["clean"] = {"runs": len(judged), **dict(zip(keys, share_of(judged), strict=True))}
     for name in COLUMNS:
         values = np.array([getattr(row, name) for row in rows]) if name.endswith("_mm") else np.zeros(0)
         if len(finite := values[np.isfinite(values)]):

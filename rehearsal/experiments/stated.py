@@ -7,8 +7,7 @@ the middle of that circle; how far it is over r says by how much a radius is too
 import numpy as np
 
 from rehearsal.experiments.calibration import base_brier, brier, stated
-from rehearsal.experiments.result import LATER, Result
-from trunkline.ar.hybrid.rates import wilson
+from rehearsal.experiments.result import LATER, Result, share_of
 
 PROBABLE = ("grasp", "handle")  # whose previews state a probability
 REACH = "reach"  # whose previews state a radius
@@ -31,10 +30,10 @@ def probabilities(rows: list[Result]) -> dict:
     """Of runs that all have a probability; nothing of none. What was never judged did not agree."""
     if not rows:
         return {}
-    agreed, (probability, outcome) = int(sum(row.agreed == 1 for row in rows)), stated(rows)
-    low, high = wilson(agreed, len(rows))
+    probability, outcome = stated(rows)
+    agreed, share, low, high = share_of([row.agreed == 1 for row in rows])
     paths = [row.path_pct for row in rows if np.isfinite(row.path_pct)]
-    table = {"previews": len(rows), "agreed": agreed, "agreement": agreed / len(rows), "low": low, "high": high}
+    table = {"previews": len(rows), "agreed": agreed, "agreement": share, "low": low, "high": high}
     table |= {"brier": brier(probability, outcome), "brier_base": base_brier(outcome)}
     return table | ({"path_pct_median": float(np.median(paths))} if paths else {})
 
@@ -47,9 +46,8 @@ def _radii(rows: list[Result]) -> dict:
     coverage, errors = {}, {}
     for name in LATER:
         off = np.array([getattr(row, f"{name}_mm") for row in rows])
-        inside, runs = int(covered(off, radius).sum()), len(rows)
-        low, high = wilson(inside, runs)
-        coverage[name] = {"runs": runs, "inside": inside, "share": inside / runs, "low": low, "high": high}
+        inside, share, low, high = share_of(covered(off, radius))
+        coverage[name] = {"runs": len(rows), "inside": inside, "share": share, "low": low, "high": high}
         errors[name] = {"median": float(np.median(np.where(np.isfinite(off), off, np.inf) / radius))}
     median, p95 = (float(value) for value in np.quantile(radius, (0.5, 0.95)))
     return {"radius_mm": {"median": median, "p95": p95}, "coverage": coverage, "tip_error_radii": errors}

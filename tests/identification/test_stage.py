@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from tests.support.folders import TABLE_OF_NOTHING
 from tests.support.matched_plant import begin_project, curl, release, tilt
 from trunkline.errors import InputError
 from trunkline.identification.fit.fit import CoarseSearch, Refinement
@@ -98,7 +99,7 @@ def test_control_stage_finds_the_actuators_and_scores_the_cad_model(project):
     )
     config = settings(["curl"], ["release", "curl"], ranges, iterations=25, optimizer=evolution)
     (root / "artifacts/identify_damping").mkdir()
-    (root / "artifacts/identify_damping/parameters.json").write_text('{"parameters": {}}')
+    (root / "artifacts/identify_damping/parameters.json").write_text(json.dumps(TABLE_OF_NOTHING))
     run("identify_control", config, root / "artifacts/build_mjcf/arm.xml", whole=("identify_damping",))
     metrics = metrics_of(root, "identify_control")
     assert metrics["cad"]["validate"]["e_internal_mm"] == metrics["initial"]["validate"]["e_internal_mm"]

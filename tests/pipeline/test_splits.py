@@ -12,6 +12,7 @@ import yaml
 from stages import filter as filter_stage
 from stages import score as score_stage
 from tests.identification.test_stage import settings
+from tests.support.folders import TABLE_OF_NOTHING
 from tests.support.matched_plant import begin_project, curl, release, small_model, tilt
 from tests.support.sessions import all_truths, instruments, record, static_truth
 from tests.support.small_arm import small_spec
@@ -190,7 +191,7 @@ def scored(project):
         folder.mkdir()
         (folder / "arm.xml").write_text(save_model(spec, model))
         settings = {"experiments": compared[stage], "frames": 40, "command_delay": 0.0}
-        table = {"parameters": {}, "compared": settings}
+        table = TABLE_OF_NOTHING | {"compared": settings}
         (folder / "parameters.json").write_text(json.dumps(table))
     config = score_stage.Config(stages=list(compared), floor_poses=3)
     score_stage.main(config)

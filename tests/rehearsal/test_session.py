@@ -150,7 +150,7 @@ def ran() -> tuple[RehearsedSession, list, list]:
     )
     made.robot.truth = lambda: SimpleNamespace(tip=np.array([0.5, 0.2, 0.4]))
     asked = []
-    made.planner._foreseen = lambda order, plan, *_: asked.append((plan, order)) or iter([PREDICTION])
+    made.planner._predictions = lambda order, plan, *_: asked.append((plan, order)) or iter([PREDICTION])
     assert made.predict() is None, "there is no plan yet"
     ending, _, views = rehearse(made, operator.reach())
     assert ending.done

@@ -8,6 +8,11 @@ ROOT = Path(__file__).parents[2]
 SHARED = ROOT.parent / "shared/data"
 SMALL_DEMO = ROOT / "build/small_demo"
 
+# parameters.json of a stage that has identified nothing: what `read_table` asks for
+TABLE_OF_NOTHING = {
+    "parameters": {}, "fitted_to": {}, "compared": {"experiments": [], "frames": 1, "command_delay": 0.0},
+}  # fmt: skip
+
 with_recordings = pytest.mark.skipif(not SHARED.is_dir(), reason="no ../shared/data, the recordings of others' arms")
 
 

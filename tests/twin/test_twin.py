@@ -1,12 +1,15 @@
 """A twin comes from a folder of artifacts, from a model with its tables, and from a package, the same each time."""
 
+import copy
+import json
 import shutil
 
 import numpy as np
 import pytest
 
-from tests.support.folders import package
+from tests.support.folders import TABLE_OF_NOTHING, package
 from trunkline.errors import InputError
+from trunkline.identification.stages import read_table
 from trunkline.twin.package import read_tarball
 from trunkline.twin.posterior import Posterior
 from trunkline.twin.twin import Twin
@@ -93,3 +96,12 @@ def test_a_model_that_no_stage_identified_leaves_nothing_open(artifacts, tmp_pat
 def test_a_folder_without_any_is_one_line(tmp_path):
     with pytest.raises(InputError, match="found no identify_stiffness/arm.xml"):
         Twin.load(tmp_path)
+
+
+@pytest.mark.parametrize("key", ["parameters", "fitted_to", "compared", "frames"])
+def test_a_table_without_what_its_readers_need_is_refused(key, tmp_path):
+    table = copy.deepcopy(TABLE_OF_NOTHING)
+    table["compared" if key == "frames" else key] = {} if key == "frames" else None
+    (tmp_path / "parameters.json").write_text(json.dumps(table))
+    with pytest.raises(InputError, match=r"parameters\.json: .*expected what a stage of identification writes"):
+        read_table(tmp_path / "parameters.json")

@@ -18,6 +18,7 @@ import trimesh
 import yaml
 from onnx import TensorProto, helper
 
+from tests.support.folders import TABLE_OF_NOTHING
 from tests.support.small_arm import small_mjcf
 from trunkline.errors import InputError
 from trunkline.frames import downwards
@@ -419,7 +420,7 @@ def project(tmp_path, sources) -> Path:
     for stage in ("build_mjcf", "identify_control"):
         (root / "artifacts" / stage / "arm.xml").write_text(sources.mjcf)
     for stage, table in sources.tables.items():
-        (root / "artifacts" / stage / "parameters.json").write_text(json.dumps(table))
+        (root / "artifacts" / stage / "parameters.json").write_text(json.dumps(TABLE_OF_NOTHING | table))
     shutil.copy(sources.network, root / "artifacts/train_ik/ik.onnx")
     (root / "artifacts/reachability/meshes").mkdir()
     for path in sources.meshes:

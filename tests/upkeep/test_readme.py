@@ -7,6 +7,7 @@ import pytest
 import yaml
 from pydantic import TypeAdapter
 
+from tests.support.folders import TABLE_OF_NOTHING
 from trunkline.identification.parameters.parameters import NAMES
 from trunkline.pipeline.stage import write_json
 from trunkline.recordings.trials.splits import DECIDING, TEST, VALIDATE
@@ -105,11 +106,12 @@ def judged(tmp_path):
         "force_range": {"value": 9.0, "interval_95_given_model": [5.0, 100.0], "undetermined": True},
         "time_constant": {"value": 0.03, "interval_95_given_model": [0.02, 0.04]},
     }
-    table = {"parameters": {name: {"unit": "N", "undetermined": False} | row for name, row in rows.items()}}
+    rows = {name: {"unit": "N", "undetermined": False} | row for name, row in rows.items()}
+    table = TABLE_OF_NOTHING | {"parameters": rows}
     factors = {"factor": [1.05, 0.95, 1.0], "half_width_95_given_model": [0.1, 0.01, None]}
     written = {
         "identify_damping/parameters": table,
-        "identify_stiffness/parameters": {"parameters": {}, "per_joint": {"stiffness": factors}},
+        "identify_stiffness/parameters": TABLE_OF_NOTHING | {"per_joint": {"stiffness": factors}},
         "filter/metrics": {"moving": {"release_a": {"start_s": 0.701}, "release_b": {"start_s": 0.695}}},
         "ingest/metrics": {"clock_offset_ms": -98.0},
     }
@@ -137,7 +139,7 @@ def test_the_truth_table_says_what_the_model_lacks(judged):
         path = judged / "artifacts/identify_control/parameters.json"
         rows = {name: {"value": 1.0, "unit": "1", "undetermined": False} for name in {name: 1, **more}}
         path.parent.mkdir(exist_ok=True)
-        path.write_text(json.dumps({"parameters": rows}))
+        path.write_text(json.dumps(TABLE_OF_NOTHING | {"parameters": rows}))
         (line,) = (line for line in truth_table(judged).splitlines() if line.startswith(f"| `{name}`"))
         return line
 

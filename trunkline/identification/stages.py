@@ -8,6 +8,7 @@ from trunkline.errors import InputError, existing
 
 STAGES = ("identify_stiffness", "identify_damping", "identify_control")  # in their order: each goes on from the last
 MODEL, TABLE = "arm.xml", "parameters.json"
+COMPARED = {"experiments", "frames", "command_delay"}  # what a table has of how trials were compared, see `Compared`
 
 
 def final_model(artifacts: Path) -> Path | None:
@@ -27,10 +28,16 @@ def read_tables(artifacts: Path, stages: Iterable[str] = STAGES) -> dict[str, di
 
 
 def read_table(file: Path) -> dict:
-    """Raises InputError: there is no such file, or it is no such table."""
+    """`parameters`, `fitted_to` and `compared` are in it, whoever reads it.
+
+    Raises:
+        InputError: there is no such file, or it is no such table.
+    """
     try:
         table = json.loads(existing(file).read_text(encoding="utf-8"))
-        table["parameters"].items()
+        table["parameters"].items(), table["fitted_to"].items()
+        if lacking := COMPARED - table["compared"].keys():
+            raise KeyError(f"compared: {min(lacking)}")
         return table
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{file}: {error!r}, expected what a stage of identification writes") from error

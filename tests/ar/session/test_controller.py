@@ -336,7 +336,7 @@ def test_only_an_answer_to_what_was_asked_for_last_counts(serial, counts):
         controller.plan is plan,
         controller.preview is not None,
         bool(controller.pieces),
-        controller.foreseen is prediction,
+        controller.prediction is prediction,
     ] == [counts] * 4
 
 

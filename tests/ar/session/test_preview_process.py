@@ -74,7 +74,7 @@ def test_a_plan_then_its_preview_in_pieces_then_the_batch():
         PreviewBegun,
         PredictionAnswer,
     ]
-    assert planned.report.digest == planned.plan.digest() == begun.preview.digest == prediction.foreseen.digest
+    assert planned.report.digest == planned.plan.digest() == begun.preview.digest == prediction.prediction.digest
     assert {answer.report.serial if isinstance(answer, PlanAnswer) else answer.serial for answer in answers} == {7}
     assert [piece.last for piece in pieces] == [False] * (len(pieces) - 1) + [True]
     frames = np.cumsum([0] + [len(piece.poses) for piece in pieces])
@@ -85,8 +85,8 @@ def test_a_plan_then_its_preview_in_pieces_then_the_batch():
     assert np.isfinite(poses).all()
     mount = simulation().bodies.index("base")
     assert np.linalg.norm(poses[-1, mount, :3] - np.array(MOUNT)) < 0.03
-    assert (prediction.foreseen.futures, prediction.foreseen.probability) == (FUTURES, None)
-    assert len(prediction.foreseen.times) == len(prediction.foreseen.tip) == len(prediction.foreseen.spread)
+    assert (prediction.prediction.futures, prediction.prediction.probability) == (FUTURES, None)
+    assert len(prediction.prediction.times) == len(prediction.prediction.tip) == len(prediction.prediction.spread)
 
 
 def test_the_first_plan_in_a_world_that_was_prepared_for_composes_no_twin(monkeypatch):
@@ -104,10 +104,10 @@ def test_the_first_plan_in_a_world_that_was_prepared_for_composes_no_twin(monkey
 def test_of_a_grasp_the_batch_tells_how_surely_it_holds():
     planned, *_, prediction = made().answers(order(8, "the cylinder"))
     assert planned.report.refused == ""
-    assert 0 <= prediction.foreseen.probability <= 1
-    assert prediction.foreseen.low <= prediction.foreseen.probability <= prediction.foreseen.high
+    assert 0 <= prediction.prediction.probability <= 1
+    assert prediction.prediction.low <= prediction.prediction.probability <= prediction.prediction.high
     curl = planned.plan.step * dict(planned.plan.phases)["curl"]
-    assert curl < prediction.foreseen.times[0] < curl + 0.1
+    assert curl < prediction.prediction.times[0] < curl + 0.1
 
 
 def test_what_is_held_is_seen_in_the_arm_and_brought_to_rest_or_not():
@@ -129,10 +129,10 @@ def test_what_is_held_is_seen_in_the_arm_and_brought_to_rest_or_not():
     planned, _, *pieces, prediction = made_once.answers(brought)
     assert planned.report.refused == ""
     assert [name for name, _ in planned.plan.phases] == ["transfer", "release"]
-    assert prediction.foreseen.probability is not None
-    assert prediction.foreseen.low <= prediction.foreseen.probability <= prediction.foreseen.high
+    assert prediction.prediction.probability is not None
+    assert prediction.prediction.low <= prediction.prediction.probability <= prediction.prediction.high
     *_, blind = PreviewPlanner(planner, made_once.foresight, made_once.bodies).answers(brought)
-    assert blind.foreseen.probability is None
+    assert blind.prediction.probability is None
 
 
 def test_the_assistants_offer_comes_after_what_the_batch_tells():
@@ -140,11 +140,11 @@ def test_the_assistants_offer_comes_after_what_the_batch_tells():
     helpful = replace(foresight, settings=replace(foresight.settings, futures=2, assistant=1, sure=1.0, lifted=0.9))
     answers = list(PreviewPlanner(made().planner, helpful, bodies).answers(order(8, "the cylinder")))
     predictions = [answer for answer in answers if isinstance(answer, PredictionAnswer)]
-    assert [answer.foreseen.probability for answer in predictions] == [
+    assert [answer.prediction.probability for answer in predictions] == [
         0.0,
         0.0,
     ]  # nothing is lifted by so much, wherever
-    assert predictions[0].foreseen.offer is None
+    assert predictions[0].prediction.offer is None
     assert answers[-2:] == predictions
 
 

@@ -24,7 +24,7 @@ from trunkline.kinematics.panda.collision import clearance
 from trunkline.kinematics.panda.kinematics import Q_MAX, Q_MIN, joint_frames, mount_pose
 from trunkline.model.statics.chain import read_chain
 from trunkline.model.statics.equilibria import actuated
-from trunkline.model.statics.placement import joint_places
+from trunkline.model.statics.placement import joint_positions
 
 OFFSET, STEP, ROWS, CURL = 0.05, 0.01, 200, 100
 CHAIN = read_chain(hardening_stump())
@@ -44,7 +44,7 @@ def places(commands: np.ndarray) -> np.ndarray:
     """Joints and tip at the ready pose, base frame, m, (P, 3): the mount there points straight down."""
     rest = actuated(CHAIN, commands[None], gravity_in_base(0.0))
     (mount,), (flange,) = mount_pose(READY[None], OFFSET)
-    return mount + joint_places(CHAIN, rest.qpos)[0] @ (flange * [1, -1, -1]).T
+    return mount + joint_positions(CHAIN, rest.qpos)[0] @ (flange * [1, -1, -1]).T
 
 
 def about(place: np.ndarray, half: float = 0.005) -> World:
@@ -159,7 +159,7 @@ def test_an_arm_that_finds_no_rest_is_not_seen_and_the_robot_still_is(monkeypatc
     rest = actuated(CHAIN, STRAIGHT[None], gravity_in_base(0.0))
     lost = replace(rest, converged=np.array([False]))
     monkeypatch.setattr(plan_checks, "actuated", lambda chain, commands, pull: lost)
-    monkeypatch.setattr(plan_checks, "joint_places", lambda chain, qpos: np.zeros((1, 3, 3)))
+    monkeypatch.setattr(plan_checks, "joint_positions", lambda chain, qpos: np.zeros((1, 3, 3)))
     (mount,), _ = mount_pose(READY[None], OFFSET)
     assert _reason(one_row(READY), about(places(STRAIGHT)[-1]), CHAIN) == ""
     assert _reason(one_row(READY), about(mount), CHAIN).startswith("world: ")
@@ -206,7 +206,7 @@ def test_a_planner_that_knows_the_arm_refuses_a_plan_that_leads_it_into_a_solid(
     free = planner.plan(request, World("world"), READY, STRAIGHT)
     (mount,), (flange,) = mount_pose(free.joints[-1:], OFFSET)
     rest = actuated(CHAIN, free.commands[-1:], gravity_in_base(0.0))
-    there = mount + joint_places(CHAIN, rest.qpos)[0][-1] @ (flange * [1, -1, -1]).T
+    there = mount + joint_positions(CHAIN, rest.qpos)[0][-1] @ (flange * [1, -1, -1]).T
     with pytest.raises(InputError, match="world: the arm would come into the table after"):
         planner.plan(request, about(there), READY, STRAIGHT)
     with pytest.raises(InputError, match=r"world: the arm would come into the table after 0\.00 s"):
@@ -219,6 +219,6 @@ def test_what_is_followed_is_held_against_it_too(aimed):
     assert refused == ""
     (mount,), (flange,) = mount_pose(axes[None, :7], OFFSET)
     rest = actuated(CHAIN, axes[None, 7:], gravity_in_base(0.0))
-    there = mount + joint_places(CHAIN, rest.qpos)[0][-1] @ (flange * [1, -1, -1]).T
+    there = mount + joint_positions(CHAIN, rest.qpos)[0][-1] @ (flange * [1, -1, -1]).T
     assert sought(planner, asked, READY, about(there)) == (None, "world: the arm would come into the table")
     assert sought(planner, None, READY, about(there)) == (None, "")

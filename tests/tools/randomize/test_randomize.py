@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from tests.support.folders import TABLE_OF_NOTHING
 from tests.support.small_arm import small_mjcf
 from trunkline.ar.hybrid.uncertainty import GraspUncertainty, sample
 from trunkline.errors import InputError
@@ -41,7 +42,7 @@ def table(model: mujoco.MjModel, names: tuple[str, ...], correlation: float, rel
         wide = [-0.3, 0.3] if PARAMETERS[name].signed else [value / 100, value * 100]
         rows[name] = {"value": value, "interval_95_given_model": [low, high], "range": wide}
     correlations = {a: {b: 1.0 if a == b else correlation for b in names} for a in names}
-    return {"parameters": rows, "correlation": correlations, "fitted_to": TRIALS}
+    return TABLE_OF_NOTHING | {"parameters": rows, "correlation": correlations, "fitted_to": TRIALS}
 
 
 def artifacts(folder: Path, stiffer: float = 1.0, relative: float = 1.2) -> Path:
@@ -257,7 +258,9 @@ def test_what_is_no_identified_arm_is_one_line_and_writes_nothing(spoil, tmp_pat
             "identify_control/arm.xml").read_text())  # fmt: skip
         expected = "arm.xml: stiffness: found "
     if spoil == "json":
-        (folder / "identify_control/parameters.json").write_text('{"parameters": {"kp": {}}}')
+        (folder / "identify_control/parameters.json").write_text(
+            json.dumps(TABLE_OF_NOTHING | {"parameters": {"kp": {}}})
+        )
         expected = "identify_control/parameters.json: kp: found no 'interval_95_given_model', expected it: make"
     if spoil == "parameter":
         path = folder / "identify_control/parameters.json"

@@ -94,7 +94,7 @@ class SessionController:
         self.unfit = ""
         self.plan: Plan | None = None
         self.preview: messages.PreviewMessage | None = None
-        self.foreseen: messages.PredictionMessage | None = None
+        self.prediction: messages.PredictionMessage | None = None
         self.report: PlanReport | None = None
         self.pieces: list[PreviewPiece] = []
         self.intent: Intent | None = None
@@ -190,8 +190,8 @@ class SessionController:
             if len(answer.poses):  # none where no body is shown
                 self.log_writer.piece(answer.first, answer.time, answer.poses)
         else:
-            self.foreseen = answer.foreseen
-            self.log_writer.event("foreseen", foreseen=answer.foreseen)
+            self.prediction = answer.prediction
+            self.log_writer.event("foreseen", foreseen=answer.prediction)
         return True
 
     # --- what is done
@@ -206,7 +206,7 @@ class SessionController:
         self._inputs.clear()
         for hands in steps:
             executor = ExecutorReport("fault", "", self._fault) if self._fault else executor
-            offer = self.foreseen.offer if self.foreseen is not None else None
+            offer = self.prediction.offer if self.prediction is not None else None
             left, right = hands.left, hands.right
             if self._stop:
                 left, self._stop = replace(left, secondary=True), False
@@ -268,7 +268,7 @@ class SessionController:
         request = intent.request
         if request is not None and request.serial != self._requested:
             self._requested, self.report, self.plan, self.preview = request.serial, None, None, None
-            self.foreseen, self.pieces, self._shown_digest = None, [], ""
+            self.prediction, self.pieces, self._shown_digest = None, [], ""
             self._ordered = True
             self.log_writer.event("request", request=request)
             here = robot_state.joints, robot_state.commands, robot_state.hangs

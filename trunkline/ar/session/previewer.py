@@ -94,7 +94,7 @@ class PredictionAnswer:
     """What the batch says."""
 
     serial: int
-    foreseen: messages.PredictionMessage
+    prediction: messages.PredictionMessage
 
 
 Answer = PlanAnswer | PreviewBegun | PreviewPiece | PredictionAnswer | FollowAnswer
@@ -178,7 +178,7 @@ class PreviewPlanner:
             yield from self._pieces_of(serial, twin(), way, go_on)
         else:
             yield PreviewPiece(serial, 0, 0.0, np.empty((0, 0, 7), dtype=np.float32), True)
-        for prediction in self._foreseen(order, plan, twin, way, go_on):
+        for prediction in self._predictions(order, plan, twin, way, go_on):
             self.prediction = prediction
             yield PredictionAnswer(serial, prediction_message(digest, prediction))
 
@@ -219,7 +219,7 @@ class PreviewPlanner:
         if piece_answer is not None:
             yield PreviewPiece(serial, piece_answer.first, piece_answer.time, piece_answer.poses, True)
 
-    def _foreseen(
+    def _predictions(
         self,
         order: Order,
         plan: Plan,

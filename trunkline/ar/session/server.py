@@ -185,8 +185,8 @@ class Server:
                 say(messages.tell(controller.preview))
                 for frames in controller.pieces:
                     client.outbox.piece(piece(frames))
-        if controller.foreseen is not None:
-            say(messages.tell(controller.foreseen))
+        if controller.prediction is not None:
+            say(messages.tell(controller.prediction))
         if self.broadcast.shell:
             client.outbox.show("shell", self.broadcast.shell)
         self._tell_lease()
@@ -441,7 +441,7 @@ class Server:
                 for client in self.clients.values():
                     client.outbox.piece(message)
             elif isinstance(answer, PredictionAnswer):
-                self._tell(answer.foreseen)
+                self._tell(answer.prediction)
 
     def _show(self, now: float) -> None:
         """The robot, its reach and the state to all."""

@@ -16,7 +16,7 @@ from trunkline.kinematics.panda.collision import clearance
 from trunkline.kinematics.panda.kinematics import FLANGE, Q_MAX, Q_MIN, joint_frames, mount_pose
 from trunkline.model.statics.chain import Chain
 from trunkline.model.statics.equilibria import actuated
-from trunkline.model.statics.placement import joint_places
+from trunkline.model.statics.placement import joint_positions
 
 LINK_RADIUS = 0.08  # m, about the joints' centres and the mount, that no obstacle may come into
 EVERY = 0.04  # s between poses of the arm that are looked at
@@ -75,6 +75,6 @@ def _arm(plan: Plan, rows: np.ndarray, mount_offset: float, chain: Chain) -> np.
     mount, flange = mount_pose(plan.joints[rows], mount_offset)
     turn = flange * [1, -1, -1]  # the soft base: half a turn about the flange's x
     rest = actuated(chain, plan.commands[rows], -STANDARD_GRAVITY * turn[:, 2])
-    places = joint_places(chain, rest.qpos)
+    places = joint_positions(chain, rest.qpos)
     places[~rest.converged] = np.nan
     return mount[:, None] + np.einsum("nij,npj->npi", turn, places)

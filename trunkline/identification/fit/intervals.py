@@ -61,8 +61,8 @@ def certainty(linear: Linearisation, prior_deviation: float = 0.0, around: Surro
     error = np.sqrt(np.diag(covariance))
     error = np.where(_set_by_one_trial(normal, normals), np.inf, error)
     safe = np.where(error > 0, error, 1.0)
-    wide = normal if around is None else around.normals().sum(axis=0)  # by differences that no jump decides
-    singular, directions = np.linalg.eigh(wide * _scaling(wide))
+    information = normal if around is None else around.normals().sum(axis=0)  # by differences that no jump decides
+    singular, directions = np.linalg.eigh(information * _scaling(information))
     return Certainty(
         standard_error=error,
         half_width=error * float(stdtrit(max(trials - 1, 1), 0.975)),

@@ -102,7 +102,7 @@ def place_chords(first, last, chain, qpos, chords):
             copy(state.chord[i], chords[row, i])
 
 
-def joint_places(chain: Chain, qpos: np.ndarray) -> np.ndarray:
+def joint_positions(chain: Chain, qpos: np.ndarray) -> np.ndarray:
     """Joints, then the tip, at joint angles `qpos` (B, nq), in the base frame, m. Shape (B, n + 1, 3)."""
     places = np.empty((len(qpos), chain.units + 1, 3))
     _place_joints(0, len(qpos), chain, np.ascontiguousarray(qpos), places)

@@ -5,11 +5,9 @@ from pathlib import Path
 
 import mujoco
 
-from trunkline.errors import InputError
 from trunkline.identification.parameters.parameters import NAMES, SESSION_MARK
 from trunkline.identification.parameters.per_session import names_in
 from trunkline.identification.results.scoring import fingerprint
-from trunkline.identification.stages import TABLE
 from trunkline.pipeline.config import settings_of
 from trunkline.recordings.trials.trial import Trial, sessions_of
 from trunkline.twin.twin import Twin
@@ -48,15 +46,11 @@ class Written:
 
 
 def written_beside(twin: Twin, root: Path) -> Written:
-    """From the tables of the stages that the model comes from; without one, frames and delay from the settings in
-    `root`."""
-    tables = twin.provenance.tables
-    if not tables:
-        settings = settings_of("identify_damping", root)
-        return Written(settings.frames, settings.command_delay, {})
-    try:
-        compared = list(tables.values())[-1]["compared"]
-        return Written(compared["frames"], compared["command_delay"], twin.provenance.fitted_to)
-    except (KeyError, TypeError) as error:
-        where = f"{twin.provenance.model.parent}/{TABLE}"
-        raise InputError(f"{where}: {error!r}, expected what a stage of identification writes") from error
+    """From the tables of the stages that the model comes from; without one, and of a package, frames and delay from the
+    settings in `root`."""
+    provenance = twin.provenance
+    if provenance.tables and not provenance.package:  # a package's tables are without what was compared
+        compared = list(provenance.tables.values())[-1]["compared"]
+        return Written(compared["frames"], compared["command_delay"], provenance.fitted_to)
+    settings = settings_of("identify_damping", root)
+    return Written(settings.frames, settings.command_delay, provenance.fitted_to)
