@@ -10,6 +10,12 @@ STAGES = ("identify_stiffness", "identify_damping", "identify_control")  # in th
 MODEL, TABLE = "arm.xml", "parameters.json"
 
 
+def model_name(stage: str, stages: Iterable[str]) -> str:
+    """What a table calls the model of `stage`: that of the last of `stages` is shipped, all others are intermediate."""
+    *_, last = stages
+    return stage if stage == last else f"{stage} (intermediate model)"
+
+
 def final_model(artifacts: Path) -> Path | None:
     """The model of the last stage that has run, which has all that was identified; None where none has."""
     models = (artifacts / stage / MODEL for stage in reversed(STAGES))
