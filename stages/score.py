@@ -9,7 +9,7 @@ from pydantic import Field
 from trunkline.compute.progress import progress
 from trunkline.identification.evaluation.error_tables import marker_table, trial_table
 from trunkline.identification.results.scoring import Compared, score
-from trunkline.identification.stages import MODEL, TABLE, read_table
+from trunkline.identification.stages import MODEL, TABLE, model_name, read_table
 from trunkline.model_files import read_spec
 from trunkline.pipeline.stage import output_folder, run_stage, write_metrics
 from trunkline.recordings.trials.splits import IDENTIFY, TEST
@@ -34,20 +34,22 @@ def main(config: Config) -> None:
     for session in sessions_of(trials):
         if not any(trial.split == IDENTIFY for trial in trials if trial.session == session):
             print(f"score: session {session}: found no trial with split {IDENTIFY}: what it has for itself is unknown")
-    metrics, of_trials, along, unscored = {}, {}, {}, {trial.experiment for trial in trials if trial.split == TEST}
+    metrics, of_trials, along = {}, {}, {}
+    reported = read_table(ARTIFACTS / config.stages[-1] / TABLE)["compared"]["experiments"]
     with progress(len(config.stages), "score", "stages") as bar:
         for stage in config.stages:
             identified = read_spec(ARTIFACTS / stage / MODEL).compile()
             compared = Compared(**read_table(ARTIFACTS / stage / TABLE)["compared"])
             models = {"cad": cad, "initial": initial, "identified": identified}
             metrics[stage], predictions = score(models, trials, compared, config.floor_poses)
-            of_trials[stage], along[stage] = trial_table(predictions), marker_table(predictions, trials[0].markers)
+            name = model_name(stage, config.stages)
+            of_trials[name], along[name] = trial_table(predictions), marker_table(predictions, trials[0].markers)
             if not metrics[stage]:
                 print(f"score: {stage}: found no {' or '.join(compared.experiments)} with split {TEST}, expected one")
-            initial, unscored = identified, unscored - set(compared.experiments)
+            initial = identified
             bar.update(1, stage=stage)
-    if unscored:
-        print(f"score: {', '.join(sorted(unscored))}: no stage's `reported` has it, so nothing of it is scored")
+    for kind in sorted({trial.experiment for trial in trials if trial.split == TEST} - set(reported)):
+        print(f"score: {kind}: not in `reported` of {config.stages[-1]}, so the shipped model is not scored on it")
     with output_folder(ARTIFACTS / "score") as folder:
         write_metrics(folder, metrics)
         for name, tables in (("trials", of_trials), ("markers", along)):

@@ -10,22 +10,15 @@ import numpy as np
 
 from trunkline.identification.evaluation.error_tables import number
 from trunkline.identification.stages import STAGES, read_tables
-from trunkline.recordings.trials.experiments import EXPERIMENTS, ExperimentKind
+from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.recordings.trials.splits import TEST, VALIDATE
 
 TRUTH = Path("data/raw/demo.truth.json")
 
 
-def judge(kind: ExperimentKind) -> str:
-    """The stage whose model is judged by trials of this kind: the first to know all that acts in them."""
-    if kind.needs_motors:
-        return "identify_control"
-    return "identify_stiffness" if kind.static else "identify_damping"
-
-
 _number = partial(number, digits=4)
-# kind of experiment: what its trials are called, and the stage whose model is scored on them
-KINDS = {name: (kind.plural, judge(kind)) for name, kind in EXPERIMENTS.items()}
+KINDS = {name: kind.plural for name, kind in EXPERIMENTS.items()}  # what trials of a kind are called
+SHIPPED = STAGES[-1]  # the stage whose model is shipped
 # whose errors: of the identified model, and of what it stands beside
 BESIDE = {"identified": "", "cad": ": CAD", "null": ": null model", "noise_floor": ": noise floor"}
 
@@ -165,18 +158,19 @@ def _unanswered(truth: dict) -> list[str]:
 
 
 def error_table(root: Path) -> str:
-    """Every known source of error for itself: of trials by kind, of starts, clocks, poses and the time step."""
+    """Every known source of error for itself: of the shipped model by kind of trial, of starts, clocks, poses and the
+    time step."""
     metrics = {stage: _json(root / "artifacts" / stage / "metrics.json") for stage in (*STAGES, "score", "filter")}
     lines = ["| error | mean | largest | of |", "|---|---:|---:|---|"]
-    for kind, (words, stage) in KINDS.items():
-        if not _at(metrics[stage], "identified", VALIDATE, "by_experiment", kind):
+    for kind, words in KINDS.items():
+        if not _at(metrics[SHIPPED], "identified", VALIDATE, "by_experiment", kind):
             continue
-        for split, table in ((VALIDATE, metrics[stage]), (TEST, metrics["score"].get(stage, {}))):
+        for split, table in ((VALIDATE, metrics[SHIPPED]), (TEST, metrics["score"].get(SHIPPED, {}))):
             for model, of in BESIDE.items():
                 row = _at(table, model, split, "by_experiment", kind)
-                count = f"{row.get('trials', '–')} trials, `{stage}`"
+                count = f"{row.get('trials', '–')} trials, `{SHIPPED}`"
                 lines.append(_row(f"position / tip, {words} of `{split}`{of}", row, count))
-        fit = _at(metrics[stage], "start_fit", "by_experiment", kind)
+        fit = _at(metrics[SHIPPED], "start_fit", "by_experiment", kind)
         mean, largest = (f"{_number(fit.get(key))} mm" for key in ("mean_mm", "max_mm"))
         lines.append(f"| pose from which {words} start | {mean} | {largest} | markers, `identify` and `validate` |")
     for stage in STAGES[1:]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import yaml
 
@@ -221,6 +222,24 @@ def test_errors_come_with_and_without_repaired_trials(scored):
     only = metrics["identify_stiffness"]["identified"]["test"]
     assert only["repaired"] == 0
     assert "without_repaired" not in only
+
+
+def test_a_row_of_an_intermediate_model_says_so(scored):
+    root, _, _ = scored
+    for name in ("trials", "markers"):
+        stages = list(dict.fromkeys(pd.read_csv(root / f"artifacts/score/{name}.csv").stage))
+        assert stages == ["identify_stiffness (intermediate model)", "identify_damping"]
+
+
+def test_a_kind_on_which_the_shipped_model_is_not_scored_is_named(scored, capsys):
+    """Whether an intermediate model was scored on it does not count."""
+    _, config, _ = scored
+    score_stage.main(replace(config, stages=config.stages[::-1]))
+    assert "score: release: not in `reported` of identify_stiffness" in capsys.readouterr().out
+    score_stage.main(config)
+    assert [line for line in capsys.readouterr().out.splitlines() if "not in `reported`" in line] == [
+        "score: curl: not in `reported` of identify_damping, so the shipped model is not scored on it"
+    ]
 
 
 def test_a_session_without_the_split_test_is_told_so(scored, capsys):

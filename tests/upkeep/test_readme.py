@@ -8,7 +8,10 @@ import yaml
 from pydantic import TypeAdapter
 
 from tests.support.folders import TABLE_OF_NOTHING
+from trunkline.identification.fit.settings import IdentificationSettings
 from trunkline.identification.parameters.parameters import NAMES
+from trunkline.identification.stages import STAGES
+from trunkline.pipeline.config import load_config
 from trunkline.pipeline.stage import write_json
 from trunkline.recordings.trials.splits import DECIDING, TEST, VALIDATE
 from upkeep.baseline import Baseline, baseline_file, renewed
@@ -30,8 +33,8 @@ from upkeep.readme import (
 )
 from upkeep.rehearsal_table import DISTANCES
 from upkeep.truth_table import (
-    KINDS,
     LACKING,
+    SHIPPED,
     TRUTH,
     error_table,
     expectation,
@@ -160,14 +163,43 @@ def test_the_truth_table_says_what_the_model_lacks(judged):
     assert named <= set(NAMES)
 
 
-def test_scores_are_told_by_kind_and_together(tmp_path):
-    """The last row's words are those of the kinds on which the last stage is scored."""
-    row = {"trials": 1, "e_position_mm": 1.0, "e_tip_mm": 2.0, "e_internal_mm": 0.5}
-    table = {"test": row | {"by_experiment": {"curl": row, "release": row, "motion": row}}}
-    (tmp_path / "artifacts/score").mkdir(parents=True)
-    (tmp_path / "artifacts/score/metrics.json").write_text(json.dumps({"identify_control": {"identified": table}}))
-    rows = [line.split(" | ")[0] for line in score_table(tmp_path).splitlines()[2:]]
-    assert rows == ["| goal", "| curls", "| motions", "| releases, curls and motions, `identify_control`"]
+@pytest.fixture
+def shipped(tmp_path):
+    """A project whose first stage was scored on tilts, 1 mm off, and whose last on tilts, 3 mm off, and curls."""
+
+    def row(off: float) -> dict:
+        errors = {f"{error}_{unit}": off for error in ("e_position", "e_tip", "e_internal") for unit in ("mm", "pct")}
+        return {"trials": 4} | errors
+
+    def scored(off: float, *kinds: str) -> dict:
+        by_model = {"identified": off, "null": 90.0, "noise_floor": 0.1}
+        return {name: {"test": row(value) | {"by_experiment": {kind: row(value) for kind in kinds}}}
+                for name, value in by_model.items()}  # fmt: skip
+
+    metrics = {STAGES[0]: scored(1.0, "static_tilt"), SHIPPED: scored(3.0, "curl", "static_tilt")}
+    for name, text in {"artifacts/score/metrics.json": json.dumps(metrics), "tests/limits.yaml": LIMITS}.items():
+        (tmp_path / name).parent.mkdir(parents=True)
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def test_scores_are_of_the_shipped_model_on_every_kind_and_an_intermediate_one_says_so(shipped):
+    rows = [line.strip("| ").split(" | ") for line in score_table(shipped).splitlines()[2:]]
+    assert [row[0] for row in rows] == [
+        "goal", "static tilts", "curls", "all of these", "identify_stiffness (intermediate model): static tilts"
+    ]  # fmt: skip
+    assert [row[1] for row in rows[1:]] == ["3 / 3 % (3 / 3 mm)"] * 3 + ["1 / 1 % (1 / 1 mm)"]
+    assert [rows[1][3], rows[1][-2]] == ["90 / 90", "0.1 / 0.1"]  # baseline and noise floor
+
+
+def test_the_readme_leads_with_the_shipped_model_on_every_kind(shipped):
+    rows = [line.strip("| ").split(" | ") for line in headline(shipped).splitlines()[2:]]
+    assert [row[0] for row in rows[:3]] == [
+        "Shape / tip error, simulated lab, 4 held-out trials (static tilts, curls)", "… 4 static tilts", "… 4 curls"
+    ]  # fmt: skip
+    for row in rows[:3]:
+        assert row[1] == "**3 / 3 % (3 / 3 mm)**"
+        assert row[2] == "CAD – mm; baseline: mean rest shape 90 / 90 mm; noise floor 0.1 / 0.1 mm"
 
 
 LIMITS = """
@@ -241,9 +273,10 @@ def test_each_figure_of_the_readme_has_a_row_of_the_gate():
     errors = ("e_internal", "e_position", "e_tip")
     entries += [("identify_control", f"identified.{split}.{error}") for split in DECIDING for error in errors]
     scored = json.loads((ROOT / "artifacts/score/metrics.json").read_text())
-    for kind, (_, stage) in KINDS.items():
-        if lookup(scored, f"{stage}.identified.{TEST}.by_experiment.{kind}") is not None:
-            entries += [(stage, f"identified.{VALIDATE}.by_experiment.{kind}.{error}") for error in errors]
+    for stage in STAGES:
+        for kind in lookup(scored, f"{stage}.identified.{TEST}.by_experiment"):
+            if stage == SHIPPED or kind in load_config(IdentificationSettings, stage, ROOT).experiments:
+                entries += [(stage, f"identified.{VALIDATE}.by_experiment.{kind}.{error}") for error in errors]
     entries += [("rehearse", f"preview.coverage.{name}.share") for name in COVERAGE_TIMES]
     for experiment, distance in DISTANCES.items():
         entries.append(("rehearse", f"{experiment}.rate"))

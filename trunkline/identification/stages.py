@@ -11,6 +11,12 @@ MODEL, TABLE = "arm.xml", "parameters.json"
 COMPARED = {"experiments", "frames", "command_delay"}  # what a table has of how trials were compared, see `Compared`
 
 
+def model_name(stage: str, stages: Iterable[str]) -> str:
+    """What a table calls the model of `stage`: that of the last of `stages` is shipped, all others are intermediate."""
+    *_, last = stages
+    return stage if stage == last else f"{stage} (intermediate model)"
+
+
 def final_model(artifacts: Path) -> Path | None:
     """The model of the last stage that has run, which has all that was identified; None where none has."""
     models = (artifacts / stage / MODEL for stage in reversed(STAGES))

@@ -143,8 +143,8 @@ def compare(
         "deciding_trials": len(result.influence.deciding()),
         "start_fit": start_fit(experiments),
     }
-    if not all(is_static(e.kind) for e in experiments):
-        full = predictions["identified"]
+    full = predictions["identified"].of(lambda e: not is_static(e.kind))  # a shape at rest has no time step
+    if full.experiments:
         halved = replay(models["identified"], full.experiments, settings.markers, step_factor=0.5)
         metrics["halved_step"] = halved_step(full, Prediction(halved, full.experiments))
     if result.factors or whole:

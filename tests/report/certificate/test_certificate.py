@@ -14,10 +14,12 @@ from tests.support.matched_plant import small_model
 from tests.support.twins import twin_of
 from trunkline.errors import InputError
 from trunkline.recordings.trials.splits import DECIDING, TEST
+from trunkline.report.certificate.budget import FRICTION, LACKING, NOISE
 from trunkline.report.certificate.certificate import COMMAND, check_fitted, digest_of_code, inputs_of
+from trunkline.report.certificate.facts import error_rows, parameter_facts
 from trunkline.report.certificate.poses import Conditions
 from trunkline.report.certificate.replays import LOST, UNIT
-from trunkline.report.certificate.words import NOTHING, limits_of, open_lines, strong_pairs, verdict
+from trunkline.report.certificate.words import NOTHING, limits_of, next_step, open_lines, strong_pairs, verdict
 
 IDENTIFIED = {"e_position_mm": 4.0, "e_position_pct": 0.8, "e_tip_mm": 9.0}
 
@@ -43,22 +45,37 @@ def test_every_split_has_its_errors_beside_null_cad_and_noise_floor(certificate)
 
 
 def test_the_verdict_is_of_the_trials_that_decided_nothing(certificate):
-    assert f"({TEST})" in certificate.facts["verdict"]
+    good = certificate.facts["verdict"]["good_for"]
+    assert f"({TEST})" in good
     (row,) = [r for r in certificate.facts["errors"] if r["split"] == TEST and r["kind"] is None]
-    assert f"{row['errors']['identified']['e_position_mm']:.2g} mm" in certificate.facts["verdict"]
+    assert f"{row['errors']['identified']['e_position_mm']:.2g} mm" in good
 
 
 @pytest.mark.parametrize(
     ("share", "null", "says"),
-    [(0.8, 40.0, "good for previewing reaches;"), (2.5, 40.0, "good for showing how it moves;"),
+    [(0.8, 40.0, "previewing reaches. On some, markers are 4 mm off"), (2.5, 40.0, "showing how it moves. "),
      (5.0, 40.0, NOTHING), (0.8, 10.0, NOTHING)],
 )  # fmt: skip
 def test_what_it_is_good_for_follows_from_numbers(share, null, says):
     identified = IDENTIFIED | {"e_position_pct": share}
     rest = {"e_position_mm": null}
-    sentence = verdict("On some", identified, rest, ASKED.uses, ASKED.factor, 7.0, ["loads at the tip"])
-    assert says in sentence
-    assert sentence.endswith("not for loads at the tip.")
+    lines = verdict("On some", identified, rest, ASKED.uses, ASKED.factor, 7.0, ["loads at the tip"], "do that.")
+    assert lines["good_for"].startswith(says)
+    assert lines["not_for"] == "what needs the tip nearer than 7 mm or loads at the tip."
+    assert lines["next"] == "do that."
+
+
+@pytest.mark.parametrize(
+    ("source", "says"),
+    [("mount_tilt_x", "record more static tilts"), (FRICTION, "reach each pose from the side"),
+     (NOISE, "calibrate the cameras"), (LACKING, "record more trials at rest with split validate")],
+)  # fmt: skip
+def test_what_to_do_next_lowers_the_largest_line(source, says):
+    rows = [{"source": name, "contribution_mm": 3.21 if name == source else 1.0}
+            for name in ("mount_tilt_x", FRICTION, NOISE, LACKING)]  # fmt: skip
+    sentence = next_step(rows, ["mount_tilt_x"])
+    assert sentence.startswith(says)
+    assert sentence.endswith(f": {source} adds the most to the tip's uncertainty, 3.2 mm.")
 
 
 def test_what_it_is_not_good_for_is_what_no_trial_had(certificate):
@@ -67,7 +84,7 @@ def test_what_it_is_not_good_for_is_what_no_trial_had(certificate):
     assert conditions["pulls"] == pytest.approx(0.02)
     assert conditions["tilt_deg"] == pytest.approx(60)
     limits = "loads at the tip, pulls above 20 mm at rest, pulls while the mount is tilted"
-    assert limits in certificate.facts["verdict"]
+    assert limits in certificate.facts["verdict"]["not_for"]
     assert limits_of(Conditions(5.0, 0.0, 0.0, 0.0), [0.0, 0.05])[0] == "loads above 50 g"
     assert "a tilted mount" in limits_of(Conditions(5.0, 0.0, 0.0, 0.0), [])
 
@@ -77,6 +94,25 @@ def test_what_is_open_comes_with_the_experiments_that_would_tell_it():
     (line,) = open_lines(parameters)
     assert line.startswith("mount_tilt_y is not determined; told by static tilts")
     assert strong_pairs(parameters) == ["mount_tilt_x and mount_tilt_y rise together (+0.95)"]
+
+
+def test_a_parameter_that_two_stages_identify_is_in_the_last_alone():
+    first = table(sample_trials(small_model(4))[:1])
+    last = first | {"parameters": {"mount_tilt_y": first["parameters"]["mount_tilt_y"] | {"value": 0.01}}}
+    facts = parameter_facts({"identify_stiffness": first, "identify_damping": last})
+    assert [list(section["parameters"]) for section in facts.values()] == [["mount_tilt_x"], ["mount_tilt_y"]]
+    assert facts["identify_damping"]["parameters"]["mount_tilt_y"]["value"] == 0.01
+    assert [facts[stage]["open"] != [] for stage in facts] == [False, True]
+    assert facts["identify_stiffness"]["hardly_told_apart"] == []
+
+
+def test_errors_of_the_shipped_model_come_first_and_an_intermediate_one_says_so():
+    row = {"trials": 1, "e_position_mm": 1.0}
+    metrics = {"identified": {DECIDING[1]: row | {"by_experiment": {"release": row}}}}
+    rows = error_rows({"identify_stiffness": metrics, "identify_damping": metrics}, {})
+    assert [(r["model"], r["shipped"]) for r in rows] == [
+        ("identify_damping", True), ("identify_stiffness (intermediate model)", False)
+    ]  # fmt: skip
 
 
 def test_an_interval_that_ends_with_its_range_is_open():
@@ -164,6 +200,7 @@ def test_the_page_stands_by_itself(html):
     assert "<of tests>" not in html
     replays = json.loads(re.search(r'id="replays">(.*?)</script>', html, re.DOTALL)[1])
     assert replays["trials"]
-    for words in ("Errors", "Replay", "Parameters", "Uncertainty of the tip", "Data quality", COMMAND, "Signature"):
+    for words in ("Errors", "Replay", "Parameters", "Uncertainty of the tip", "Data quality", COMMAND, "Signature",
+                  "Good for", "Not for", "What to do next:", "given the model"):  # fmt: skip
         assert words in html, words
     assert len(html) < 15e6

@@ -20,7 +20,7 @@ class IdentificationSettings(Method):
     """See conf/identify_*/config.yaml. A stage's Config: a method of search and what it is for.
 
     frames: compared of each trial, at most. command_delay: s from a logged command to the motor.
-    experiments: to fit. reported: to score, those and others.
+    experiments: to fit. reported: to score, those and others; of the last stage, whose model is shipped, all kinds.
     per_session: which of the parameters each of several sessions of the arm has for itself.
     """
 

@@ -25,7 +25,7 @@ from trunkline.report.certificate.facts import error_rows, parameter_facts, unce
 from trunkline.report.certificate.held_out import at_rest, tip_residuals
 from trunkline.report.certificate.poses import conditions_of, draw_poses, posed
 from trunkline.report.certificate.replays import packed
-from trunkline.report.certificate.words import Use, limits_of, verdict
+from trunkline.report.certificate.words import Use, limits_of, next_step, verdict
 from trunkline.settings import Seed
 from trunkline.twin.twin import Twin
 from trunkline.version import __version__
@@ -100,6 +100,7 @@ def certify(
     limits = limits_of(conditions, [trial.load for trial in trials])
     headline = headline_of(list(tables), metrics)
     radius = uncertainty["radius_mm"]["median"]
+    following = next_step(uncertainty["lines"], twin.posterior.names)
     prediction = replayed(model, trials, tables, config.frames)
     facts = {
         "arm": {"name": config.arm, "length_m": length, "markers": len(trials[0].markers), "tendons": model.nu},
@@ -108,7 +109,7 @@ def certify(
             "recorded": recorded_of_each(trials, DECIDING),
             "missing": missing_lines(trials),
         },
-        "verdict": verdict(*headline, config.uses, config.factor, radius, limits),
+        "verdict": verdict(*headline, config.uses, config.factor, radius, limits, following),
         "errors": rows,
         "parameters": parameter_facts(tables),
         "uncertainty": uncertainty,

@@ -3,6 +3,7 @@
 import numpy as np
 
 from trunkline.identification.evaluation.error_tables import LABELS
+from trunkline.identification.stages import model_name
 from trunkline.report.certificate.budget import COVERAGE, LEAST, Budget
 from trunkline.report.certificate.poses import Conditions
 from trunkline.report.certificate.words import certainty_words, open_lines, strong_pairs, telling
@@ -12,15 +13,17 @@ ERRORS = ("e_position_mm", "e_position_pct", "e_tip_mm", "e_tip_pct")
 
 
 def error_rows(stages: dict[str, dict], scored: dict[str, dict]) -> list[dict]:
-    """The errors of every stage's model, by split and, within it, by kind: all together first.
+    """The errors of every stage's model, the last one's, which is shipped, first: by split and, within it, by kind, all
+    together first.
 
     Args:
         stages: metrics of the identification stages by name, with the splits that they may read. scored: of the stage
             `score`, by the same names, with the other one.
     """
     rows = []
-    for stage, deciding in stages.items():
-        for metrics in (deciding, scored.get(stage, {})):
+    for stage in sorted(stages, key=lambda stage: stage != list(stages)[-1]):
+        shipped = stage == list(stages)[-1]
+        for metrics in (stages[stage], scored.get(stage, {})):
             for split in metrics.get("identified", {}):
                 whole = {name: metrics[name][split] for name in SHOWN if split in metrics.get(name, {})}
                 kinds = [None, *whole["identified"]["by_experiment"]]
@@ -30,19 +33,23 @@ def error_rows(stages: dict[str, dict], scored: dict[str, dict]) -> list[dict]:
                     errors = {LABELS[name]: {key: scores[key] for key in ERRORS if key in scores}
                               for name, scores in by_model.items() if "e_position_mm" in scores}  # fmt: skip
                     trials = by_model["identified"]["trials"]
-                    rows.append({"stage": stage, "split": split, "kind": kind, "trials": trials, "errors": errors})
+                    rows.append({"stage": stage, "model": model_name(stage, stages), "shipped": shipped, "split": split,
+                                 "kind": kind, "trials": trials, "errors": errors})  # fmt: skip
     return rows
 
 
 def parameter_facts(tables: dict[str, dict]) -> dict[str, dict]:
     """By stage: values with their intervals, of several sessions also what all but the first have for themselves; what
-    trades off, what is told least, and what is open."""
-    facts = {}
-    for stage, table in tables.items():
+    trades off, what is told least, and what is open. A parameter that several stages identify is in the last of them
+    alone, whose value the model has."""
+    facts, keys = {}, ("parameters", "per_session")
+    last = {name: stage for stage, table in tables.items() for key in keys for name in table.get(key, {})}
+    for stage, whole in tables.items():
+        table = whole | {
+            key: {name: row for name, row in whole[key].items() if last[name] == stage} for key in keys if key in whole
+        }
         rows = {
-            key: {name: _parameter_fact(name, row) for name, row in table[key].items()}
-            for key in ("parameters", "per_session")
-            if key in table
+            key: {name: _parameter_fact(name, row) for name, row in table[key].items()} for key in keys if key in table
         }
         facts[stage] = rows | {
             "trials": len(table["fitted_to"]),

@@ -15,6 +15,7 @@ from trunkline.recordings.trials.experiments import EXPERIMENTS
 ASSETS = Path(__file__).parent / "page"
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
 BESIDE = [LABELS[name] for name in TABLED]
+VERDICT = {"good_for": "Good for", "not_for": "Not for", "next": "What to do next:"}
 SPEEDS = (0.1, 0.25, 0.5, 1, 2)
 
 
@@ -44,6 +45,8 @@ def page(facts: dict, replays: dict, pictures: dict[str, bytes]) -> str:
 
 def _first(facts: dict) -> str:
     arm, session = facts["arm"], facts["session"]
+    lines = [f"<strong>{words}</strong> {escape(facts['verdict'][key])}" for key, words in VERDICT.items()]
+    verdict = "<br>".join(lines)
     rows = {
         "Arm": f"{arm['name']}; {1e3 * arm['length_m']:.0f} mm, {arm['tendons']} tendons, "
         f"{arm['markers']} markers tracked",
@@ -51,34 +54,29 @@ def _first(facts: dict) -> str:
     }
     return (
         f'<header>\n<p class="kind">Calibration certificate</p>\n<h1>{escape(arm["name"])}, session '
-        f"{escape(session['name'])}</h1>\n</header>\n<main>\n<p class=\"verdict\">{escape(facts['verdict'])}</p>\n"
+        f"{escape(session['name'])}</h1>\n</header>\n<main>\n<p class=\"verdict\">{verdict}</p>\n"
         f"{_list(rows)}"
     )
 
 
 def _errors(facts: dict) -> str:
     head = ["model of", "split", "trials", *BESIDE]
-    whole = [row for row in facts["errors"] if row["kind"] is None or _lone(facts, row)]
-    table = [_error_row(row, whole=False) for row in whole]
-    every = [_error_row(row, whole=row["kind"] is None) for row in facts["errors"]]
+    shipped, others = ([_error_row(row) for row in facts["errors"] if row["shipped"] == is_it]
+                       for is_it in (True, False))  # fmt: skip
     caption = "Position error over all markers / of the tip, mm (the former in % of length), mean over trials"
     note = (
-        "<p class=\"quiet\">Nothing was fitted to the trials of test; choices are made on those of validate. The noise "
-        "floor is what noise and the fit of a pose leave by themselves.</p>\n"
+        "<p class=\"quiet\">All rows are of the model that is shipped. Nothing was fitted to the trials of test; "
+        "choices are made on those of validate. The noise floor is what noise and the fit of a pose leave by "
+        "themselves.</p>\n"
     )
-    return (
-        f"<h2>Errors</h2>\n{_table(caption, head, table)}{note}"
-        f"<details>\n<summary>By kind of experiment</summary>\n{_table(caption, head, every)}</details>\n"
-    )
+    before = ""
+    if others:
+        table = _table(caption, head, others)
+        before = f"<details>\n<summary>Intermediate models, which are not shipped</summary>\n{table}</details>\n"
+    return f"<h2>Errors</h2>\n{_table(caption, head, shipped)}{note}{before}"
 
 
-def _lone(facts: dict, row: dict) -> bool:
-    """Whether a kind is all that a stage has in a split."""
-    same = [other for other in facts["errors"] if (other["stage"], other["split"]) == (row["stage"], row["split"])]
-    return len(same) == 1
-
-
-def _error_row(row: dict, whole: bool) -> tuple[bool, list[str]]:
+def _error_row(row: dict) -> tuple[bool, list[str]]:
     kind = "all kinds" if row["kind"] is None else EXPERIMENTS[row["kind"]].plural
     cells = []
     for label in BESIDE:
@@ -88,7 +86,7 @@ def _error_row(row: dict, whole: bool) -> tuple[bool, list[str]]:
             continue
         tip = f" / {errors['e_tip_mm']:.3g}" if "e_tip_mm" in errors else ""
         cells.append(f"{errors['e_position_mm']:.3g}{tip} ({errors['e_position_pct']:.2g} %)")
-    return whole, [row["stage"], row["split"], f"{row['trials']} {kind}", *cells]
+    return row["kind"] is None, [row["model"], row["split"], f"{row['trials']} {kind}", *cells]
 
 
 def _replay(pictures: dict[str, bytes]) -> str:
@@ -118,7 +116,11 @@ simulated.</figcaption></figure>
 
 
 def _parameters(facts: dict) -> str:
-    parts = ["<h2>Parameters</h2>\n"]
+    parts = [
+        "<h2>Parameters</h2>\n<p>Of a parameter that several stages identify, this is the last value, which the model "
+        "has. Intervals are given the model: they are right if the arm is as the model has it. What the model lacks is "
+        "not in them.</p>\n"
+    ]
     for stage, section in facts["parameters"].items():
         rows = []
         for name, row in (section["parameters"] | section.get("per_session", {})).items():
@@ -126,8 +128,8 @@ def _parameters(facts: dict) -> str:
             state = "on a bound" if row["at_bound"] else "undetermined" if row["undetermined"] else ""
             rows.append((False, [name, f"{row['value']:.4g}", f"{low:.4g} … {high:.4g}", row["unit"] or "–",
                                  f"{row['words']}{f'; {state}' if state else ''}"]))  # fmt: skip
-        caption = f"From {section['trials']} trials; intervals of 95 %, given the model"
-        table = _table(caption, ["parameter", "value", "interval", "unit", "in words"], rows)
+        caption = f"From {section['trials']} trials; intervals are given the model"
+        table = _table(caption, ["parameter", "value", "95 % interval, given the model", "unit", "in words"], rows)
         parts.append(f"<h3>{stage}</h3>\n{table}")
         sentences = [f"What the trials tell least: {section['weakest_direction']}."]
         sentences += [f"Hardly told apart: {pair}." for pair in section["hardly_told_apart"]]

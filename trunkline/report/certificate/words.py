@@ -1,5 +1,6 @@
 """What a certificate says in sentences, each from numbers."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -9,11 +10,12 @@ from pydantic import Field
 from trunkline.identification.diagnostics.identifiability import Identifiability
 from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.recordings.trials.experiments import EXPERIMENTS
+from trunkline.report.certificate.budget import FRICTION, NOISE
 from trunkline.report.certificate.poses import Conditions
 
 FEW_TILTS = 10.0  # deg, up to which a mount counts as upright
 STRONG = 0.9  # of a correlation, from which on it is named
-NOTHING = "for nothing yet: it is not far better than knowing nothing of forces"
+NOTHING = "nothing yet: it is not far better than knowing nothing of forces"
 
 
 @dataclass
@@ -25,9 +27,10 @@ class Use:
 
 
 def verdict(
-    where: str, identified: dict, null: dict, uses: list[Use], factor: float, radius_mm: float, limits: list[str]
-) -> str:
-    """One sentence: how far off, what that is good for, and what not.
+    where: str, identified: dict, null: dict, uses: list[Use], factor: float, radius_mm: float, limits: list[str],
+    next_step: str,
+) -> dict[str, str]:  # fmt: skip
+    """What the twin is good for and what not, and what to do next: a sentence each, with its numbers in mm.
 
     Args:
         where: which trials the errors are of, in words.
@@ -35,15 +38,40 @@ def verdict(
         factor: by which the twin must be nearer than that to be good for anything.
         radius_mm: within which a tip at rest is in 95 of 100 cases, in the median pose.
         limits: what it is not good for.
+        next_step: as the function of that name has it.
     """
     off, share = identified["e_position_mm"], identified["e_position_pct"]
     fit = [use.words for use in sorted(uses, key=lambda use: use.up_to_pct) if share <= use.up_to_pct]
     better = off * factor <= null["e_position_mm"]
     tip = f", tips {identified['e_tip_mm']:.2g} mm" if "e_tip_mm" in identified else ""
-    good = f"good for {fit[0]}" if fit and better else f"good {NOTHING}"
-    rest = f"at rest, in the median pose, its tip is within {radius_mm:.2g} mm of the twin's in 95 of 100 cases"
-    start = f"{where}, markers are {off:.2g} mm off in the mean, {share:.2g} % of length{tip}"
-    return f"{start}; {rest}; {good}; not for {_listed(limits)}."
+    good = fit[0] if fit and better else NOTHING
+    errors = f"{where}, markers are {off:.2g} mm off in the mean, {share:.2g} % of length{tip}"
+    rest = f"at rest, in the median pose, the tip is within {radius_mm:.2g} mm of the twin's in 95 of 100 cases"
+    nearer = f"what needs the tip nearer than {radius_mm:.2g} mm"
+    return {
+        "good_for": f"{good}. {errors}; {rest}.",
+        "not_for": f"{_listed([nearer, *limits])}.",
+        "next": next_step,
+    }
+
+
+def next_step(lines: list[dict], parameters: Collection[str]) -> str:
+    """What lowers the largest line of the tip's uncertainty.
+
+    Args:
+        lines: as `uncertainty_facts` has them. parameters: which sources are parameters of the model.
+    """
+    largest = max(lines, key=lambda line: line["contribution_mm"])
+    source = largest["source"]
+    if source == NOISE:
+        step = "calibrate the cameras"
+    elif source == FRICTION:
+        step = "reach each pose from the side from which it was recorded"
+    elif source in parameters:
+        step = f"record more {_listed([EXPERIMENTS[kind].plural for kind in telling(source)])}"
+    else:
+        step = "record more trials at rest with split validate, in the poses that are needed"
+    return f"{step}: {source} adds the most to the tip's uncertainty, {largest['contribution_mm']:.2g} mm."
 
 
 def limits_of(conditions: Conditions, loads: list[float]) -> list[str]:
