@@ -107,7 +107,7 @@ def rubbing() -> mujoco.MjModel:
     return spec.compile()
 
 
-def held(model: mujoco.MjModel, pulls: np.ndarray, approach: int) -> Experiment:
+def pull_from(model: mujoco.MjModel, pulls: np.ndarray, approach: int) -> Experiment:
     """Motors hold `pulls` (3,), m; `approach` is the side from which they brought the arm there."""
     hinges = ArmModel(model).hinge_count
     return Experiment(
@@ -126,7 +126,7 @@ def test_cables_rub_to_the_side_from_which_the_arm_came():
     chain = read_chain(model)
     bends = []
     for approach in (1, 0, -1):
-        experiment = held(model, pulls, approach)
+        experiment = pull_from(model, pulls, approach)
         shape = shapes_at_rest(model, fields, [experiment], sites, None)
         followed = actuated(chain._replace(capstan=0.2 * approach), experiment.controls, DOWN)
         assert followed.converged.all()

@@ -12,7 +12,7 @@ BEFORE = np.arange(-1000, len(TIME)) / 120  # s, from 8 s before the arm rests
 RAMP = [-8.0, -6.0, -5.0, -4.0]  # s
 
 
-def held(*columns, kind="static_pull", **changes):
+def pull_from(*columns, kind="static_pull", **changes):
     """A trial whose motors are at these mm of pull at the times of `RAMP`, and hold the last of them from then on."""
     pulls = [np.interp(BEFORE, RAMP, column) / 1000 for column in columns]
     tendons = tuple(f"tendon_{number + 1}" for number in range(len(columns)))
@@ -39,22 +39,22 @@ LOOSE = [-300.0] * 4
     ],
 )
 def test_the_last_motion_of_the_motors_that_pull_counts(columns, approach):
-    assert filter_raw_trial(held(*columns), SETTINGS)[0].approach == approach
+    assert filter_raw_trial(pull_from(*columns), SETTINGS)[0].approach == approach
 
 
 def test_what_comes_after_the_rest_does_not_count():
-    trial = held([0, 40, 40, 40])
+    trial = pull_from([0, 40, 40, 40])
     trial.commands[0.9 * TIME[-1] < BEFORE] = 0.02
     assert filter_raw_trial(trial, SETTINGS)[0].approach == 1
 
 
 def test_commands_are_dated_by_the_clock_of_the_poses():
-    trial = held([0, 40, 40, 40])
+    trial = pull_from([0, 40, 40, 40])
     late = replace(trial, clock_offset=100.0)
     assert filter_raw_trial(late, SETTINGS)[0].approach == 0, "all of them come after the rest"
 
 
 def test_only_an_arm_that_motors_hold_has_an_approach():
-    assert filter_raw_trial(held([0, 40, 40, 40], kind="static_tilt"), SETTINGS)[0].approach == 0
+    assert filter_raw_trial(pull_from([0, 40, 40, 40], kind="static_tilt"), SETTINGS)[0].approach == 0
     nothing = raw("static_pull", command_time=np.empty(0), commands=np.empty((0, 1)))
     assert filter_raw_trial(nothing, SETTINGS)[0].approach == 0
