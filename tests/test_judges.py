@@ -40,6 +40,10 @@ JUDGES = {  # by function, the test that has its table, and its file below tests
         "rehearsal/test_reach.py",
         "test_the_first_contact_decides_who_has_reached",
     ),
+    "rehearsal.experiments.result:share_of": (
+        "rehearsal/test_stated.py",
+        "test_of_outcomes_those_that_are_one_are_counted",
+    ),
     "rehearsal.experiments.stated:probabilities": (
         "rehearsal/test_stated.py",
         "test_only_what_was_judged_to_agree_counts_as_such",

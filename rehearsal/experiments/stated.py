@@ -8,6 +8,7 @@ import numpy as np
 
 from rehearsal.experiments.calibration import base_brier, brier, stated
 from rehearsal.experiments.result import LATER, Result, share_of
+from trunkline.ar.hybrid.rates import wilson
 
 PROBABLE = ("grasp", "handle")  # whose previews state a probability
 REACH = "reach"  # whose previews state a radius
@@ -30,10 +31,10 @@ def probabilities(rows: list[Result]) -> dict:
     """Of runs that all have a probability; nothing of none. What was never judged did not agree."""
     if not rows:
         return {}
-    probability, outcome = stated(rows)
-    agreed, share, low, high = share_of([row.agreed == 1 for row in rows])
+    agreed, (probability, outcome) = int(sum(row.agreed == 1 for row in rows)), stated(rows)
+    low, high = wilson(agreed, len(rows))
     paths = [row.path_pct for row in rows if np.isfinite(row.path_pct)]
-    table = {"previews": len(rows), "agreed": agreed, "agreement": share, "low": low, "high": high}
+    table = {"previews": len(rows), "agreed": agreed, "agreement": agreed / len(rows), "low": low, "high": high}
     table |= {"brier": brier(probability, outcome), "brier_base": base_brier(outcome)}
     return table | ({"path_pct_median": float(np.median(paths))} if paths else {})
 

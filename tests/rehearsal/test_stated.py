@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rehearsal.experiments.result import LATER, Result
+from rehearsal.experiments.result import LATER, Result, share_of
 from rehearsal.experiments.stated import covered, probabilities, scores
 from rehearsal.rehearse import metrics_of
 from rehearsal.runs import Provenance
@@ -115,3 +115,11 @@ def test_the_metrics_name_package_code_experiments_and_previews():
     for key in ("agreement", "path_pct_median", "brier", "brier_base"):
         assert np.isfinite(metrics["preview"][key])
     assert "preview" not in metrics_of(Provenance("abc", "def"), [Result("follow", 0, True)])
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "ones", "share"),
+    [((1.0,), 1, 1.0), ((0.0,), 0, 0.0), ((True, False, True, True), 3, 0.75), ((0.0, 1.0, 0.0, 0.0), 1, 0.25)],
+)
+def test_of_outcomes_those_that_are_one_are_counted(outcomes, ones, share):
+    assert share_of(outcomes) == (ones, share, *wilson(ones, len(outcomes)))

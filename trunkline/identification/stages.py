@@ -41,7 +41,8 @@ def read_table(file: Path) -> dict:
     """
     try:
         table = json.loads(existing(file).read_text(encoding="utf-8"))
-        table["parameters"].items(), table["fitted_to"].items()
+        table["parameters"].items()
+        table["fitted_to"].items()
         if lacking := COMPARED - table["compared"].keys():
             raise KeyError(f"compared: {min(lacking)}")
         return table
