@@ -9,9 +9,10 @@ from tests.support.matched_plant import small_model
 from trunkline.identification.parameters.parameters import PARAMETERS
 from trunkline.identification.simulate.experiment import SLACK
 from trunkline.report.certificate.arms import arm_of
-from trunkline.report.certificate.budget import FRICTION, NOISE, Inputs, budget, lacking_draws
-from trunkline.report.certificate.discrepancy import Discrepancy, discrepancy
+from trunkline.report.certificate.budget import FRICTION, NOISE, Inputs, budget
+from trunkline.report.certificate.discrepancy import discrepancy
 from trunkline.report.certificate.poses import Conditions, StaticPoses, draw_poses
+from trunkline.twin.discrepancy import Discrepancy
 from trunkline.twin.posterior import Posterior
 
 SMALL = 1e-3  # rad, of a mount: tips move along straight lines
@@ -112,37 +113,63 @@ def test_friction_is_rectangular_between_the_ends_of_its_band(model):
 
 
 def test_what_the_model_lacks_has_the_variance_that_it_says():
-    likelihood = np.zeros((2, 2))
-    likelihood[0, 1] = 1.0  # of the scales 0.01 and 0.02, for sure
-    lacking = Discrepancy(np.array([0.01, 0.02]), likelihood, 5)
+    lacking = Discrepancy(np.array([[2e-3, 0.01, 0.02]]), 5)
     ways, arms = np.array([[0.1, 0.0], [0.1, 0.3]]), np.array([[0, 0, -0.5], [0.3, 0, -0.3]])
-    draws = lacking_draws(lacking, ways, arms, 20_000, np.random.default_rng(6))
+    draws = lacking.offsets(ways, arms, 20_000, np.random.default_rng(6))
     deviation = np.sqrt((draws**2).sum(axis=2).mean(axis=0))
-    np.testing.assert_allclose(deviation, [1e-3, np.hypot(1e-3, 6e-3)], rtol=0.02)
+    expected = [np.hypot(2e-3, 1e-3), np.linalg.norm([2e-3, 1e-3, 6e-3])]
+    np.testing.assert_allclose(deviation, expected, rtol=0.02)
+    np.testing.assert_allclose(lacking.deviation(ways), expected)
     assert np.abs(np.einsum("dnk,nk->dn", draws, arms)).max() < 1e-15, "across the arm"
 
 
+def residuals_of(true, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Lengths (N,) of what a model with the scales `true` (3,) lacks, and ways (N, 2), some of them 0."""
+    ways = rng.uniform(0, 0.3, (count, 2)) * rng.integers(0, 2, (count, 2))
+    deviation = Discrepancy(np.array([true]), count).deviation(ways) / np.sqrt(2)
+    return np.linalg.norm(deviation[:, None] * rng.standard_normal((count, 2)), axis=1), ways
+
+
 def test_scales_of_what_the_model_lacks_come_back_from_many_residuals_and_few_leave_them_wide():
-    rng, true = np.random.default_rng(7), np.array([0.01, 0.03])
-    ways = rng.uniform(0, 0.3, (400, 2))
-    off = np.sqrt((ways**2 @ true**2) / 2)[:, None] * rng.standard_normal((400, 2))
-    residuals = np.linalg.norm(off, axis=1)
-    many = discrepancy(residuals, ways, np.zeros(400))
-    np.testing.assert_allclose(many.rms, true, rtol=0.1)
+    true = np.array([2e-3, 0.01, 0.03])
+    residuals, ways = residuals_of(true, 300, np.random.default_rng(7))
+    many = discrepancy(residuals, ways, np.zeros(300))
+    np.testing.assert_allclose(many.rms, true, rtol=0.15)
     few = discrepancy(residuals[:4], ways[:4], np.zeros(4))
 
     def spread(lacking: Discrepancy) -> float:
-        return float(np.std(np.log(lacking.draw(4000, np.random.default_rng(8))[:, 1])))
+        return float(np.std(np.log(lacking.draw(4000, np.random.default_rng(8))[:, 2])))
 
     assert spread(few) > 4 * spread(many)
+
+
+def test_a_model_that_is_off_where_it_hardly_moves_is_so_said_to_be():
+    """Residuals that are as large at the smallest ways as at the largest: shares alone would state next to nothing."""
+    residuals, _ = residuals_of(np.array([8e-3, 0, 0]), 16, np.random.default_rng(3))
+    lacking = discrepancy(residuals, np.linspace(0.002, 0.3, 16)[:, None] * np.ones(2), np.zeros(16))
+    small = lacking.offsets(np.full((1, 2), 0.002), np.array([[0, 0, -0.5]]), 4000, np.random.default_rng(4))
+    assert 0.008 < np.quantile(np.linalg.norm(small, axis=2), 0.95) < 0.025
+
+
+def test_the_constant_covers_small_and_large_ways_alike():
+    """Of 25 models, each with its own scales and 12 residuals, the 90 % radius holds 90 % of what comes next."""
+    rng, inside = np.random.default_rng(12), []
+    for _ in range(25):
+        true = np.exp(rng.normal(np.log([4e-3, 0.01, 0.03]), 0.4))
+        residuals, ways = residuals_of(true, 62, rng)
+        lacking = discrepancy(residuals[:12], ways[:12], np.zeros(12))
+        arms = np.tile([0.0, 0.0, -0.5], (50, 1))
+        radius = np.quantile(np.linalg.norm(lacking.offsets(ways[12:], arms, 1000, rng), axis=2), 0.9, axis=0)
+        inside.append(residuals[12:] <= radius)
+    assert 0.87 < np.mean(inside) < 0.97
 
 
 def test_residuals_that_other_sources_explain_leave_nothing_to_the_model():
     rng, wide = np.random.default_rng(9), 2e-3
     residuals = np.linalg.norm(wide / np.sqrt(2) * rng.standard_normal((200, 2)), axis=1)
     ways = np.full((200, 2), 0.2)
-    assert discrepancy(residuals, ways, np.full(200, wide**2)).rms.max() < 0.2 * wide / 0.2
-    assert discrepancy(residuals, ways, np.zeros(200)).rms.max() > 0.5 * wide / 0.2
+    assert discrepancy(residuals, ways, np.full(200, wide**2)).deviation(ways).max() < 0.4 * wide
+    assert discrepancy(residuals, ways, np.zeros(200)).deviation(ways).max() > 0.9 * wide
 
 
 def test_poses_lie_within_the_conditions(model):

@@ -9,7 +9,7 @@ from tests.report.certificate.sample import ASKED, metrics, sample_trials, table
 from tests.support.matched_plant import small_model
 from tests.support.twins import twin_of
 from trunkline.report.certificate.arms import arm_of
-from trunkline.report.certificate.budget import COVERAGE, Budget, lacking_draws, radius_of
+from trunkline.report.certificate.budget import COVERAGE, Budget, radius_of
 from trunkline.report.certificate.certificate import certify
 from trunkline.report.certificate.coverage import Coverage, covered, from_beyond, is_inside, share_of
 from trunkline.report.certificate.discrepancy import discrepancy
@@ -146,6 +146,6 @@ def test_a_twin_without_rest_states_an_infinite_radius_and_the_others_theirs():
     """What the model lacks is drawn across the arm, and such a pose has none."""
     lacking = discrepancy(np.full(5, 0.005), np.full((5, 2), 0.1), np.full(5, 1e-6))
     ways, arms = np.array([[0.1, 0.1], [np.nan, np.nan]]), np.array([[0.0, 0.0, -0.5], [np.nan] * 3])
-    radius = radius_of(lacking_draws(lacking, ways, arms, 200, np.random.default_rng(0)))
+    radius = radius_of(lacking.offsets(ways, arms, 200, np.random.default_rng(0)))
     assert 0 < radius[0] < 0.1
     assert radius[1] == np.inf

@@ -14,8 +14,9 @@ import numpy as np
 
 from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.report.certificate.arms import StaticArm, arm_of, arms_with
-from trunkline.report.certificate.discrepancy import Discrepancy, discrepancy
+from trunkline.report.certificate.discrepancy import discrepancy
 from trunkline.report.certificate.poses import StaticPoses
+from trunkline.twin.discrepancy import Discrepancy
 from trunkline.twin.posterior import Posterior
 
 COVERAGE = 0.95
@@ -133,7 +134,7 @@ def budget(inputs: Inputs, poses: StaticPoses, arms: int, each: int, rng: np.ran
     offsets = offsets + rng.uniform(-1, 1, (draws, len(poses), 1)) * friction
     offsets = offsets + inputs.noise * rng.standard_normal(offsets.shape)
     if inputs.lacking:
-        offsets = offsets + lacking_draws(inputs.lacking, ways, tips - arm.origin, draws, rng)
+        offsets = offsets + inputs.lacking.offsets(ways, tips - arm.origin, draws, rng)
     sources = [
         UncertaintySource(name, f"t, {degrees:.0f} degrees of freedom", deviation * parameter_named(name).scale,
                           _axis_unit(name), degrees, np.linalg.norm(move, axis=1))
@@ -143,28 +144,12 @@ def budget(inputs: Inputs, poses: StaticPoses, arms: int, each: int, rng: np.ran
     sources.append(UncertaintySource(FRICTION, "rectangular, between both ends of its band", 1 / np.sqrt(3),
                                      "half bands", np.inf, np.linalg.norm(friction, axis=1) / np.sqrt(3)))  # fmt: skip
     if inputs.lacking:
-        scales = inputs.lacking.rms
         sources.append(UncertaintySource(LACKING, f"from {inputs.lacking.trials} held-out trials at rest", None, "mm",
-                           inputs.lacking.trials, np.sqrt(ways**2 @ scales**2)))  # fmt: skip
+                           inputs.lacking.trials, inputs.lacking.deviation(ways)))  # fmt: skip
     every = np.full(len(poses), np.sqrt(3) * inputs.noise)
     sources.append(UncertaintySource(NOISE, "normal, of each coordinate", inputs.noise * 1e3, "mm", np.inf, every))
     both = np.einsum("ink,jnk,ij->n", moves, moves, parameters.correlation - np.eye(len(parameters.names)))
     return Budget(tips, sources, both, radius_of(offsets))
-
-
-def lacking_draws(
-    lacking: Discrepancy, ways: np.ndarray, arms: np.ndarray, draws: int, rng: np.random.Generator
-) -> np.ndarray:
-    """Draws of what the model lacks, m, across the lines from the mount to the tips. Shape (draws, N, 3).
-
-    Args:
-        ways: g and p, m. Shape (N, 2). arms: from the mount to the tip. Shape (N, 3).
-    """
-    scales = lacking.draw(draws, rng)
-    deviation = np.sqrt(scales**2 @ (ways**2).T / 2)  # of each of both directions
-    across = np.linalg.svd(np.nan_to_num(arms)[:, None, :])[2][:, 1:]  # (N, 2, 3); a twin without rest has no arm
-    normal = rng.standard_normal((draws, len(ways), 2))
-    return deviation[..., None] * np.einsum("dnk,nkx->dnx", normal, across)
 
 
 def radius_of(offsets: np.ndarray) -> np.ndarray:

@@ -87,8 +87,9 @@ def certify(
     uncertainty = uncertainty_facts(tip_budget, conditions, length, config.arms * config.each)
     uncertainty["held_out_trials"] = inputs.lacking.trials if inputs.lacking else 0
     if inputs.lacking:
-        uncertainty["lacking_pct"] = dict(zip(("of_what_gravity_moves", "of_what_cables_move"),
-                                              100 * inputs.lacking.rms, strict=True))  # fmt: skip
+        constant, *shares = inputs.lacking.rms
+        uncertainty["lacking_constant_mm"] = 1e3 * constant
+        uncertainty["lacking_pct"] = {"of_what_gravity_moves": 100 * shares[0], "of_what_cables_move": 100 * shares[1]}
     if len(sessions := sessions_of(trials)) > 1:
         uncertainty["mounted_as_in"] = sessions[0]
     uncertainty["measured"] = None

@@ -163,7 +163,12 @@ def _uncertainty(facts: dict, pictures: dict[str, bytes]) -> str:
         still = f'<p class="quiet">No tip at rest moves with {escape(", ".join(uncertainty["move_no_tip"]))}.</p>\n'
     lacking = "Too few held-out trials at rest tell what the model lacks: it is not in here."
     if count := uncertainty["held_out_trials"]:
-        lacking = f"What the model lacks, which no interval holds, is taken from the {count} held-out trials at rest."
+        constant, shares = uncertainty["lacking_constant_mm"], uncertainty["lacking_pct"]
+        lacking = (
+            f"What the model lacks, which no interval holds, is taken from the {count} held-out trials at rest: "
+            f"{constant:.2g} mm everywhere, {shares['of_what_gravity_moves']:.2g} % of how far gravity moves the tip "
+            f"and {shares['of_what_cables_move']:.2g} % of how far the cables do, root mean squares."
+        )
     mounted = ""
     if session := uncertainty.get("mounted_as_in"):
         mounted = f" It is of the arm as it was mounted in the session {escape(session)}."
