@@ -137,9 +137,13 @@ class Reached:
     seconds: np.ndarray
     rested: np.ndarray | None = None
 
+    def missed(self, length: float) -> np.ndarray:
+        """By how much each target was missed, m; one without an end counts as missed by the arm's `length`, m. (N,)."""
+        return np.where(np.isfinite(self.position), self.position, length)
+
     def metrics(self, length: float) -> dict:
-        """Summary; a target without an end counts as missed by the arm's `length`, m."""
-        position = np.where(np.isfinite(self.position), self.position, length)
+        """Summary, of targets as `missed` has them."""
+        position = self.missed(length)
         far = position > SHARE * length
         return {
             "position_error_mm": {
@@ -225,7 +229,7 @@ def score(
     tips = rig(pulls, gravity_of(few) @ turn.T)
     on_rig = _reached(few, answer, (tips - origin) @ turn)
     summary = on_rig.metrics(chain.length)
-    twin = np.quantile(sent.position[: len(few)], (0.5, 0.95)) * 1e3
+    twin = np.quantile(sent.missed(chain.length)[: len(few)], (0.5, 0.95)) * 1e3
     return on_model, {"targets": len(few)} | summary | {"twin_mm": {"median": twin[0], "p95": twin[1]}}
 
 
