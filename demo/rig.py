@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from demo.plants.at_once import tips_at_once
 from demo.plants.choice import Choice, plant_of
 from demo.plants.slowly import Slow, slow_tips
 from trunkline.pipeline.config import load_config
@@ -23,13 +24,15 @@ class Config(Choice):
 
 
 def reach(pulls: np.ndarray, gravity: np.ndarray) -> np.ndarray:
-    """Where the tip of the lab's arm comes to rest, with its friction, from straight, in the base frame, m.
+    """Where the tip of the lab's arm comes to rest by itself after commands that are sent at once, in the base frame,
+    m; NaN where it does not rest. Shape (N, 3). The mount is tilted before, while the arm hangs with loose cables.
 
     Args:
         pulls: commands of the motors, m of pull from the straight arm's path length. Shape (N, K).
         gravity: in the base frame, m/s². Shape (N, 3).
     """
-    return plant_of(load_config(Config, "record", ROOT)).reach(pulls, gravity)
+    lab = load_config(Config, "record", ROOT)
+    return tips_at_once(plant_of(lab), lab.arm, pulls, gravity)
 
 
 def bring(pulls: np.ndarray, gravity: np.ndarray, back: np.ndarray) -> np.ndarray:

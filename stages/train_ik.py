@@ -8,16 +8,21 @@ import torch
 from trunkline.kinematics.dataset.samples import read_samples
 from trunkline.kinematics.ik.inputs import inputs_of
 from trunkline.kinematics.ik.learn import Learning, learn
+from trunkline.kinematics.ik.on_plant import Rig
 from trunkline.kinematics.ik.report import histogram, summary
 from trunkline.model.statics.chain import read_chain
 from trunkline.model_files import read_model
 from trunkline.pipeline.inputs import load_rig
 from trunkline.pipeline.stage import output_folder, run_stage, write_metrics
+from trunkline.recordings.trials.conditions import conditions_of
+from trunkline.recordings.trials.splits import DECIDING
+from trunkline.recordings.trials.trial import read_trials
 from trunkline.report.figures.network import error_map_figure, learning_figure, tip_error_figure
 from trunkline.report.figures.style import save_figure
 from trunkline.settings import settings
 
 SAMPLES = Path("data/processed/fk_dataset/samples.parquet")
+TRIALS = Path("data/processed/filter")
 ARTIFACTS = Path("artifacts/train_ik")
 
 
@@ -32,7 +37,10 @@ def main(config: Config) -> None:
     model = read_model(Path(config.model))
     chain = read_chain(model).smooth
     table = read_samples(SAMPLES, chain.tendons, "split")
-    rig = None if config.rig is None else load_rig("train_ik.rig", config.rig)
+    rig = None
+    if config.rig is not None:
+        reach = load_rig("train_ik.rig", config.rig)
+        rig = Rig(reach, conditions_of(read_trials(TRIALS, DECIDING)).pulls)
     inputs = inputs_of(table)
     learned = learn(model, chain, table, config, rig)
 

@@ -21,12 +21,13 @@ from studies.rows import Rows, digest
 from trunkline.errors import in_one_line
 from trunkline.model.statics.chain import read_chain
 from trunkline.pipeline.config import load_config
+from trunkline.recordings.trials.conditions import conditions_of
 from trunkline.recordings.trials.splits import DECIDING
 from trunkline.recordings.trials.trial import read_trials
 from trunkline.report.certificate.budget import Budget, budget
 from trunkline.report.certificate.certificate import inputs_of
 from trunkline.report.certificate.coverage import is_inside, pulls_of
-from trunkline.report.certificate.poses import conditions_of, draw_poses
+from trunkline.report.certificate.poses import draw_poses
 from trunkline.twin.twin import Twin
 
 COUNT, SEED, BATCH = 500, 20, 20

@@ -71,8 +71,12 @@ class Shown:
 
 def as_sent(at: str, targets: str) -> tuple[Shown, ...]:
     """Of commands that were sent to an arm: the same statistics of whatever arm, the bad ones beside the good."""
-    error, unsaid = f"{at}.position_error_mm", f"{at}.beyond_1pct_unsaid"
-    return Shown(f"{error}.median", "mm"), Shown(f"{error}.p95", "mm"), Shown(unsaid, of=targets)
+    return *both(f"{at}.position_error_mm"), Shown(f"{at}.beyond_1pct_unsaid", of=targets)
+
+
+def both(distances: str) -> tuple[Shown, Shown]:
+    """Median and 95th percentile of `distances`, mm."""
+    return Shown(f"{distances}.median", "mm"), Shown(f"{distances}.p95", "mm")
 
 
 # stage: [(what it is, its figures)]
@@ -98,6 +102,20 @@ RESULTS = {
             as_sent("as_controls.friction", "as_controls.friction.targets"),
         ),
         ("… to the simulated lab's arm", as_sent("on_plant", "on_plant.targets")),
+        (
+            "… pulling by no more in all than in the session's trials at rest",
+            as_sent("on_plant.within", "on_plant.within.targets"),
+        ),
+        (
+            "… to tips at which that arm itself rested, tip error: median / 95th percentile / of those within the "
+            "session's pulls",
+            (*both("on_plant.own_surface.position_error_mm"), *both("on_plant.own_surface.within.position_error_mm")),
+        ),
+        (
+            "Part of the error across the surface of tips, which no command takes away: median / 95th percentile / of "
+            "those within the session's pulls",
+            (*both("on_plant.across_mm"), *both("on_plant.within.across_mm")),
+        ),
     ],
     "reachability": [
         (
@@ -431,6 +449,8 @@ def _command_row(root: Path) -> str:
         tip = " / ".join(_number(lookup(metrics, figure.key)) for figure in errors)
         counts = f"{_number(lookup(metrics, silent.key))} of {_number(lookup(metrics, targets))}"
         cells.append(f"{tip} mm; {counts} targets missed by more than 1 % of length without a warning")
+    within = " / ".join(_number(lookup(metrics, figure.key)) for figure in both("on_plant.within.position_error_mm"))
+    cells[1] += f"; {within} mm where it pulls by no more than in the session"
     what = "Tip error of the network's commands, median / 95th percentile"
     return f"| {what} | on the twin, without friction: {cells[0]} | **on the simulated lab's arm: {cells[1]}** |"
 

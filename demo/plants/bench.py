@@ -36,7 +36,7 @@ class PrintedArm:
 
 @dataclass
 class Bench:
-    """n trials of one length, all at once, each from rest under an upright mount.
+    """n trials of one length, all at once, each from rest.
 
     gravity: in the frame of the base marker, m/s². Shape (n, 3).
     commands: m of pull, as sent at COMMAND_RATE. Shape (n, T, K).
@@ -44,6 +44,7 @@ class Bench:
     loads: at the tip, kg. Shape (n,).
     steady, steady_factor: a hand steadies the arm for so many s, all damping is so many times as large.
     since: s, from when on the trials are seen.
+    hanging: whether the mount is tilted beforehand, so that the rest is under `gravity`; else under an upright mount.
     """
 
     gravity: np.ndarray
@@ -53,6 +54,7 @@ class Bench:
     steady: float = 0.0
     steady_factor: float = 1.0
     since: float = 0.0
+    hanging: bool = False
 
     @property
     def stride(self) -> int:
@@ -85,15 +87,6 @@ class Plant(Protocol):
 
     def run(self, label: str, bench: Bench, tracked: list[int]) -> PlantMotion:
         """Do the trials and look at the units of these indices. `label` says what is done, for a bar of progress."""
-        ...
-
-    def reach(self, pulls: np.ndarray, gravity: np.ndarray) -> np.ndarray:
-        """Where the tip comes to rest, from straight, with its friction, in the base frame, m. Shape (N, 3).
-
-        Args:
-            pulls: commands of the motors, m of pull, sent at once. Shape (N, K).
-            gravity: m/s². Shape (N, 3).
-        """
         ...
 
     def answers(self) -> dict:

@@ -4,7 +4,6 @@ Every unit of the spiral hangs on a short elastic link with a joint at each end 
 harden, scatter and have dry friction, the masses are off, and the cables are stiff springs wound by motors.
 """
 
-import copy
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Literal
@@ -19,7 +18,6 @@ from trunkline.frames import STANDARD_GRAVITY
 from trunkline.model.arm.geometry import ChainGeometry
 from trunkline.model.arm.material import unit_properties
 from trunkline.model.arm.mjcf import Solref, unit_name
-from trunkline.model.simulation.drive import drive
 from trunkline.model.simulation.load import hang
 from trunkline.model.simulation.motion import batch_of, move
 
@@ -82,12 +80,6 @@ class Cousin:
                 rotations[trial, frame] = data.site_xmat[sites].reshape(-1, 3, 3)
         return PlantMotion(positions, rotations, wound[:, :: bench.stride][:, bench.skipped :][:, : angles.shape[1]])
 
-    def reach(self, pulls: np.ndarray, gravity: np.ndarray) -> np.ndarray:
-        model = copy.copy(self.model)
-        model.dof_damping[:] *= CALM
-        controls = np.concatenate([model.tendon_length0 - pulls, np.zeros_like(pulls)], axis=1)  # no hand
-        return drive(model, controls, gravity, LONGEST_REST).end
-
     def answers(self) -> dict:
         """Stiffness, with its mean scatter, and damping are those of a unit's two joints in series, at the base."""
         s, model = self.settings, self.model
@@ -114,14 +106,17 @@ class Cousin:
         }
 
     def _simulate(self, label: str, bench: Bench, controls: np.ndarray) -> np.ndarray:
-        """Joint angles (n, T, nq) at SAMPLE_RATE of n trials that start straight and at rest."""
+        """Joint angles (n, T, nq) at SAMPLE_RATE of n trials that start at rest, straight if the mount is upright."""
         batch = batch_of(self.model, len(controls))
         batch.expand("opt.gravity")[:] = bench.gravity
         damping = batch.expand("dof_damping")
-        damping *= bench.steady_factor
         if bench.loads.any():
             hang(batch, self.model, bench.loads)
         stride = bench.stride
+        if bench.hanging:
+            damping *= CALM
+            move(batch, np.repeat(controls[:, :1], round(LONGEST_REST * COMMAND_RATE), axis=1), (), stride)
+        damping[:] = bench.steady_factor * self.model.dof_damping
         instants = controls.shape[1] // stride
         parts = [batch.bind("qpos")[:, None].copy()]
         with progress(instants, f"record {label}", "instants") as bar:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from demo.plants.bench import COMMAND_RATE, LOOSE, Bench, Plant
+from demo.plants.bench import COMMAND_RATE, LOOSE, Bench, Plant, PlantMotion
 from demo.plants.choice import ArmChoice
 from trunkline.model.arm.spiral import spiral_chain
 
@@ -36,7 +36,6 @@ def slow_tips(
         back: whether a pull comes from beyond. Shape (N,).
     """
     last = spiral_chain(drawn.length, drawn.base_width, drawn.tip_width, drawn.units).lengths[-1]
-    from_centre = np.array([0.0, 0.0, -last / 2])
     tips = np.empty((len(pulls), 3))
     for pulled in (True, False):  # an arm that only hangs is steadied by a hand, as the lab does it
         chosen = np.flatnonzero((pulls > 0).any(axis=1) == pulled)
@@ -54,8 +53,13 @@ def slow_tips(
             steady=0.0 if pulled else slow.settle, steady_factor=slow.steady_factor, since=rest,
         )  # fmt: skip
         motion = plant.run("poses", bench, [drawn.units - 1])
-        tips[chosen] = rested(motion.positions[:, :, 0] + motion.rotations[:, :, 0] @ from_centre)
+        tips[chosen] = rested(tips_of(motion, last))
     return tips
+
+
+def tips_of(motion: PlantMotion, unit: float) -> np.ndarray:
+    """Of a motion of the last unit, whose length is `unit`, m: its lower end, m. Shape (n, F, 3)."""
+    return motion.positions[:, :, 0] + motion.rotations[:, :, 0] @ np.array([0.0, 0.0, -unit / 2])
 
 
 def rested(ways: np.ndarray) -> np.ndarray:

@@ -14,8 +14,8 @@ import numpy as np
 from pydantic import Field
 from scipy.spatial.transform import Rotation
 
-from demo.plants.bench import COMMAND_RATE, LOOSE, Bench, PlantMotion, PrintedArm
-from demo.plants.stranger_kernel import Links, LinkState, come_to_rest, path_lengths, simulate, tip
+from demo.plants.bench import COMMAND_RATE, Bench, PlantMotion, PrintedArm
+from demo.plants.stranger_kernel import Links, LinkState, come_to_rest, path_lengths, simulate
 from trunkline.compute.progress import progress
 from trunkline.compute.threads import thread_count
 from trunkline.frames import STANDARD_GRAVITY
@@ -114,15 +114,17 @@ class Stranger:
         positions = np.empty((count, samples, len(tracked), 3))
         rotations, wound = np.empty((*positions.shape, 3)), np.empty((count, samples, self.tendons))
         watched, heights = _centres(self.chain, self.links.lengths)
-        upright, gravity = self.mount.inv().apply(UPRIGHT), self.mount.inv().apply(bench.gravity)
-        starts: dict[tuple, LinkState] = {}  # of trials that begin alike
-        for load, sent in zip(bench.loads, bench.commands[:, 0], strict=True):
-            if (load, *sent) not in starts:
-                starts[load, *sent] = self._rest(upright, load, sent)
+        gravity = self.mount.inv().apply(bench.gravity)
+        before = gravity if bench.hanging else np.tile(self.mount.inv().apply(UPRIGHT), (count, 1))
+        begins = [tuple(row) for row in np.column_stack([before, bench.loads, bench.commands[:, 0]])]
+        distinct = list(dict.fromkeys(begins))  # of trials that begin alike
+        with ThreadPoolExecutor(thread_count()) as pool:
+            rests = pool.map(lambda row: self._rest(np.array(row[:3]), row[3], np.array(row[4:])), distinct)
+            starts = dict(zip(distinct, rests, strict=True))
 
         def simulate_trial(index: int) -> None:
             load, sent = bench.loads[index], bench.commands[index]
-            state = LinkState(*(part.copy() for part in starts[load, *sent[0]]))
+            state = LinkState(*(part.copy() for part in starts[begins[index]]))
             simulate(
                 self.links, state, gravity[index], load, sent, bench.pulls[index], self.straight, COMMAND_RATE,
                 self.settings.substeps, round(bench.steady * COMMAND_RATE), bench.steady_factor, bench.stride,
@@ -133,17 +135,6 @@ class Stranger:
         assert np.isfinite(positions).all(), "the stranger's engine diverged: its steps are too long"
         turn = self.mount.as_matrix()
         return PlantMotion(positions @ turn.T, turn @ rotations, wound)
-
-    def reach(self, pulls: np.ndarray, gravity: np.ndarray) -> np.ndarray:
-        tips, weight = np.empty((len(pulls), 3)), self.mount.inv().apply(gravity)
-        start = self._rest(self.mount.inv().apply(UPRIGHT), 0.0, np.full(self.tendons, -LOOSE))
-        start.motors[:] = start.winches[:] = 0.0
-
-        def drive(index: int) -> None:
-            tips[index] = tip(self.links, self._rest(weight[index], 0.0, pulls[index], start))
-
-        self._all("drive the stranger", drive, len(pulls), "drives")
-        return self.mount.apply(tips)
 
     def answers(self) -> dict:
         """Stiffness is the relaxed one of a unit's links in series, at the base, with the mean scatter; damping is what
@@ -201,9 +192,9 @@ class Stranger:
             motors=np.array(wound, float), winches=np.array(wound, float),
         )  # fmt: skip
 
-    def _rest(self, gravity: np.ndarray, load: float, sent: np.ndarray, start: LinkState | None = None) -> LinkState:
-        """The arm long after it was left alone with the motors at `sent` (K,) m, from `start` or from straight."""
-        state = self._state(sent) if start is None else LinkState(*(part.copy() for part in start))
+    def _rest(self, gravity: np.ndarray, load: float, sent: np.ndarray) -> LinkState:
+        """The arm long after it was left alone, straight, with the motors at `sent` (K,) m."""
+        state = self._state(sent)
         steps = round(LONGEST_REST / REST_STEP)
         come_to_rest(self.links, state, gravity, load, sent, self.straight, REST_STEP, steps, CALM, STILL)
         state.v[:] = 0.0

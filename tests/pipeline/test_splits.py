@@ -29,7 +29,7 @@ from trunkline.recordings.trials.trial import Trial, read_trials, write_trials
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("trunkline", "stages", "studies", "benchmarks", "qualification", "examples", "demo")
-READERS = {"filter", "identify_stiffness", "identify_damping", "identify_control", "score", "report"}  # of trials
+READERS = {"filter", "identify_stiffness", "identify_damping", "identify_control", "score", "report", "train_ik"}
 # who may name the split test, or all splits, and for what
 MAY_NAME = {
     "demo/laboratory.py": {"TEST"},  # records it

@@ -7,7 +7,7 @@ from trunkline.errors import InputError
 
 
 def load_rig(key: str, module: str, function: str = "reach") -> Callable:
-    """A function of a module that drives the arm itself, see `ik.as_controls.Rig` and `certificate.coverage.Bring`.
+    """A function of a module that drives the arm itself, see `ik.on_plant.Rig` and `certificate.coverage.Bring`.
     Each lab has its own.
 
     Raises:

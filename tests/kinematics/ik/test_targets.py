@@ -125,7 +125,7 @@ def test_the_score_asks_for_nearly_all_that_the_samples_reach(model, chain, monk
 
     monkeypatch.setattr(as_controls, "settle", settle)
     monkeypatch.setattr(as_controls, "drive", drive)
-    settings = AsControls(targets=MANY, timed=1, sent=1, seconds=1.0)
+    settings = AsControls(targets=MANY, timed=1, sent=1, on_rig=1, seconds=1.0)
     score(model, chain, ask, ANGLES, DEEPEST, settings, np.random.default_rng(0))
     targets, taut = asked[:2]
     assert len(targets) == MANY

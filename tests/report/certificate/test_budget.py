@@ -8,10 +8,11 @@ from scipy.stats import t as student
 from tests.support.matched_plant import small_model
 from trunkline.identification.parameters.parameters import PARAMETERS
 from trunkline.identification.simulate.experiment import SLACK
+from trunkline.recordings.trials.conditions import Conditions
 from trunkline.report.certificate.arms import arm_of
 from trunkline.report.certificate.budget import FRICTION, NOISE, Inputs, budget
 from trunkline.report.certificate.discrepancy import discrepancy
-from trunkline.report.certificate.poses import Conditions, StaticPoses, draw_poses
+from trunkline.report.certificate.poses import StaticPoses, draw_poses
 from trunkline.twin.discrepancy import Discrepancy
 from trunkline.twin.posterior import Posterior
 

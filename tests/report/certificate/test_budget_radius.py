@@ -9,6 +9,7 @@ from tests.report.certificate.test_budget import mounts, nothing_known, straight
 from tests.support.matched_plant import small_model, static_pull, tilt
 from tests.support.twins import twin_of
 from trunkline.identification.simulate.experiment import SLACK
+from trunkline.recordings.trials.conditions import Conditions
 from trunkline.recordings.trials.splits import IDENTIFY, TEST, VALIDATE
 from trunkline.report.certificate import budget as budgets
 from trunkline.report.certificate.arms import arm_of
@@ -16,7 +17,7 @@ from trunkline.report.certificate.budget import Inputs, UncertaintySource, budge
 from trunkline.report.certificate.certificate import FEWEST, inputs_of
 from trunkline.report.certificate.facts import uncertainty_facts
 from trunkline.report.certificate.held_out import at_rest, tip_residuals
-from trunkline.report.certificate.poses import Conditions, StaticPoses
+from trunkline.report.certificate.poses import StaticPoses
 from trunkline.report.certificate.words import open_lines
 from trunkline.twin.posterior import Posterior
 

@@ -13,11 +13,11 @@ from tests.report.certificate.sample import ASKED, INGESTED, sample, sample_tria
 from tests.support.matched_plant import small_model
 from tests.support.twins import twin_of
 from trunkline.errors import InputError
+from trunkline.recordings.trials.conditions import Conditions
 from trunkline.recordings.trials.splits import DECIDING, TEST
 from trunkline.report.certificate.budget import FRICTION, LACKING, NOISE
 from trunkline.report.certificate.certificate import COMMAND, check_fitted, digest_of_code, inputs_of
 from trunkline.report.certificate.facts import error_rows, parameter_facts
-from trunkline.report.certificate.poses import Conditions
 from trunkline.report.certificate.replays import LOST, UNIT
 from trunkline.report.certificate.words import NOTHING, limits_of, next_step, open_lines, strong_pairs, verdict
 

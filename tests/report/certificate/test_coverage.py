@@ -8,13 +8,14 @@ import pytest
 from tests.report.certificate.sample import ASKED, metrics, sample_trials, table
 from tests.support.matched_plant import small_model
 from tests.support.twins import twin_of
+from trunkline.recordings.trials.conditions import Conditions
 from trunkline.report.certificate.arms import arm_of
 from trunkline.report.certificate.budget import COVERAGE, Budget, radius_of
 from trunkline.report.certificate.certificate import certify
 from trunkline.report.certificate.coverage import Coverage, covered, from_beyond, is_inside, share_of
 from trunkline.report.certificate.discrepancy import discrepancy
 from trunkline.report.certificate.page import _measured
-from trunkline.report.certificate.poses import Conditions, StaticPoses, draw_poses
+from trunkline.report.certificate.poses import StaticPoses, draw_poses
 
 CONDITIONS = Conditions(60.0, 0.0, 0.02, 0.03)
 

@@ -17,7 +17,7 @@ from trunkline.kinematics.dataset.sampling import around_the_arm, in_sections, s
 from trunkline.kinematics.ik.inputs import draw_gravity, gravity_of, position_of
 from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.drive import drive, has_friction
-from trunkline.model.simulation.rest import base_frame, settle
+from trunkline.model.simulation.rest import settle
 from trunkline.model.statics.chain import Chain
 from trunkline.model.statics.hysteresis import model_friction
 
@@ -29,7 +29,6 @@ DOUBT = 0.75 * SHARE  # from which on a foreseen miss is a reason to doubt: what
 SWING = 4.0  # s that an arm without friction swings by itself before it is damped: then it has its shape
 PULL_SHARE = 0.8  # of the deepest pulls of the samples: together, two of them are near the motors' limits
 
-Rig = Callable[[np.ndarray, np.ndarray], np.ndarray]  # m of pull (N, K), gravity (N, 3), m/s², to tips (N, 3), m
 Ask = Callable[[np.ndarray], dict[str, np.ndarray]]  # as `ask.ask`, of one network
 
 
@@ -39,12 +38,13 @@ class AsControls:
 
     targets: that are drawn; some of them are left out, see `Drawn`. timed: how many of them are driven
     without friction for as long as it takes, to see how long that is. sent: how many are sent at once to a model with
-    friction, and to a rig. seconds: longest time to rest.
+    friction. on_rig: how many of these to the arm itself, where a rig drives it. seconds: longest time to rest.
     """
 
     targets: Annotated[int, Field(ge=8, le=100_000)]
     timed: Annotated[int, Field(ge=1, le=100_000)]
     sent: Annotated[int, Field(ge=1, le=100_000)]
+    on_rig: Annotated[int, Field(ge=1, le=100_000)]
     seconds: Annotated[PositiveFloat, Field(le=120)]
 
 
@@ -54,11 +54,13 @@ class Drawn:
 
     Attributes:
         targets: inputs of the network. Shape (N, 7, 8 or 10).
+        commands: of the tendons, m, under which the arm rests so. Shape (N, K).
         near_limit: how many were left out in which a motor is near its limit.
         unrested: how many were left out in which the arm had not come to rest, whatever its motors then did.
     """
 
     targets: np.ndarray
+    commands: np.ndarray
     near_limit: int
     unrested: int
 
@@ -90,8 +92,9 @@ def draw_targets(
     rest = settle(model, commands[:, model.actuator_trnid[:, 0]], _gravity_vectors(gravity), PATIENCE)
     tensions = rest.tensions[:, ArmModel(model).actuators]
     near_limit = ~(tensions < NEAR_LIMIT * chain.max_tension).all(axis=1)
-    targets = np.column_stack([gravity, rest.position, rest.quaternion])[rest.rested & ~near_limit]
-    return Drawn(targets, int((rest.rested & near_limit).sum()), int((~rest.rested).sum()))
+    targets, chosen = np.column_stack([gravity, rest.position, rest.quaternion]), rest.rested & ~near_limit
+    targets, commands = targets[chosen], commands[chosen]
+    return Drawn(targets, commands, int((rest.rested & near_limit).sum()), int((~rest.rested).sum()))
 
 
 def draw_commands(
@@ -137,6 +140,10 @@ class Reached:
     seconds: np.ndarray
     rested: np.ndarray | None = None
 
+    def __getitem__(self, rows) -> "Reached":
+        rested = None if self.rested is None else self.rested[rows]
+        return Reached(self.position[rows], self.doubtful[rows], self.seconds[rows], rested)
+
     def missed(self, length: float) -> np.ndarray:
         """By how much each target was missed, m; one without an end counts as missed by the arm's `length`, m. (N,)."""
         return np.where(np.isfinite(self.position), self.position, length)
@@ -177,8 +184,7 @@ def score(
     deepest: np.ndarray,
     settings: AsControls,
     rng: np.random.Generator,
-    rig: Rig | None = None,
-) -> tuple[dict, dict | None]:
+) -> tuple[dict, Drawn, Reached]:
     """The network's commands as sent, without and with friction, and for shapes that the data set has none of.
 
     "frictionless": drawn in slowly, damped. "friction": sent at once to the model as it is. Where that has no friction,
@@ -187,10 +193,9 @@ def score(
     Args:
         ask: the network, targets to its answer.
         sampled, deepest: as in `draw_targets`.
-        rig: the arm that the model is of.
 
     Returns:
-        Metrics of the model, and of the rig beside the model's with friction on the same targets.
+        Metrics, the targets, and how the first of them were met with friction.
     """
     drawn = draw_targets(model, chain, sampled, PULL_SHARE * deepest, settings.targets, rng)
     taut = draw_targets(model, chain, sampled, TAUT_SHARE * deepest, settings.targets // 8, rng, others_pay_out=False)
@@ -220,24 +225,14 @@ def score(
         },
         "all_taut": taut.counts() | settled(model, ask, taut.targets).metrics(chain.length),
     }
-    if rig is None:
-        return on_model, None
-    few = targets[: settings.sent]
-    answer = ask(few)
-    pulls = chain.straight_lengths - answer["commands"]  # motors count from the straight arm, as in a session's logs
-    origin, turn = base_frame(model)  # a rig knows the tracked base, in which the arm's mount is turned
-    tips = rig(pulls, gravity_of(few) @ turn.T)
-    on_rig = _reached(few, answer, (tips - origin) @ turn)
-    summary = on_rig.metrics(chain.length)
-    twin = np.quantile(sent.missed(chain.length)[: len(few)], (0.5, 0.95)) * 1e3
-    return on_model, {"targets": len(few)} | summary | {"twin_mm": {"median": twin[0], "p95": twin[1]}}
+    return on_model, drawn, sent
 
 
 def settled(model: mujoco.MjModel, ask: Ask, targets: np.ndarray) -> Reached:
     """The commands of the network for `targets`, each at rest without friction."""
     answer = ask(targets)
     rest = settle(model, answer["commands"][:, model.actuator_trnid[:, 0]], gravity_of(targets))
-    return replace(_reached(targets, answer, rest.position), rested=rest.rested)
+    return replace(reached(targets, answer, rest.position), rested=rest.rested)
 
 
 def driven(
@@ -250,10 +245,11 @@ def driven(
     answer = ask(targets)
     commands, gravity = answer["commands"][:, model.actuator_trnid[:, 0]], gravity_of(targets)
     motion = drive(model, commands, gravity, seconds, friction, calm=calm)
-    return replace(_reached(targets, answer, motion.end), seconds=motion.seconds_to_rest, rested=motion.rested)
+    return replace(reached(targets, answer, motion.end), seconds=motion.seconds_to_rest, rested=motion.rested)
 
 
-def _reached(targets: np.ndarray, answer: dict[str, np.ndarray], tips: np.ndarray) -> Reached:
+def reached(targets: np.ndarray, answer: dict[str, np.ndarray], tips: np.ndarray) -> Reached:
+    """How `targets` were met by tips (N, 3), m, in the base frame, of the network's `answer` for them."""
     position = np.linalg.norm(tips - position_of(targets), axis=1)
     nothing = np.full(len(targets), np.nan)
     return Reached(position, answer["doubtful"], nothing)

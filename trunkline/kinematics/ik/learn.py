@@ -17,10 +17,11 @@ from trunkline.frames import downwards
 from trunkline.kinematics.dataset.columns import command_columns, length_columns, tension_columns
 from trunkline.kinematics.dataset.sampling import sections
 from trunkline.kinematics.dataset.table import command_by_tension, sample_table, tip_by_tension, turn_by_tension
-from trunkline.kinematics.ik.as_controls import DOUBT, AsControls, Rig, score
+from trunkline.kinematics.ik.as_controls import DOUBT, AsControls, score
 from trunkline.kinematics.ik.inference import ask
 from trunkline.kinematics.ik.inputs import draw_gravity, gravity_columns, inputs_of, position_of
 from trunkline.kinematics.ik.network import OUTPUTS, InverseKinematics
+from trunkline.kinematics.ik.on_plant import Rig, score_on_plant
 from trunkline.kinematics.ik.onnx import to_onnx
 from trunkline.kinematics.ik.refine import refine
 from trunkline.kinematics.ik.score import (
@@ -62,7 +63,7 @@ class Learning(Training):
     """The training and what it is scored on, see conf/train_ik/config.yaml.
 
     lever: m; the loss counts a turn of the tip by 1 rad as this much distance. outside: targets far off.
-    rig: module whose `reach` drives the arm itself, as `as_controls.Rig`; none for an arm that no module drives.
+    rig: module whose `reach` drives the arm itself, as `on_plant.Rig`; none for an arm that no module drives.
     """
 
     lever: Annotated[float, Field(ge=0, le=1)]
@@ -131,7 +132,14 @@ def learn(
     rng = np.random.default_rng(learning.seed)
     far = ask(runtime, outside_targets(learning.outside, chain.length, rng, sampled.shape[1]))["commands"]
     print("train_ik: sending commands to MuJoCo until the arm rests", flush=True)
-    sent, on_plant = score(model, chain, partial(ask, runtime), sampled, deepest, learning.as_controls, rng, rig)
+    network_answer = partial(ask, runtime)
+    as_controls, drawn, sent = score(model, chain, network_answer, sampled, deepest, learning.as_controls, rng)
+    on_plant = None
+    if rig is not None:
+        few = slice(learning.as_controls.on_rig)
+        twin = np.quantile(sent.missed(chain.length)[few], (0.5, 0.95)) * 1e3
+        on_plant = score_on_plant(model, chain, network_answer, drawn.targets[few], drawn.commands[few], rig)
+        on_plant["twin_mm"] = {"median": twin[0], "p95": twin[1]}
     return Learned(
         network=network,
         exported=exported,
@@ -139,7 +147,7 @@ def learn(
         held_out=held_out,
         errors=errors,
         as_lengths=as_lengths,
-        as_controls=sent,
+        as_controls=as_controls,
         on_plant=on_plant,
         refined=refined,
         outside=len(far),

@@ -15,6 +15,7 @@ from trunkline.identification.evaluation.evaluation import Prediction, replay
 from trunkline.identification.results.scoring import fingerprint
 from trunkline.identification.simulate.checks import check_trials
 from trunkline.identification.simulate.experiment import prepare
+from trunkline.recordings.trials.conditions import conditions_of
 from trunkline.recordings.trials.inventory import missing_lines, recorded_of_each
 from trunkline.recordings.trials.splits import DECIDING, VALIDATE
 from trunkline.recordings.trials.trial import Trial, sessions_of
@@ -23,7 +24,7 @@ from trunkline.report.certificate.budget import Budget, Inputs, budget, held_out
 from trunkline.report.certificate.coverage import Bring, covered
 from trunkline.report.certificate.facts import error_rows, parameter_facts, uncertainty_facts
 from trunkline.report.certificate.held_out import at_rest, tip_residuals
-from trunkline.report.certificate.poses import conditions_of, draw_poses, posed
+from trunkline.report.certificate.poses import draw_poses, posed
 from trunkline.report.certificate.replays import packed
 from trunkline.report.certificate.words import Use, limits_of, next_step, verdict
 from trunkline.settings import Seed

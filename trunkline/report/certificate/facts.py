@@ -4,8 +4,8 @@ import numpy as np
 
 from trunkline.identification.evaluation.error_tables import LABELS
 from trunkline.identification.stages import model_name
+from trunkline.recordings.trials.conditions import Conditions
 from trunkline.report.certificate.budget import COVERAGE, LEAST, Budget
-from trunkline.report.certificate.poses import Conditions
 from trunkline.report.certificate.words import certainty_words, open_lines, strong_pairs, telling
 
 SHOWN = ("identified", "cad", "null", "null_straight", "noise_floor")  # models of the table of errors

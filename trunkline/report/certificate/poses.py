@@ -5,32 +5,17 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from trunkline.frames import STANDARD_GRAVITY, tilt_of_gravity
+from trunkline.frames import STANDARD_GRAVITY
 from trunkline.identification.parameters.per_session import model_in
 from trunkline.identification.simulate.experiment import SLACK, commanded_lengths
 from trunkline.kinematics.dataset.sampling import around_the_arm
 from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.rest import base_frame
 from trunkline.model.statics.chain import Chain
-from trunkline.recordings.trials.experiments import is_static
+from trunkline.recordings.trials.conditions import PULLED, Conditions
 from trunkline.recordings.trials.trial import Trial
 
-PULLED = 1e-3  # m, from which on a tendon counts as pulled
 LOOSE_EVERY = 5  # poses of which one is without a pull
-
-
-@dataclass
-class Conditions:
-    """Of the session's trials at rest, none of the split test: what they went up to.
-
-    tilt_deg: of the mount. pulled_tilt_deg: of the mount while a motor pulled. pull: of one motor, m. pulls: of all
-    motors together, m.
-    """
-
-    tilt_deg: float
-    pulled_tilt_deg: float
-    pull: float
-    pulls: float
 
 
 @dataclass
@@ -48,23 +33,6 @@ class StaticPoses:
 
     def __getitem__(self, rows) -> "StaticPoses":
         return StaticPoses(self.gravity[rows], self.commands[rows])
-
-
-def conditions_of(trials: list[Trial]) -> Conditions:
-    """What the trials at rest without a load among `trials` went up to."""
-    rested = [trial for trial in trials if is_static(trial.experiment) and not trial.load]
-    tilts = [(float(np.degrees(tilt_of_gravity(t.gravity))) if t.gravity.any() else 0.0, _pulls(t)) for t in rested]
-    return Conditions(
-        tilt_deg=max((tilt for tilt, _ in tilts), default=0.0),
-        pulled_tilt_deg=max((tilt for tilt, pulls in tilts if pulls.max(initial=0) > PULLED), default=0.0),
-        pull=max((float(pulls.max(initial=0)) for _, pulls in tilts), default=0.0),
-        pulls=max((float(pulls.sum(axis=1).max()) for _, pulls in tilts), default=0.0),
-    )
-
-
-def _pulls(trial: Trial) -> np.ndarray:
-    """What each motor draws in, m. Shape (T, K)."""
-    return np.maximum(trial.commands, 0) if trial.commands.size else np.zeros((1, 0))
 
 
 def posed(trials: list[Trial], model: mujoco.MjModel) -> StaticPoses:

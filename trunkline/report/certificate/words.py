@@ -9,9 +9,9 @@ from pydantic import Field
 
 from trunkline.identification.diagnostics.identifiability import Identifiability
 from trunkline.identification.parameters.parameters import parameter_named
+from trunkline.recordings.trials.conditions import Conditions
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.report.certificate.budget import FRICTION, NOISE
-from trunkline.report.certificate.poses import Conditions
 
 FEW_TILTS = 10.0  # deg, up to which a mount counts as upright
 STRONG = 0.9  # of a correlation, from which on it is named

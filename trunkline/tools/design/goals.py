@@ -11,8 +11,9 @@ import mujoco
 import numpy as np
 
 from trunkline.identification.parameters.parameters import parameter_named
+from trunkline.recordings.trials.conditions import Conditions
 from trunkline.report.certificate.arms import arm_of, arms_with
-from trunkline.report.certificate.poses import Conditions, StaticPoses, draw_poses
+from trunkline.report.certificate.poses import StaticPoses, draw_poses
 from trunkline.tools.design.information import StageInformation
 from trunkline.tools.design.settings import Recordable
 

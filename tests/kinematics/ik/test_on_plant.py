@@ -1,0 +1,112 @@
+"""The network's commands on the arm itself: what is sent, what is asked, and what no command mends."""
+
+import numpy as np
+import pytest
+
+from tests.kinematics.ik.test_as_controls import ANGLES, exact
+from trunkline.kinematics.ik.as_controls import draw_targets
+from trunkline.kinematics.ik.inputs import gravity_of, position_of
+from trunkline.kinematics.ik.on_plant import Rig, across_surface, score_on_plant
+from trunkline.model.simulation.rest import settle
+from trunkline.model.statics.equilibria import actuated
+
+MM = 1e-3  # m
+
+
+@pytest.fixture(scope="module")
+def drawn(model, chain):
+    return draw_targets(model, chain, ANGLES, np.full(3, 0.01), 12, np.random.default_rng(0))
+
+
+class Shifted:
+    """A rig whose arm is the model, its tips `shift` m aside; `never` of the drives do not rest."""
+
+    def __init__(self, model, chain, shift=0.0, never=()):
+        self.model, self.chain, self.shift, self.never, self.sent = model, chain, shift, list(never), []
+
+    def reach(self, pulls, gravity):
+        self.sent.append(pulls)
+        commands = (self.chain.straight_lengths - pulls)[:, self.model.actuator_trnid[:, 0]]
+        tips = settle(self.model, commands, gravity).position + [self.shift, 0.0, 0.0]
+        tips[self.never] = np.nan
+        return tips
+
+
+def score(model, chain, drawn, rig: Shifted, ask=None, pulls=1.0):
+    return score_on_plant(model, chain, ask or exact(chain), drawn.targets, drawn.commands, Rig(rig.reach, pulls))
+
+
+def test_commands_go_to_the_arm_as_they_are(model, chain, drawn):
+    """First those by which the targets were drawn, then the network's: idle motors are sent what they are sent."""
+
+    def ask(poses):
+        answer = exact(chain)(poses)
+        return answer | {"commands": np.tile(chain.straight_lengths + [0.001, -0.002, 0.03], (len(poses), 1))}
+
+    rig = Shifted(model, chain)
+    score(model, chain, drawn, rig, ask)
+    assert len(rig.sent) == 3
+    np.testing.assert_allclose(rig.sent[0], chain.straight_lengths - drawn.commands)
+    for sent in rig.sent[1:]:
+        np.testing.assert_allclose(sent, np.tile([-0.001, 0.002, -0.03], (len(drawn.targets), 1)))
+
+
+def test_an_arm_beside_its_twin_misses_the_twin_s_tips_and_less_its_own(model, chain, drawn):
+    """The arm's surface is the twin's, 1 mm aside: for its own tips commands need be right by first order only."""
+    result = score(model, chain, drawn, Shifted(model, chain, MM))
+    assert result["position_error_mm"]["median"] == pytest.approx(1.0, abs=0.05)
+    own = result["own_surface"]
+    assert own["targets"] == len(drawn.targets)
+    assert own["across_mm"]["median"] < 1.0
+    assert result["rested"] == own["rested"] == 1.0
+    exactly = score(model, chain, drawn, Shifted(model, chain))
+    assert exactly["own_surface"]["position_error_mm"]["max"] < 0.05
+
+
+def test_an_arm_that_does_not_rest_misses_by_its_length_and_is_no_target(model, chain, drawn):
+    result = score(model, chain, drawn, Shifted(model, chain, never=[0]))
+    count = len(drawn.targets)
+    assert result["position_error_mm"]["max"] == pytest.approx(1e3 * chain.length)
+    assert result["beyond_1pct"] == 1
+    assert result["rested"] == pytest.approx(1 - 1 / count)
+    assert result["across_mm"]["p95"] > 1.0
+    assert result["own_surface"]["left_out"] == {"unrested": 1}
+    assert result["own_surface"]["targets"] == count - 1
+    none = score(model, chain, drawn, Shifted(model, chain, never=range(count)))
+    assert none["own_surface"] == {"targets": 0, "left_out": {"unrested": count}}
+
+
+@pytest.mark.parametrize(("off", "of"), [(0.0, 5), (1e-9, 6), (1.0, 12)])
+def test_within_are_those_whose_pulls_add_up_to_no_more_than_the_session_s(model, chain, drawn, off, of):
+    """Letting out does not count."""
+    sums = 1e-3 * (1 + np.arange(12))
+
+    def ask(poses):
+        commands = np.tile(chain.straight_lengths, (len(poses), 1))
+        commands -= np.stack([sums[: len(poses)] / 2, sums[: len(poses)] / 2, np.full(len(poses), -0.05)], axis=1)
+        return {"commands": commands, "doubtful": np.zeros(len(poses), bool)}
+
+    result = score(model, chain, drawn, Shifted(model, chain), ask, pulls=sums[5] - 1e-10 + off)
+    assert result["within"]["targets"] == min(of, len(drawn.targets))
+    assert score(model, chain, drawn, Shifted(model, chain), ask, pulls=0.0)["within"] == {"targets": 0}
+
+
+def test_what_a_command_moves_is_along_the_surface_and_its_normal_is_across(chain, drawn):
+    """Steps of either motor that pulls, and what is upright on both."""
+    gravity = gravity_of(drawn.targets)
+    commands = np.tile(chain.straight_lengths + [-0.012, -0.009, 0.2], (len(gravity), 1))
+    here, steps = actuated(chain, commands, gravity).position, []
+    for motor in (0, 1):
+        moved = commands.copy()
+        moved[:, motor] -= 1e-5
+        steps.append(actuated(chain, moved, gravity).position - here)
+    for step in steps:
+        size = np.linalg.norm(step, axis=1)
+        assert (across_surface(chain, commands, gravity, step) < 0.01 * size).all()
+    normal = np.cross(*steps)
+    normal *= MM / np.linalg.norm(normal, axis=1, keepdims=True)
+    np.testing.assert_allclose(across_surface(chain, commands, gravity, normal), MM, rtol=1e-3)
+    np.testing.assert_allclose(across_surface(chain, commands, gravity, normal + 100 * steps[0]), MM, rtol=1e-2)
+    lost = np.full_like(normal, np.nan)
+    assert np.isnan(across_surface(chain, commands, gravity, lost)).all()
+    assert position_of(drawn.targets).shape == normal.shape
