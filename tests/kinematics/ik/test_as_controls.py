@@ -121,20 +121,6 @@ def test_a_drive_on_the_twin_that_diverges_misses_by_the_arm_s_length(model, cha
     assert sent.missed(chain.length).tolist() == [chain.length]
 
 
-def test_a_drive_on_the_twin_that_diverges_misses_by_the_arm_s_length(model, chain, monkeypatch):
-    def never_ends(*arguments, **more):
-        motion = drive(*arguments, **more)
-        motion.end[0] = np.nan
-        return motion
-
-    monkeypatch.setattr(as_controls, "drive", never_ends)
-    settings, rng = AsControls(targets=12, timed=1, sent=1, seconds=2.0), np.random.default_rng(0)
-    _, on_plant = score(
-        model, chain, exact(chain), ANGLES, np.full(3, 0.01), settings, rng, lambda *_: np.zeros((1, 3))
-    )
-    assert on_plant["twin_mm"] == pytest.approx({"median": chain.length * 1e3, "p95": chain.length * 1e3})
-
-
 def test_a_model_without_friction_is_driven_once_and_damped_at_last(model, chain, monkeypatch):
     smooth, driven_arms = copy.copy(model), []
     smooth.tendon_frictionloss[:] = 0
