@@ -55,10 +55,10 @@ def test_an_arm_beside_its_twin_misses_the_twin_s_tips_and_less_its_own(model, c
     """The arm's surface is the twin's, 1 mm aside: for its own tips commands need be right by first order only."""
     result = score(model, chain, drawn, Shifted(model, chain, MM))
     assert result["position_error_mm"]["median"] == pytest.approx(1.0, abs=0.05)
-    own = result["own_surface"]
-    assert own["targets"] == len(drawn.targets)
-    assert own["across_mm"]["median"] < 1.0
-    assert result["rested"] == own["rested"] == 1.0
+    at_tips = result["own_surface"]
+    assert at_tips["targets"] == len(drawn.targets)
+    assert at_tips["across_mm"]["median"] < 1.0
+    assert result["rested"] == at_tips["rested"] == 1.0
     exactly = score(model, chain, drawn, Shifted(model, chain))
     assert exactly["own_surface"]["position_error_mm"]["max"] < 0.05
 

@@ -49,10 +49,10 @@ def score_on_plant(
         targets, commands: as `as_controls.Drawn` has them.
     """
     reach = _in_base_frame(model, rig)
-    own = reach(chain.straight_lengths - commands, gravity_of(targets))
-    rested = np.isfinite(own).all(axis=1)
+    tips = reach(chain.straight_lengths - commands, gravity_of(targets))
+    rested = np.isfinite(tips).all(axis=1)
     own_targets = targets[rested].copy()
-    position_of(own_targets)[:] = own[rested]
+    position_of(own_targets)[:] = tips[rested]
     summary = _score(chain, ask, targets, reach, rig.pulls)
     own_surface = _score(chain, ask, own_targets, reach, rig.pulls) if rested.any() else {"targets": 0}
     return summary | {"own_surface": own_surface | {"left_out": {"unrested": int((~rested).sum())}}}
