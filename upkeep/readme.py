@@ -30,7 +30,7 @@ from trunkline.recordings.trials.splits import DECIDING, TEST
 from upkeep.baseline import baseline_file, read_baseline
 from upkeep.limits import Limit, lookup, metrics_folder, read_limits
 from upkeep.rehearsal_table import rehearsal_table, source_words
-from upkeep.results import block, results_index
+from upkeep.results import KeptResult, block, results_index
 from upkeep.truth_table import KINDS, STAGES, error_table, truth_table
 
 # where it is made, and where the READMEs show it: Git holds no pictures among the artifacts
@@ -406,7 +406,21 @@ def _held_out_rows(root: Path) -> list[str]:
         errors = _pair(metrics, f"identified.{TEST}.", share=True)
         others = "; ".join(f"{title(name)} {_pair(metrics, f'{name}.{TEST}.')} mm" for name in ("cad", "null"))
         rows.append(f"| Shape / tip error, {arm}, {trials} held-out trials ({kinds}) | {errors} | {others} |")
-    return rows
+    return [rows[0], *_family_rows(root), *rows[1:]]
+
+
+def _family_rows(root: Path) -> list[str]:
+    """Errors over simulated arms whose laws the model has not: the last row of their study's table, if it has run."""
+    path = root / "docs/results/families.json"
+    if not path.is_file():
+        return []
+    result = KeptResult.read(path)
+    *_, last = (line for line in result.lines if line.startswith("|"))
+    _, arms, _, position, worst_position, tip, worst_tip, null = last.strip("| ").split(" | ")
+    what = f"Shape / tip error, {arms} simulated arms [with laws that the model lacks](docs/results/families.md)"
+    stale = " (**STALE**)" if result.state(root) == "STALE" else ""
+    errors = f"mean {position} / {tip} %, worst arm {worst_position} / {worst_tip} %{stale}"
+    return [f"| {what} | {errors} | baseline: mean rest shape, tip {null} % |"]
 
 
 def _command_row(root: Path) -> str:
