@@ -98,10 +98,10 @@ def family_table(rows: list[dict]) -> str:
             cell = f"{of[f'{kind}_null_tip'].mean():.3g}"
             lines.append(f"| {family} | {len(of)} | {words[kind]} | {' | '.join([*numbers, cell])} |")
     least = table.loc[(table["held"] / table["intervals"]).idxmin()]
-    held, intervals, seconds = (int(table[name].sum()) for name in ("held", "intervals", "seconds"))
+    holding, intervals, seconds = (int(table[name].sum()) for name in ("held", "intervals", "seconds"))
     return "\n".join([
         *lines,
-        f"95 % intervals of parameters, given the model, that hold the truth: {held} of {intervals}; "
+        f"95 % intervals of parameters, given the model, that hold the truth: {holding} of {intervals}; "
         f"worst arm {int(least['held'])} of {int(least['intervals'])} ({least['arm']}).",
         f"{(table['sealed'] == 'yes').sum()} of {len(table)} arms sealed; {seconds / 60 / len(table):.0f} min an arm.",
     ])  # fmt: skip

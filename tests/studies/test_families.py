@@ -81,8 +81,8 @@ def test_the_table_has_mean_and_worst_and_the_readme_shows_its_last_row(tmp_path
     (tmp_path / "tests/limits.yaml").write_text("rehearse: {reach.rate: {min: 0.5}}\n")
     (tmp_path / "docs/results").mkdir(parents=True)
     if with_rows:
-        kept = {"command": "python -m studies.families", "commit": "abc", "code": {}, "lines": lines}
-        write_json(tmp_path / "docs/results/families.json", kept)
+        result = {"command": "python -m studies.families", "commit": "abc", "code": {}, "lines": lines}
+        write_json(tmp_path / "docs/results/families.json", result)
     text = headline(tmp_path)
     assert ("3 simulated arms" in text) == with_rows
     assert ("| mean 2 / 4 %, worst arm 4 / 8 % | baseline: mean rest shape, tip 4 % |" in text) == with_rows
