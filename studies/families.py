@@ -29,6 +29,7 @@ from trunkline.identification.stages import STAGES
 from trunkline.pipeline.config import PROJECT
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.recordings.trials.splits import TEST
+from trunkline.settings import read_yaml
 from upkeep.truth_table import TRUTH, expectation, holds, identified
 
 PIPELINE = ("ingest", "filter", "build_mjcf", *STAGES, "score")
@@ -53,7 +54,7 @@ def set_up(folder: Path, family: str, seed: int) -> None:
     OmegaConf.save(OmegaConf.create(plant), folder / f"demo/conf/record/plant/{family}.yaml")
     record = {"record": {"seed": lab_seed, "plant": family}}
     OmegaConf.save(OmegaConf.merge(OmegaConf.load(PROJECT / "demo/params.yaml"), record), folder / "demo/params.yaml")
-    settings = OmegaConf.masked_copy(OmegaConf.load(PROJECT / "params.yaml"), list(PIPELINE))
+    settings = OmegaConf.masked_copy(read_yaml(PROJECT / "params.yaml"), list(PIPELINE))
     settings.ingest.session = "demo"
     settings[STAGES[-1]].reported = list(EXPERIMENTS)
     OmegaConf.save(settings, folder / "params.yaml")
