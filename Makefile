@@ -11,8 +11,8 @@ PIP := .venv/bin/python -m pip --disable-pip-version-check -qq
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 unexport PYTHONDONTWRITEBYTECODE  # where that is set, every process of a stage compiles all its libraries: 9 s each
 
-.PHONY: demo small_demo rehearse live client browser mono test types gate baseline lock release house readme pull push setup stale \
-  mutants mutants_sample requirements clean
+.PHONY: demo small_demo rehearse live client browser mono test types gate baseline lock release house families readme \
+  pull push setup stale mutants mutants_sample requirements clean
 
 demo: setup          ## run the whole pipeline, from recording the demo logs to the Unity package
 	python -m trunkline.pipeline.settings
@@ -49,6 +49,9 @@ mutants: setup       ## change what judges, scores and stops by small faults, an
 
 types: setup         ## check the types of all but the tests and the stand-in lab
 	pyright
+
+families: setup      ## identify arms that nobody designs for, five of them sealed; resumes where it was stopped
+	python -m studies.families
 
 gate: setup          ## compare the metrics with tests/limits.yaml
 	python -m upkeep.gate

@@ -31,7 +31,7 @@ from trunkline.recordings.trials.splits import DECIDING, TEST
 from upkeep.baseline import baseline_file, read_baseline
 from upkeep.limits import Limit, lookup, metrics_folder, read_limits
 from upkeep.rehearsal_table import rehearsal_table, source_words
-from upkeep.results import block, results_index
+from upkeep.results import KeptResult, block, results_index
 from upkeep.truth_table import KINDS, SHIPPED, STAGES, error_table, truth_table
 
 # where it is made, and where the READMEs show it: Git holds no pictures among the artifacts
@@ -428,7 +428,7 @@ def _held_out_rows(root: Path) -> list[str]:
         rows.append(_held_out_row(f"… {{}} {KINDS[kind]}", lab, f"{TEST}.by_experiment.{kind}.", GOAL))
     real = lookup(_metrics(root / example, "score"), "identify_damping")
     words = f"Shape / tip error, [a real arm]({example}), {{}} held-out trials (releases)"
-    return [*rows, _held_out_row(words, real, f"{TEST}.", REAL_GOAL)]
+    return [*rows, *_family_rows(root), _held_out_row(words, real, f"{TEST}.", REAL_GOAL)]
 
 
 def _held_out_row(words: str, metrics: dict | None, at: str, goals: Mapping[str, float]) -> str:
@@ -439,6 +439,20 @@ def _held_out_row(words: str, metrics: dict | None, at: str, goals: Mapping[str,
     beside = "; ".join(f"{title(name)} {_pair(metrics, f'{name}.{at}')} mm" for name in ("cad", "null", "noise_floor"))
     trials = _number(lookup(metrics, f"identified.{at}trials"))
     return f"| {words.format(trials)} | {f'**{errors}**' if missed else errors} | {beside} |"
+
+
+def _family_rows(root: Path) -> list[str]:
+    """Errors over simulated arms whose laws the model has not: the last row of their study's table, if it has run."""
+    path = root / "docs/results/families.json"
+    if not path.is_file():
+        return []
+    result = KeptResult.read(path)
+    *_, last = (line for line in result.lines if line.startswith("|"))
+    _, arms, _, position, worst_position, tip, worst_tip, null = last.strip("| ").split(" | ")
+    what = f"Shape / tip error, {arms} simulated arms [with laws that the model lacks](docs/results/families.md)"
+    stale = " (**STALE**)" if result.state(root) == "STALE" else ""
+    errors = f"mean {position} / {tip} %, worst arm {worst_position} / {worst_tip} %{stale}"
+    return [f"| {what} | {errors} | baseline: mean rest shape, tip {null} % |"]
 
 
 def _command_row(root: Path) -> str:

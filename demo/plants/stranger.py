@@ -7,7 +7,7 @@ their holes, a rest shape and a mount that are a little off, and motors of their
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 import numpy as np
@@ -64,6 +64,29 @@ class StrangerMotors:
 
 
 @dataclass
+class OtherLaws:
+    """Laws that the identified model has not, all off by default; of a unit where they are of a joint.
+
+    stiffening: 1/rad², a in K b exp(a b²), which replaces K b where `hardening` is 0. softening: share of the stiffness
+    that a large bend takes away, half of it at `softening_bend`, rad. ovality: e, a section is 1 ± e times as stiff
+    about its two axes, of which the stiffer is at ovality_deg from x. drag: N, friction of a hole whatever the tension.
+    stribeck: relative growth of μ where a cable hardly slides; stribeck_speed: m/s. swirl_deg: by which the last unit's
+    holes are turned beside the mount's, evenly along the arm. hole_scatter_deg: standard deviation, per unit.
+    """
+
+    stiffening: Annotated[float, Field(ge=0, le=1000)] = 0.0
+    softening: Annotated[float, Field(ge=0, lt=1)] = 0.0
+    softening_bend: Bend = 0.1
+    ovality: Annotated[float, Field(ge=0, lt=1)] = 0.0
+    ovality_deg: Annotated[float, Field(ge=-360, le=360)] = 0.0
+    drag: Annotated[float, Field(ge=0, le=10)] = 0.0
+    stribeck: Annotated[float, Field(ge=0, le=10)] = 0.0
+    stribeck_speed: Annotated[float, Field(gt=0, le=10)] = 0.05
+    swirl_deg: Annotated[float, Field(ge=-90, le=90)] = 0.0
+    hole_scatter_deg: Annotated[float, Field(ge=0, le=10)] = 0.0
+
+
+@dataclass
 class StrangerSettings(PrintedArm):
     """The truth about the arm on the bench, which scatters by link. Sources stand in the file.
 
@@ -73,7 +96,7 @@ class StrangerSettings(PrintedArm):
     mount_tilt_deg: of the arm against the base marker, to a side that is drawn.
     limit_ratio: stiffness of two links that touch over that of their joint. limit_time: s, its damping over it.
     friction: μ in a hole. slip_length: m of travel within which it builds up. cable_scatter: relative, uniform, of the
-    cables' stiffness between winch and mount. substeps: of 1 / COMMAND_RATE s.
+    cables' stiffness between winch and mount. substeps: of 1 / COMMAND_RATE s. laws: those that the model has not.
     """
 
     kind: Literal["stranger"]
@@ -93,6 +116,7 @@ class StrangerSettings(PrintedArm):
     cable_scatter: Annotated[float, Field(ge=0, lt=1)]
     motors: StrangerMotors
     substeps: Annotated[int, Field(ge=1, le=100)]
+    laws: OtherLaws = field(default_factory=OtherLaws)
 
 
 class Stranger:
@@ -139,7 +163,8 @@ class Stranger:
     def answers(self) -> dict:
         """Stiffness is the relaxed one of a unit's links in series, at the base, with the mean scatter; damping is what
         acts beside the Maxwell branches. Nothing answers to a tendon's constant friction, as it grows with tension, and
-        to a single branch or slider of the model, as there are several. joint_place is the mean of a unit's links.
+        to a single branch or slider of the model, as there are several. Nor does anything to a parameter of a law that
+        the arm has not, or not alone. joint_place is the mean of a unit's links.
         Rest shapes are by unit, c_0 + c_1 s with s from -1 to 1."""
         s, links = self.settings, self.links
         rest = links.rest.reshape(-1, s.links_per_unit, 2).sum(axis=1)
@@ -150,7 +175,7 @@ class Stranger:
         stiffness = scatter.mean() * properties.stiffness[0]
         values = {
             "stiffness": stiffness,
-            "hardening": s.hardening,
+            "hardening": None if s.laws.stiffening or s.laws.softening else s.hardening,
             "joint_place": (s.links_per_unit - 1) / (2 * s.links_per_unit),
             "damping": stiffness * s.viscous_time,
             "tendon_friction": None,
@@ -160,7 +185,7 @@ class Stranger:
             "force_range": s.motors.max_force,
             "time_constant": s.motors.lag,
             "dead_time": s.motors.dead_time,
-            "capstan_friction": s.friction,
+            "capstan_friction": None if s.laws.stribeck or s.laws.drag else s.friction,
             "rest_bend_x": rest[:, 0].mean(),
             "rest_bend_y": rest[:, 1].mean(),
             "rest_gradient_x": place @ rest[:, 0] / (place @ place),
@@ -220,15 +245,22 @@ def make_links(chain: ChainGeometry, settings: StrangerSettings, tendons: int, r
     cables = s.cable_stiffness * (1 + s.cable_scatter * rng.uniform(-1, 1, tendons))
     zero = s.motors.zero_scatter * rng.normal(size=tendons)
     hole_link, hole_height = _centres(chain, fine.lengths)
+    laws, axis = s.laws, 2 * np.radians(s.laws.ovality_deg)
+    swirl = np.radians(laws.swirl_deg * np.arange(1, chain.units + 1) / chain.units)
+    if laws.hole_scatter_deg:
+        swirl = swirl + np.radians(laws.hole_scatter_deg) * rng.normal(size=chain.units)
     return Links(
         lengths=fine.lengths, masses=masses * properties.masses, transverse=masses * properties.transverse_inertia,
-        axial=masses * properties.axial_inertia, stiffness=stiffness, hardening=s.hardening * per**2, rest=rest,
+        axial=masses * properties.axial_inertia, stiffness=stiffness, hardening=s.hardening * per**2,
+        stiffening=laws.stiffening * per**2, softening=laws.softening, softening_bend=laws.softening_bend / per,
+        ovality=laws.ovality * np.array([np.cos(axis), np.sin(axis)]), rest=rest,
         viscous_time=s.viscous_time, branch_ratio=np.array([b.ratio for b in s.branches]),
         branch_time=np.array([b.time for b in s.branches]), slider_ratio=np.array([e.ratio for e in s.sliders]),
         slider_yield=np.array([e.bend / per for e in s.sliders]), limit=float(fine.joint_range[0]),
         limit_ratio=s.limit_ratio, limit_time=s.limit_time, hole_link=hole_link, hole_height=hole_height,
         hole_radius=s.hole_ratio * chain.widths / 2, base_radius=s.hole_ratio * float(chain.widths[0]) / 2,
-        azimuth=2 * np.pi * np.arange(tendons) / tendons, friction=s.friction, slip_length=s.slip_length,
+        azimuth=2 * np.pi * np.arange(tendons) / tendons, swirl=swirl, friction=s.friction, slip_length=s.slip_length,
+        drag=laws.drag, stribeck=laws.stribeck, stribeck_speed=laws.stribeck_speed,
         cable_stiffness=cables, cable_damping=s.cable_damping, zero=zero, dead_time=s.motors.dead_time,
         rate_limit=s.motors.rate_limit, lag=s.motors.lag, max_force=s.motors.max_force, backlash=s.motors.backlash,
     )  # fmt: skip

@@ -20,14 +20,20 @@ class Links(NamedTuple):
 
     lengths, masses (M,): m, kg. transverse, axial (M,): moments of inertia about a link's centre, kg m².
     stiffness (M,): N m/rad, relaxed. hardening: 1/rad², c in K b (1 + c b²), b the bend from `rest` (M, 2) rad.
+    stiffening: 1/rad², a of a further torque K b (exp(a b²) - 1), Fung's law. softening, softening_bend: share s and
+    rad, b₀ of a further torque -K b s b² / (b² + b₀²). ovality (2,): e cos 2φ and e sin 2φ; a link is 1 + e times as
+    stiff about the axis at φ from x, 1 - e times about the other.
     viscous_time: s, D = stiffness * viscous_time.
     branch_ratio, branch_time (P,): moduli over the relaxed one, and their time constants, s.
     slider_ratio (E,), slider_yield (E,): stiffness over that of the joint, and the bend at which it slides, rad.
     limit: rad, bend at which neighbours touch. limit_ratio: stiffness of the contact over the joint's.
     limit_time: s, its damping over its stiffness.
     hole_link (U,), hole_height (U,) m from the link's joint (negative), hole_radius (U,) m: of each unit's holes.
-    base_radius: m, of the holes in the mount. azimuth (K,): rad, of the tendons.
-    friction: μ of a tendon on its holes. slip_length: m of travel in which friction builds up.
+    base_radius: m, of the holes in the mount. azimuth (K,): rad, of the tendons in the mount. swirl (U,): rad, by which
+    each unit's holes are beside it.
+    friction: μ of a tendon on its holes. slip_length: m of travel in which friction builds up. drag: N of a hole,
+    whatever the tension. stribeck, stribeck_speed: by how much of μ friction is larger where a tendon hardly slides,
+    and the speed at which most of that is gone, m/s.
     cable_stiffness (K,): N/m. cable_damping: N s/m. zero (K,): m of pull by which a winch is off.
     dead_time: s. rate_limit: m/s. lag: s. max_force: N. backlash: m.
     """
@@ -38,6 +44,10 @@ class Links(NamedTuple):
     axial: np.ndarray
     stiffness: np.ndarray
     hardening: float
+    stiffening: float
+    softening: float
+    softening_bend: float
+    ovality: np.ndarray
     rest: np.ndarray
     viscous_time: float
     branch_ratio: np.ndarray
@@ -52,8 +62,12 @@ class Links(NamedTuple):
     hole_radius: np.ndarray
     base_radius: float
     azimuth: np.ndarray
+    swirl: np.ndarray
     friction: float
     slip_length: float
+    drag: float
+    stribeck: float
+    stribeck_speed: float
     cable_stiffness: np.ndarray
     cable_damping: float
     zero: np.ndarray
@@ -173,6 +187,22 @@ def bend(links, state, work, h, damping, relaxed):
         tx, ty = -(stiffness + hard * square) * qx, -(stiffness + hard * square) * qy
         kx, ky = stiffness + hard * (square + 2 * qx * qx), stiffness + hard * (square + 2 * qy * qy)
         kxy, dxy = 2 * hard * qx * qy, 0.0
+        secant, slope = 0.0, 0.0  # of the further torque over K b, and its derivative by b²
+        if links.stiffening > 0:
+            grown = np.exp(links.stiffening * square)
+            secant, slope = grown - 1, links.stiffening * grown
+        if links.softening > 0:
+            spread = square + links.softening_bend**2
+            secant -= links.softening * square / spread
+            slope -= links.softening * (links.softening_bend / spread) ** 2
+        if secant != 0:
+            tx, ty = tx - stiffness * secant * qx, ty - stiffness * secant * qy
+            kx, ky = kx + stiffness * (secant + 2 * slope * qx * qx), ky + stiffness * (secant + 2 * slope * qy * qy)
+            kxy += stiffness * 2 * slope * qx * qy
+        if links.ovality[0] != 0 or links.ovality[1] != 0:
+            even, cross = stiffness * links.ovality[0], stiffness * links.ovality[1]
+            tx, ty = tx - even * qx - cross * qy, ty + even * qy - cross * qx
+            kx, kxy, ky = kx + even, kxy + cross, ky - even
         d = damping * stiffness * links.viscous_time
         tx, ty = tx - d * vx, ty - d * vy
         dx = dy = d
@@ -212,9 +242,9 @@ def pull(links, state, work, h, hand, straight):
 
     A motor's spring is between winch and mount; from there to the last hole the tendon is inextensible, so that at
     hole u it slides to the motor as fast as all chords beyond shorten. At a hole where it turns by θ, tension falls by
-    exp(-μ θ s), s the slip's share: Dahl's law, ds = (1 - s sign(dx)) dx / slip_length, which is ±1 when it slides
-    steadily, holds at rest without creep, and does not depend on rate. hand (K,): N, pulls without friction.
-    straight (K,): m, length of the path in the straight arm.
+    exp(-μ θ s) and by `drag` s, s the slip's share: Dahl's law, ds = (1 - s sign(dx)) dx / slip_length, which is ±1
+    when it slides steadily, holds at rest without creep, and does not depend on rate (μ does, by `stribeck`).
+    hand (K,): N, pulls without friction. straight (K,): m, length of the path in the straight arm.
     """
     units = len(links.hole_link)
     work.pushed[:] = 0.0
@@ -227,6 +257,9 @@ def pull(links, state, work, h, hand, straight):
             i = links.hole_link[u]
             frame, moving = work.frames[i], work.moving[i]
             x, y, z = links.hole_radius[u] * cosine, links.hole_radius[u] * sine, links.hole_height[u]
+            if links.swirl[u] != 0:
+                c, s = np.cos(links.swirl[u]), np.sin(links.swirl[u])
+                x, y = c * x - s * y, s * x + c * y
             for a in range(3):
                 holes[u + 1, a] = work.joints[i, a] + frame[a, 0] * x + frame[a, 1] * y + frame[a, 2] * z
             h0, h1, h2 = holes[u + 1, 0], holes[u + 1, 1], holes[u + 1, 2]
@@ -260,7 +293,12 @@ def pull(links, state, work, h, hand, straight):
                 toward = 1.0 if sliding > 0 else -1.0
                 slip = toward + (state.slips[k, u] - toward) * np.exp(-abs(sliding))
                 state.slips[k, u] = slip
-                after = force * np.exp(-links.friction * 2 * np.arcsin(min(0.5 * gap, 1.0)) * slip)
+                rubbing = links.friction
+                if links.stribeck > 0:
+                    rubbing *= 1 + links.stribeck * np.exp(-abs(beyond) / links.stribeck_speed)
+                after = force * np.exp(-rubbing * 2 * np.arcsin(min(0.5 * gap, 1.0)) * slip)
+                if links.drag > 0:  # no more than the tension itself: a slack tendon rubs nowhere
+                    after = max(after - min(links.drag, force) * slip, 0.0)
                 beyond -= work.rates[u]
             else:
                 c0 = c1 = c2 = after = 0.0
@@ -499,7 +537,8 @@ def path_lengths(links, state):
         for u in range(len(links.hole_link)):
             i = links.hole_link[u]
             radius = links.hole_radius[u]
-            local = np.array([radius * np.cos(azimuth), radius * np.sin(azimuth), links.hole_height[u]])
+            beside = azimuth + links.swirl[u]
+            local = np.array([radius * np.cos(beside), radius * np.sin(beside), links.hole_height[u]])
             hole = work.joints[i] + work.frames[i] @ local
             lengths[k] += np.sqrt(np.sum((hole - before) ** 2))
             before = hole

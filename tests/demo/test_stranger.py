@@ -10,7 +10,7 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 from demo.plants.bench import COMMAND_RATE, LOOSE, Bench
-from demo.plants.stranger import Stranger, StrangerSettings
+from demo.plants.stranger import OtherLaws, Stranger, StrangerSettings
 from demo.plants.stranger_kernel import (
     LinkState,
     advance,
@@ -76,9 +76,9 @@ def mujoco_twin(plant: Stranger, load: float) -> mujoco.MjModel:
     cables = [spec.add_tendon(name=f"cable_{k}") for k in range(3)]
     body = spec.worldbody
 
-    def holes(name, radius, height):
+    def holes(name, radius, height, swirl=0.0):
         for k, (azimuth, cable) in enumerate(zip(links.azimuth, cables, strict=True)):
-            place = [radius * np.cos(azimuth), radius * np.sin(azimuth), height]
+            place = [radius * np.cos(azimuth + swirl), radius * np.sin(azimuth + swirl), height]
             body.add_site(name=f"{name}_{k}", pos=place)
             cable.wrap_site(f"{name}_{k}")
 
@@ -86,7 +86,7 @@ def mujoco_twin(plant: Stranger, load: float) -> mujoco.MjModel:
     for i in range(len(links.lengths)):
         body = add_link(body, links, i)
         for unit in np.flatnonzero(links.hole_link == i):
-            holes(f"unit_{unit}", links.hole_radius[unit], links.hole_height[unit])
+            holes(f"unit_{unit}", links.hole_radius[unit], links.hole_height[unit], links.swirl[unit])
     if load:
         point = body.add_body(pos=[0, 0, -links.lengths[-1]])
         point.explicitinertial, point.mass, point.inertia, point.ipos = True, load, [1e-15] * 3, [0, 0, 0]
@@ -95,10 +95,12 @@ def mujoco_twin(plant: Stranger, load: float) -> mujoco.MjModel:
     return model
 
 
-@pytest.mark.parametrize(("load", "wound"), [(0.0, -LOOSE), (0.05, -LOOSE), (0.05, 0.004)])
-def test_accelerations_are_those_of_mujoco_s_twin(settings, load, wound):
-    """In any pose and at any speed, with a load, and with all tendons taut."""
-    plant = bare(settings, hardening=0.0)
+@pytest.mark.parametrize(
+    ("load", "wound", "swirl"), [(0.0, -LOOSE, 0.0), (0.05, -LOOSE, 0.0), (0.05, 0.004, 0.0), (0.0, 0.004, 12.0)]
+)
+def test_accelerations_are_those_of_mujoco_s_twin(settings, load, wound, swirl):
+    """In any pose and at any speed, with a load, with all tendons taut, and with tendons along a helix."""
+    plant = bare(settings, hardening=0.0, laws=OtherLaws(swirl_deg=swirl))
     model = mujoco_twin(plant, load)
     state, h = state_of(plant, wound, 0.03, 2.0), 1e-9
     taut = path_lengths(plant.links, state) - plant.straight + wound + plant.links.zero
@@ -126,13 +128,27 @@ def energy(plant: Stranger, state: LinkState) -> float:
         speed, local = origin + np.cross(turning, centre), frame.T @ turning
         inertia = np.array([links.transverse[i], links.transverse[i], links.axial[i]])
         total += 0.5 * links.masses[i] * speed @ speed + 0.5 * inertia @ local**2 - links.masses[i] * GRAVITY @ centre
-    square = ((state.q - links.rest) ** 2).sum(axis=1)
-    return total + float(links.stiffness @ (square / 2 + links.hardening * square**2 / 4))
+    x, y = (state.q - links.rest).T
+    square, a, b = x**2 + y**2, links.stiffening, links.softening_bend
+    bent = square / 2 + links.hardening * square**2 / 4
+    bent += (np.exp(a * square) - 1 - a * square) / (2 * a) if a else 0.0
+    bent -= links.softening / 2 * (square - b**2 * np.log(1 + square / b**2))
+    bent += links.ovality[0] * (x**2 - y**2) / 2 + links.ovality[1] * x * y
+    return total + float(links.stiffness @ bent)
 
 
-def test_energy_is_kept_to_first_order_in_the_step(settings):
+LAWS = {
+    "the model's": OtherLaws(),
+    "stiffening": OtherLaws(stiffening=1.0),
+    "softening": OtherLaws(softening=0.5),
+    "oval": OtherLaws(ovality=0.3, ovality_deg=20.0),
+}
+
+
+@pytest.mark.parametrize("laws", LAWS.values(), ids=LAWS)
+def test_energy_is_kept_to_first_order_in_the_step(settings, laws):
     """Nothing rubs: what the implicit step takes out halves with the step."""
-    plant, lost, swung = bare(settings, limit_ratio=1e-6), [], []
+    plant, lost, swung = bare(settings, limit_ratio=1e-6, laws=laws), [], []
     for steps in (4000, 8000):
         state = state_of(plant)
         state.q[:] = [0.05, 0.1]
@@ -224,8 +240,8 @@ def test_a_slider_s_loop_has_its_area(settings):
         assert area == pytest.approx(expected, rel=2e-3)
 
 
-def capstan(plant: Stranger, speed: float) -> tuple[float, float, float]:
-    """Tension at the motor and in the last chord, and the angle by which the tendon turns, sliding steadily."""
+def capstan(plant: Stranger, speed: float) -> tuple[float, float, np.ndarray]:
+    """Tension at the motor and in the last chord, and the angles by which the tendon turns, sliding steadily."""
     state, work = state_of(plant, 0.003), work_for(plant.links, 3)
     state.q[:, 1] = -0.02  # towards +x, where the first tendon is, so that it shortens
     state.winches[:] = [0.05, -LOOSE, -LOOSE]
@@ -244,21 +260,41 @@ def capstan(plant: Stranger, speed: float) -> tuple[float, float, float]:
         before = hole
     turns = [np.arccos(np.clip(a @ b, -1, 1)) for a, b in zip(chords[:-1], chords[1:], strict=True)]
     np.testing.assert_allclose(far / np.linalg.norm(far), -chords[-1], atol=1e-9)
-    return work.tension[0], float(np.linalg.norm(far)), float(np.sum(turns))
+    return work.tension[0], float(np.linalg.norm(far)), np.array(turns)
 
 
 def test_tension_falls_along_a_sliding_tendon(settings):
     """exp(-μ θ) from the motor to the end where it is drawn in, exp(μ θ) where it is let out."""
     plant = arm(settings, units=8, cable_damping=0.0)
     for speed, sign in ((-1.0, -1), (1.0, 1)):
-        near, far, angle = capstan(plant, speed)
+        near, far, turns = capstan(plant, speed)
+        angle = turns.sum()
         assert near > 10
         assert angle > 0.3
         assert far / near == pytest.approx(np.exp(sign * settings.friction * angle), rel=1e-6)
 
 
+def test_drag_takes_as_much_at_every_hole(settings):
+    """T_n+1 = T_n exp(∓μ θ_n) ∓ drag, from the motor on; below the tension of the hole."""
+    plant = arm(settings, units=8, cable_damping=0.0, laws=OtherLaws(drag=0.04))
+    for speed, sign in ((-1.0, -1), (1.0, 1)):
+        tension, far, turns = capstan(plant, speed)
+        for turn in turns:
+            tension = tension * np.exp(sign * settings.friction * turn) + sign * 0.04
+        assert far == pytest.approx(tension, rel=1e-6)
+
+
+def test_friction_falls_with_speed(settings):
+    """By Stribeck: μ (1 + stribeck) where the tendon hardly slides, μ where it slides fast."""
+    plant = arm(settings, units=8, cable_damping=0.0, laws=OtherLaws(stribeck=0.5, stribeck_speed=1.0))
+    for speed, factor in ((-1e3, 1.0), (-1e-3, 1.5)):
+        plant.links = plant.links._replace(slip_length=1e-9)
+        near, far, turns = capstan(plant, speed)
+        assert far / near == pytest.approx(np.exp(-factor * settings.friction * turns.sum()), rel=1e-3)
+
+
 def test_a_slack_tendon_pulls_and_rubs_nowhere(settings):
-    plant = arm(settings)
+    plant = arm(settings, laws=OtherLaws(drag=0.04))
     state, work = state_of(plant, -0.05, 0.01, 1.0), work_for(plant.links, 3)
     place(plant.links, state, work)
     pull(plant.links, state, work, 1e-3, np.zeros(3), plant.straight)

@@ -1,0 +1,130 @@
+"""How good the twin of an arm is that nobody designs for: `python -m studies.families [--open N] [--sealed N]`
+
+Arms of families with laws that the model has not are drawn (demo/families.py): open ones from plain seeds, N a family,
+and sealed ones from the digest of the code, which nobody can tune to, N in all, the families in turn. Each records the
+committed lab's experiments in a temporary folder, and the project's own stages identify it there with the settings of
+params.yaml. Prints the errors of the final model on the trials of `test`, which the stage `score` reads, as mean over
+arms and of the worst arm, and how many of the parameters' intervals hold the truth.
+
+An arm takes some ten minutes and is kept in docs/results/families.csv as soon as it is done; stopped, the study goes on
+from there. Progress goes to stderr.
+"""
+
+import argparse
+import json
+import shutil
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import pandas as pd
+from omegaconf import OmegaConf
+
+from demo.families import draw_arm, families, sealed_seed
+from studies.recovery import run
+from studies.rows import Rows, digest
+from trunkline.errors import in_one_line
+from trunkline.identification.stages import STAGES
+from trunkline.pipeline.config import PROJECT
+from trunkline.recordings.trials.experiments import EXPERIMENTS
+from trunkline.recordings.trials.splits import TEST
+from trunkline.settings import read_yaml
+from upkeep.truth_table import TRUTH, expectation, holds, identified
+
+PIPELINE = ("ingest", "filter", "build_mjcf", *STAGES, "score")
+EVERY = "every"  # trial, of all kinds
+
+
+def arms(code: str, open_arms: int, sealed: int) -> dict[str, tuple[str, int]]:
+    """Family and seed of each arm, by its name. code: digest."""
+    names = list(families())
+    chosen = {f"{family} {seed}": (family, seed) for family in names for seed in range(1, open_arms + 1)}
+    for index in range(sealed):
+        family = names[index % len(names)]
+        chosen[f"{family} sealed {index + 1}"] = family, sealed_seed(code, family, index + 1)
+    return chosen
+
+
+def set_up(folder: Path, family: str, seed: int) -> None:
+    """Write the settings of an arm's lab and of the stages into `folder`: the project's, but the last model is scored
+    on every kind of trial."""
+    lab_seed, plant = draw_arm(family, seed)
+    shutil.copytree(PROJECT / "demo/conf", folder / "demo/conf")
+    OmegaConf.save(OmegaConf.create(plant), folder / f"demo/conf/record/plant/{family}.yaml")
+    record = {"record": {"seed": lab_seed, "plant": family}}
+    OmegaConf.save(OmegaConf.merge(OmegaConf.load(PROJECT / "demo/params.yaml"), record), folder / "demo/params.yaml")
+    settings = OmegaConf.masked_copy(read_yaml(PROJECT / "params.yaml"), list(PIPELINE))
+    settings.ingest.session = "demo"
+    settings[STAGES[-1]].reported = list(EXPERIMENTS)
+    OmegaConf.save(settings, folder / "params.yaml")
+    OmegaConf.save({"stages": {name: {} for name in PIPELINE}}, folder / "dvc.yaml")
+
+
+def cells(folder: Path) -> dict[str, float]:
+    """Of the arm in `folder`: errors of its final model in % of its length, by kind of trial, those of the null model,
+    and of how many parameters that have a truth the interval holds it."""
+    scored = json.loads((folder / "artifacts/score/metrics.json").read_text(encoding="utf-8"))[STAGES[-1]]
+    row: dict[str, float] = {}
+    for model, end in (("identified", ""), ("null", "_null")):
+        errors = scored[model][TEST]
+        for kind, of in {EVERY: errors, **errors["by_experiment"]}.items():
+            row |= {f"{kind}{end}_{error}": of[f"e_{error}_pct"] for error in ("position", "tip")}
+    truth = json.loads((folder / TRUTH).read_text(encoding="utf-8"))
+    verdicts = [holds(table, expectation(truth, name)) for name, table in identified(folder).items()]
+    decided = [verdict for verdict in verdicts if verdict is not None]
+    return row | {"held": sum(decided), "intervals": len(decided)}
+
+
+def measure(family: str, seed: int) -> dict[str, float]:
+    """Record, identify and score an arm."""
+    begun = time.perf_counter()
+    with tempfile.TemporaryDirectory() as name:
+        set_up(Path(name), family, seed)
+        for module in ("demo.record", *(f"stages.{stage}" for stage in PIPELINE)):
+            run(module, Path(name))
+        return cells(Path(name)) | {"seconds": time.perf_counter() - begun}
+
+
+def family_table(rows: list[dict]) -> str:
+    """Errors by family and kind of trial, those of all arms last, and the parameters' intervals below."""
+    table = pd.DataFrame(rows)
+    words = {kind: of.plural for kind, of in EXPERIMENTS.items()} | {EVERY: "all"}
+    lines = ["| family | arms | trials of `test`, final model | position (%): mean | worst arm | tip (%): mean "
+             "| worst arm | null model, tip (%): mean |", "|---|---:|---|---:|---:|---:|---:|---:|"]  # fmt: skip
+    for family, of in [*table.groupby("family", sort=False), (EVERY, table)]:
+        for kind in [kind for kind in words if f"{kind}_tip" in of]:
+            errors = [of[f"{kind}_{error}"] for error in ("position", "tip")]
+            numbers = [f"{number:.3g}" for error in errors for number in (error.mean(), error.max())]
+            cell = f"{of[f'{kind}_null_tip'].mean():.3g}"
+            lines.append(f"| {family} | {len(of)} | {words[kind]} | {' | '.join([*numbers, cell])} |")
+    least = table.loc[(table["held"] / table["intervals"]).idxmin()]
+    holding, intervals, seconds = (int(table[name].sum()) for name in ("held", "intervals", "seconds"))
+    return "\n".join([
+        *lines,
+        f"95 % intervals of parameters, given the model, that hold the truth: {holding} of {intervals}; "
+        f"worst arm {int(least['held'])} of {int(least['intervals'])} ({least['arm']}).",
+        f"{(table['sealed'] == 'yes').sum()} of {len(table)} arms sealed; {seconds / 60 / len(table):.0f} min an arm.",
+    ])  # fmt: skip
+
+
+@in_one_line
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="studies.families", description=__doc__)
+    parser.add_argument("--open", type=int, default=2, help="arms of each family from plain seeds")
+    parser.add_argument("--sealed", type=int, default=5, help="arms in all from the digest of the code")
+    args = parser.parse_args()
+    table = Rows("families", digest("test, final model", Path("demo/families.yaml")), "arm")
+    assert table.origin is not None
+    chosen = arms(table.origin.digest, args.open, args.sealed)
+    with table.recorded(keep=True):
+        for name, (family, seed) in chosen.items():
+            if name not in table.read():
+                table.add(name, family=family, sealed="yes" if "sealed" in name else "no", **measure(family, seed))
+        rows = table.read()
+        print(family_table([rows[name] for name in chosen]))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
