@@ -7,6 +7,7 @@ import pytest
 from demo.families import families
 from demo.record import Config
 from studies.families import PIPELINE, arms, cells, family_table, set_up
+from tests.support.folders import TABLE_OF_NOTHING
 from trunkline.identification.stages import STAGES
 from trunkline.pipeline.config import check_settings, load_config, settings_of
 from trunkline.pipeline.stage import write_json
@@ -48,7 +49,7 @@ def written(folder, position: float, tip: float):
     row = {"undetermined": False, "unit": ""}
     intervals = {"kp": [1.0, 3.0], "kv": [1.0, 3.0], "hardening": [1.0, 3.0]}
     tables = {name: row | {"value": 2.0, "interval_95_given_model": span} for name, span in intervals.items()}
-    write |= {f"artifacts/{stage}/parameters.json": {"parameters": tables} for stage in STAGES}
+    write |= {f"artifacts/{stage}/parameters.json": TABLE_OF_NOTHING | {"parameters": tables} for stage in STAGES}
     truth = {"kp": 2.0, "kv": 4.0, "hardening": None}
     write[str(TRUTH)] = {"parameters": truth, "forces": [], "mass_factor": 1.0}
     for name, content in write.items():
