@@ -1,6 +1,7 @@
 """A small spiral arm for tests: the real geometry and material, fewer units."""
 
 import mujoco
+import numpy as np
 
 from trunkline.model.arm.material import TPU_95A_DENSITY, TPU_95A_MODULUS, unit_properties
 from trunkline.model.arm.mjcf import Solver, Tendons, build_spec
@@ -17,6 +18,11 @@ def small_spec(units: int = 8, **motors: float) -> mujoco.MjSpec:
     gains = {"kp": 2000, "kv": 85, "max_force": 80, "time_constant": 0.05}
     tendons = Tendons(routes=even_routes(chain, 3, 0.85), friction=0.5, **gains | motors)
     return build_spec(chain, properties, tendons, Solver(0.001, 1e-5, *LIMIT, *LIMIT))
+
+
+def hinges_about(model: mujoco.MjModel, axis: int) -> np.ndarray:
+    """Numbers of the hinges about x (0) or y (1), from the base on: in every second unit, y is the first."""
+    return np.flatnonzero(model.jnt_axis[:, axis] == 1)
 
 
 def small_mjcf(units: int = 8) -> str:

@@ -142,7 +142,7 @@ def test_an_arm_bent_along_a_diagonal_rests_in_mujoco_where_the_statics_say(endi
     np.testing.assert_allclose(result.position, expected.position, atol=1e-6)
 
 
-@pytest.mark.parametrize(("turn", "within"), [(np.pi / 8, 0.08), (np.pi / 4, 0.04)])
+@pytest.mark.parametrize(("turn", "within"), [(np.pi / 8, 0.08), (np.pi / 4, 0.05)])
 def test_a_pull_that_is_turned_about_the_axis_bends_the_arm_alike(ending, turn, within):
     """Its units' whole bends, and how far the tip gets: where it gets to also depends on the twist of hinges in a row.
     With the hinges' limits alone, bends differ by 40 % and the tip by 16 % of the arm's length."""
@@ -165,7 +165,8 @@ def test_limits_with_a_preferred_axis_stay_those_of_the_hinges(ends):
         spec.joint(name).range = end
     add_elements(spec, Joints(round=True), 1e-5)
     limited = {spec.tendons[t.id].name: bool(spec.compile().tendon_limited[t.id]) for t in spec.tendons}
-    assert [limited[f"unit_0{unit}_x_diagonal_1"] for unit in (1, 2, 3)] == [True, False, True]
+    diagonals = ("unit_01_x_diagonal_1", "unit_02_y_diagonal_1", "unit_03_x_diagonal_1")
+    assert [limited[name] for name in diagonals] == [True, False, True]
 
 
 def test_limits_in_degrees_are_those_in_radians():

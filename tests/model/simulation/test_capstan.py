@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from tests.support.small_arm import small_spec
+from tests.support.small_arm import hinges_about, small_spec
 from trunkline.identification.parameters.parameters import candidate_fields
 from trunkline.identification.parameters.saving import save_model
 from trunkline.model.arm.guide_holes import GuideHoles, add_holes
@@ -35,7 +35,7 @@ def shares(speed: float, stretches: int) -> np.ndarray:
     model.dof_armature[:], model.opt.gravity[:], model.opt.timestep = 1e6, 0, 0.001
     mujoco.mj_setConst(model, mujoco.MjData(model))
     batch = batch_of(model, 1)
-    about_y = slice(1, None, 2)
+    about_y = hinges_about(model, 1)
     batch.bind("qpos")[0, about_y], batch.bind("qvel")[0, about_y] = -BEND, -speed
     controls = np.tile(model.tendon_length0[ArmModel(model).cables] + 0.3, (1, STEPS, 1))
     controls[:, :, 0] = 0.0
@@ -66,9 +66,9 @@ def test_friction_acts_where_the_cable_does():
     slope = batch.bind("ten_J")
     move(batch, controls, ())
     arm = ArmModel(model)
-    last = model.tendon_adr[arm.guide_holes] + model.tendon_num[arm.guide_holes] - 1  # of the hinge y
+    last = model.tendon_adr[arm.guide_holes] + model.tendon_num[arm.guide_holes] - 2  # of the hinge y
     for cable, entries in zip(arm.cables, last, strict=True):
-        row = model.ten_J_rowadr[cable] + model.ten_J_rownnz[cable] - 1
+        row = model.ten_J_rowadr[cable] + model.ten_J_rownnz[cable] - 2
         assert abs(model.wrap_prm[entries[0]] / slope[0, row] - 1) > 0.02, "or the arm is straight"
         np.testing.assert_allclose(batch.expand("wrap_prm")[0, entries], slope[0, row], rtol=0.01)
 

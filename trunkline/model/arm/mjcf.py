@@ -170,7 +170,10 @@ def _add_unit(
     body.mass = properties.masses[index]
     body.ipos = [0, 0, -length / 2]
     body.inertia = [properties.transverse_inertia[index]] * 2 + [properties.axial_inertia[index]]
-    for axis, direction in (("x", (1, 0, 0)), ("y", (0, 1, 0))):
+    axes = (("x", (1, 0, 0)), ("y", (0, 1, 0)))
+    # Two hinges in a row turn a unit about its own length too, by half the product of their angles. In the other order
+    # the next unit turns it back, so that the arm does not twist as it bends, as none does that is stiff against it.
+    for axis, direction in axes if index % 2 == 0 else axes[::-1]:
         body.add_joint(
             name=f"{name}_{axis}",
             type=mujoco.mjtJoint.mjJNT_HINGE,
