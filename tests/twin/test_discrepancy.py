@@ -60,3 +60,11 @@ def test_a_damaged_file_is_one_line(tmp_path):
     (tmp_path / "discrepancy.json").write_text("{")
     with pytest.raises(InputError, match=r"discrepancy\.json: .*expected what the stage report writes"):
         read_lacking(tmp_path / "discrepancy.json", "model")
+
+
+@pytest.mark.parametrize(("pulls", "tilt", "expected"), [
+    ([0.0, 0.0], 60.0, True), ([0.0, 0.0], 60.1, False), ([0.039, 0.0], 10.0, True), ([0.039, 0.0], 10.1, False),
+    ([0.041, 0.0], 0.0, False), ([0.025, 0.0249], 0.0, True), ([0.025, 0.0251], 0.0, False),
+])  # fmt: skip
+def test_it_holds_up_to_what_trials_went_up_to(pulls, tilt, expected):
+    assert lacking("model").holds(np.array(pulls), tilt) is expected

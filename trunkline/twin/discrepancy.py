@@ -21,6 +21,8 @@ from trunkline.errors import InputError
 FILE = Path("report/discrepancy.json")  # in a folder of artifacts
 UNITS = {"scales": ["m", "1", "1"], "tilt_deg": "deg", "pulled_tilt_deg": "deg", "pull": "m", "pulls": "m",
          "load": "kg"}  # fmt: skip
+PULLED = 1e-3  # m, from which on a tendon counts as pulled, as `recordings/trials/conditions.py` has it
+SAME_TILT = 1e-6  # deg, of rounding
 DIGITS = 6  # of a scale; trials leave each open by far more
 
 
@@ -72,6 +74,13 @@ class Lacking:
     pull: float
     pulls: float
     load: float = 0.0  # held-out trials with a load tell nothing of the model alone
+
+    def holds(self, pulls: np.ndarray, tilt_deg: float) -> bool:
+        """Whether trials went up to a pose at rest without a load: what each motor draws in, m (K,), and the mount."""
+        pulled = bool((pulls > PULLED).any())
+        tilt_bound = self.pulled_tilt_deg if pulled else self.tilt_deg
+        within = pulls.max(initial=0) <= self.pull and pulls.sum() <= self.pulls
+        return bool(within and tilt_deg <= tilt_bound + SAME_TILT)
 
     def table(self) -> dict:
         """As JSON has it."""
