@@ -14,6 +14,7 @@ from trunkline.report.certificate.page import page
 from trunkline.report.figures.certificate import pose_figure, uncertainty_figure
 from trunkline.report.figures.style import save_figure
 from trunkline.settings import read_yaml, settings
+from trunkline.twin.discrepancy import FILE
 from trunkline.twin.twin import Twin
 
 ARTIFACTS, TRIALS = Path("artifacts"), Path("data/processed/filter")
@@ -41,6 +42,7 @@ def main(config: Config) -> None:
         pictures = {name: (folder / f"{name}.png").read_bytes() for name in ("uncertainty", "poses")}
         (folder / "certificate.html").write_text(page(facts, certificate.replays, pictures), encoding="utf-8")
         write_json(folder / "facts.json", facts)
+        write_json(folder / FILE.name, certificate.lacking.table() if certificate.lacking else {})
         write_metrics(folder, certificate.metrics)
 
 

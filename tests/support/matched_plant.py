@@ -139,7 +139,8 @@ def _rest_pose(model, tilt_deg, pulls) -> np.ndarray:
 
 def release(model, bend: float, split="identify", frames=120, noise=0.0, seed=0, substep=0.0, tilt_deg=0.0) -> Trial:
     """Let go from every y hinge at `bend` rad and every x hinge at half of it."""
-    start = np.tile([0.5 * bend, bend], ArmModel(model).hinge_count // 2)
+    about_y = model.jnt_axis[: ArmModel(model).hinge_count, 1] == 1
+    start = np.where(about_y, bend, 0.5 * bend)
     rng = np.random.default_rng(seed)
     return _trial(model, f"release_{bend:.2f}_{split}", "release", split, None,
                   gravity_in_base(np.radians(tilt_deg)), frames, start,

@@ -76,7 +76,7 @@ def test_a_round_joint_s_diagonals_come_back_too():
     laws = linearize(spec, angles, np.ones((50, 16)))
     assert (len(laws.springs), len(laws.dampers), len(laws.diagonals)) == (16, 0, 16)
     both = angles[:, 2] + angles[:, 3]
-    assert laws.diagonals[1].tendon == "unit_02_x_diagonal_1"
+    assert laws.diagonals[1].tendon == "unit_02_y_diagonal_1"
     assert laws.diagonals[1].line == pytest.approx(0.25 * both**4 @ np.ones(50) / (both @ both))
     spec.compile()
     restored = compile_with(spec.to_xml(), laws)

@@ -10,9 +10,20 @@ where its tip hardly moves: the rest shape, the place of the mount, the first mi
 are not known exactly; `trunkline/report/certificate/discrepancy.py` infers them from held-out trials.
 """
 
+import json
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
+
+from trunkline.errors import InputError
+
+FILE = Path("report/discrepancy.json")  # in a folder of artifacts
+UNITS = {"scales": ["m", "1", "1"], "tilt_deg": "deg", "pulled_tilt_deg": "deg", "pull": "m", "pulls": "m",
+         "load": "kg"}  # fmt: skip
+PULLED = 1e-3  # m, from which on a tendon counts as pulled, as `recordings/trials/conditions.py` has it
+SAME_TILT = 1e-6  # deg, of rounding
+DIGITS = 6  # of a scale; trials leave each open by far more
 
 
 @dataclass(frozen=True)
@@ -46,6 +57,70 @@ class Discrepancy:
         across = np.linalg.svd(np.nan_to_num(arms)[:, None, :])[2][:, 1:]  # (N, 2, 3); a twin without rest has no arm
         normal = rng.standard_normal((count, len(ways), 2))
         return deviation[..., None] * np.einsum("dnk,nkx->dnx", normal, across)
+
+
+@dataclass(frozen=True)
+class Lacking:
+    """What a model lacks, and what the trials that tell it went up to.
+
+    model: SHA-256 of its file. tilt_deg: of the mount. pulled_tilt_deg: of the mount while a motor pulled. pull: of one
+    motor, m. pulls: of all motors together, m. load: at the tip, kg.
+    """
+
+    model: str
+    discrepancy: Discrepancy
+    tilt_deg: float
+    pulled_tilt_deg: float
+    pull: float
+    pulls: float
+    load: float = 0.0  # held-out trials with a load tell nothing of the model alone
+
+    def holds(self, pulls: np.ndarray, tilt_deg: float) -> bool:
+        """Whether trials went up to a pose at rest without a load: what each motor draws in, m (K,), and the mount."""
+        pulled = bool((pulls > PULLED).any())
+        tilt_bound = self.pulled_tilt_deg if pulled else self.tilt_deg
+        within = pulls.max(initial=0) <= self.pull and pulls.sum() <= self.pulls
+        return bool(within and tilt_deg <= tilt_bound + SAME_TILT)
+
+    def table(self) -> dict:
+        """As JSON has it."""
+        bounds = {name: getattr(self, name) for name in ("tilt_deg", "pulled_tilt_deg", "pull", "pulls", "load")}
+        scales = [[float(f"{scale:.{DIGITS}g}") for scale in triple] for triple in self.discrepancy.scales.tolist()]
+        return {"model": self.model, "trials": self.discrepancy.trials, "units": UNITS, "conditions": bounds,
+                "scales": scales}  # fmt: skip
+
+    @classmethod
+    def from_table(cls, table: dict | None, model: str, source: str) -> "Lacking | None":
+        """None where there is no table, where no trial tells what the model lacks, and of another `model`.
+
+        Raises:
+            InputError: naming `source`, which has something else.
+        """
+        if not table:
+            return None
+        try:
+            if table["model"] != model:
+                return None
+            scales = np.array(table["scales"], dtype=float).reshape(-1, len(UNITS["scales"]))
+            bounds = {name: float(bound) for name, bound in table["conditions"].items()}
+            return cls(model, Discrepancy(scales, int(table["trials"])), **bounds)
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise InputError(f"{source}: {error!r}, expected what the stage report writes") from error
+
+
+def read_lacking(file: Path, model: str) -> Lacking | None:
+    """Of the model whose SHA-256 is `model`, from discrepancy.json; None where there is no such file."""
+    return Lacking.from_table(read_discrepancy_table(file), model, str(file))
+
+
+def read_discrepancy_table(file: Path) -> dict | None:
+    """discrepancy.json as it is; None where there is none."""
+    if not file.is_file():
+        return None
+    try:
+        return json.loads(file.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise InputError(f"{file}: {error}, expected what the stage report writes") from error
 
 
 def lengths_of(ways: np.ndarray) -> np.ndarray:

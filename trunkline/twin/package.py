@@ -74,6 +74,11 @@ def tables_of(files: dict[str, bytes]) -> dict[str, dict]:
     return {stage["stage"]: stage for stage in json.loads(file_of(files, "parameters"))["stages"]}
 
 
+def lacking_of(files: dict[str, bytes]) -> dict | None:
+    """What the package has of discrepancy.json; None of an earlier release's."""
+    return json.loads(file_of(files, "parameters")).get("lacking")
+
+
 def robot_of(files: dict[str, bytes]) -> Robot:
     """What holds the arm."""
     return TypeAdapter(Robot).validate_python(_hybrid(files)["robot"])

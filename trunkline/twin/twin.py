@@ -12,7 +12,8 @@ from trunkline.files import file_digest
 from trunkline.identification.stages import MODEL, STAGES, TABLE, final_model, read_table, read_tables
 from trunkline.model.arm_model import ArmModel
 from trunkline.model_files import read_spec
-from trunkline.twin.package import MANIFEST, arm_of, manifest_of, package_digest, read_package, tables_of
+from trunkline.twin.discrepancy import FILE, Lacking, read_lacking
+from trunkline.twin.package import MANIFEST, arm_of, lacking_of, manifest_of, package_digest, read_package, tables_of
 from trunkline.twin.posterior import Posterior
 
 MOST_TURN = np.radians(30)  # of the mount in the tracked base, as it may be identified; more is another frame
@@ -38,8 +39,8 @@ class Provenance:
 
     @property
     def digest(self) -> str:
-        """SHA-256 of the model's file."""
-        return self.files[self.model.as_posix()]
+        """SHA-256 of the model's file; empty of one that is none."""
+        return self.files.get(self.model.as_posix(), "")
 
     @property
     def fitted_to(self) -> dict[str, str]:
@@ -50,12 +51,13 @@ class Provenance:
 @dataclass(frozen=True)
 class Twin:
     """spec: of the arm, to be changed, composed and compiled. arm: compiled, with the motors' dead time and winches,
-    and cables that rub. posterior: of its parameters."""
+    and cables that rub. posterior: of its parameters. lacking: what it lacks beside them, None where nobody knows."""
 
     spec: mujoco.MjSpec
     arm: ArmModel
     posterior: Posterior
     provenance: Provenance
+    lacking: Lacking | None = None
 
     @classmethod
     def load(cls, path: str | Path) -> "Twin":
@@ -89,7 +91,9 @@ class Twin:
             tables = read_tables(folder.parent, (folder.name,))
         files = [path, *(folder.parent / stage / TABLE for stage in tables)]
         digests = {file.as_posix(): file_digest(file) for file in files}
-        return cls(spec, ArmModel(arm), Posterior.from_tables(tables), Provenance(path, digests, tables))
+        provenance = Provenance(path, digests, tables)
+        lacking = read_lacking(folder.parent / FILE, provenance.digest)
+        return cls(spec, ArmModel(arm), Posterior.from_tables(tables), provenance, lacking)
 
     @classmethod
     def of_package(cls, files: dict[str, bytes]) -> "Twin":
@@ -102,7 +106,8 @@ class Twin:
         spec, tables = arm_of(files), tables_of(files)
         model = Path(manifest["hybrid"]["arm"])
         provenance = Provenance(model, manifest["sha256"], tables, digest, manifest["versions"])
-        return cls(spec, ArmModel(spec.compile()), Posterior.from_tables(tables), provenance)
+        lacking = Lacking.from_table(lacking_of(files), provenance.digest, manifest["hybrid"]["parameters"])
+        return cls(spec, ArmModel(spec.compile()), Posterior.from_tables(tables), provenance, lacking)
 
 
 def _check_chain(model: mujoco.MjModel, path: Path) -> None:

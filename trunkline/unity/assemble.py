@@ -69,7 +69,8 @@ class Trajectory:
 class Sources:
     """What the earlier stages made: the calibrated MJCF, files to read, metrics by stage, texts by name.
 
-    tables: of identification, by stage, the latest last. trunkline: version of the code that made it.
+    tables: of identification, by stage, the latest last. trunkline: version of the code that made it. lacking:
+    discrepancy.json of the stage `report`; None where that has not run.
     """
 
     mjcf: str
@@ -80,6 +81,7 @@ class Sources:
     metrics: dict[str, dict]
     texts: dict[str, bytes]
     trunkline: str
+    lacking: dict | None = None
 
 
 def assemble(
@@ -121,7 +123,7 @@ def assemble(
         ),
         MODEL: mjcf.encode(),
         CALIBRATED: sources.mjcf.encode(),
-        PARAMETERS: parameters_file(sources.tables),
+        PARAMETERS: parameters_file(sources.tables, sources.lacking),
         NETWORK: network,
     }
     files |= scripts()
@@ -173,8 +175,9 @@ def sealed(manifest: Manifest, files: dict[str, bytes]) -> dict[str, bytes]:
     return files | {MANIFEST: (manifest.model_dump_json(indent=2) + "\n").encode()}
 
 
-def parameters_file(tables: dict[str, dict]) -> bytes:
-    """What `parameters.json` of the stages have that a twin needs, one after the other; the rest is about trials."""
+def parameters_file(tables: dict[str, dict], lacking: dict | None) -> bytes:
+    """What `parameters.json` of the stages have that a twin needs, one after the other, and what the model lacks beside
+    them; the rest is about trials."""
     columns = ("value", "unit", "interval_95_given_model", "range")
     stages = [
         {
@@ -185,7 +188,8 @@ def parameters_file(tables: dict[str, dict]) -> bytes:
         }
         for stage, table in tables.items()
     ]
-    return (json.dumps({"stages": stages}, indent=2) + "\n").encode()
+    beside = {"lacking": lacking} if lacking else {}
+    return (json.dumps({"stages": stages} | beside, indent=2) + "\n").encode()
 
 
 def movement(model: mujoco.MjModel, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:

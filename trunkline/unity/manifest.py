@@ -130,7 +130,8 @@ class Hybrid(_Block):
     arm: str = Field(description="the calibrated model whole, for MuJoCo itself: another file, not to be imported")
     parameters: str = Field(
         description="what was identified, a stage after the other: of each parameter `value`, `unit` and"
-        " `interval_95_given_model`, and how those of a stage correlate; the latest stage counts"
+        " `interval_95_given_model`, and how those of a stage correlate; the latest stage counts;"
+        " `lacking`, where held-out trials tell it: scales of what the model lacks at its tip, and their conditions"
     )
     robot: Robot = Field(description="what holds the arm, as `trunkline/kinematics/panda/mounts.py` says")
 

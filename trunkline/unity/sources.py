@@ -6,6 +6,7 @@ from pathlib import Path
 from trunkline.errors import InputError, existing
 from trunkline.identification.stages import MODEL, TABLE, read_table
 from trunkline.identification.stages import STAGES as IDENTIFYING
+from trunkline.twin.discrepancy import FILE, read_discrepancy_table
 from trunkline.unity.assemble import Sources
 from trunkline.version import __version__
 
@@ -36,4 +37,5 @@ def read_sources(root: Path) -> Sources:
             "CHANGELOG.md": existing(root / "trunkline/unity/CHANGELOG.md").read_bytes(),
         },
         trunkline=__version__,
+        lacking=read_discrepancy_table(artifacts / FILE),
     )

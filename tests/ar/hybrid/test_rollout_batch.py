@@ -1,14 +1,17 @@
 """What counts as held, and what a preview says of its futures: every criterion decides somewhere, from both sides."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from trunkline.ar.hybrid.assistant import best
 from trunkline.ar.hybrid.outcomes import Holding
 from trunkline.ar.hybrid.rates import wilson
-from trunkline.ar.hybrid.rollout_batch import PlanPreview, interruptible, joined
+from trunkline.ar.hybrid.rollout_batch import PlanPreview, interruptible, joined, offsets_of
 from trunkline.ar.hybrid.rollouts import Piece
 from trunkline.ar.hybrid.uncertainty import nominal_sample
+from trunkline.twin.discrepancy import Discrepancy
 
 FRAMES, SINCE = 11, 0.5
 TIME = np.linspace(0.0, 1.0, FRAMES)
@@ -184,3 +187,19 @@ def test_a_spread_is_stated_every_tenth_of_a_second_of_sixtieth_frames():
     stated = of_futures(None, (True,)).stated
     np.testing.assert_array_equal(stated.times, TIME[[0, 6]])
     assert len(stated.tips) == len(stated.radii) == 2
+
+
+@pytest.mark.parametrize("offset", [0.001, 0.05])
+def test_what_the_model_lacks_widens_the_spread_about_the_nominal_tip(offset):
+    tips = np.zeros((2, FRAMES, 3))
+    tips[:, :, 0] = 0.01
+    lacking = Discrepancy(np.array([[offset, 0.0, 0.0]]), 16)
+    believed = replace(piece(), mount=np.zeros((1, FRAMES, 3)) + [0.0, 0.0, 0.5])
+    drawn = offsets_of(lacking, np.zeros(2), believed, 2, 0)
+    result = PlanPreview(believed, piece(tips, (True, True)), nominal_sample(), None, drawn)
+    np.testing.assert_array_equal(result.center, 0.0)
+    np.testing.assert_array_equal(result.stated.tips, 0.0)
+    expected = np.quantile(np.linalg.norm(drawn + [0.01, 0, 0], axis=2), 0.9)
+    np.testing.assert_allclose(result.spread, expected)
+    assert result.spread[-1] > 1.2 * offset
+    np.testing.assert_allclose(drawn[..., 2], 0.0, atol=1e-12)

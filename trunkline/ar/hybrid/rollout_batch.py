@@ -15,8 +15,10 @@ from trunkline.ar.hybrid.outcomes import Criterion
 from trunkline.ar.hybrid.rates import wilson
 from trunkline.ar.hybrid.rollouts import FRAME, CommandTrajectory, ComposedTwin, Piece, rollouts
 from trunkline.ar.hybrid.uncertainty import GraspUncertainty, PosteriorSamples, nominal_sample, sample
+from trunkline.twin.discrepancy import Discrepancy
 
 WITHIN = 0.9  # share of futures whose tips are within the spread
+OFFSETS = 100  # draws of what the model lacks for each future: a quantile of a dozen is none
 EVERY = 0.1  # s between the times at which a spread is stated
 
 
@@ -39,12 +41,14 @@ class PlanPreview:
         motion: of the B futures.
         samples: what each future has.
         success: which of them hold the object, or do what else was asked; None if nobody asked. Shape (B,).
+        offsets: of the tip by what the model lacks, draws for each future; None where nobody knows. Shape (B, D, 3).
     """
 
     nominal: Piece
     motion: Piece
     samples: PosteriorSamples
     success: np.ndarray | None
+    offsets: np.ndarray | None = None
 
     @property
     def median(self) -> np.ndarray:
@@ -58,8 +62,18 @@ class PlanPreview:
         return int(np.argmin(np.where(self.motion.sound, away, np.inf)))
 
     @property
+    def center(self) -> np.ndarray:
+        """What the spread is about: the tip of the nominal motion, which is shown, and where nobody knows what the
+        model lacks the futures' median. Shape (F, 3)."""
+        return self.median if self.offsets is None else self.nominal.tip[0]
+
+    @property
     def spread(self) -> np.ndarray:
-        """Distance from the median within which the tips of WITHIN of sound futures are, m. Shape (F,)."""
+        """Distance from `center` within which the tips of WITHIN of sound futures are, m. Shape (F,)."""
+        if self.offsets is not None:
+            away = self.motion.tip[self.motion.sound] - self.center
+            moved = away[:, None] + self.offsets[self.motion.sound][:, :, None]
+            return np.quantile(np.linalg.norm(moved, axis=3), WITHIN, axis=(0, 1))
         away = np.linalg.norm(self.motion.tip[self.motion.sound] - self.median, axis=2)
         return np.quantile(away, WITHIN, axis=0)
 
@@ -67,7 +81,7 @@ class PlanPreview:
     def stated(self) -> Stated:
         """Every EVERY s, as a page shows it; the last is of where the tip ends."""
         every = max(round(EVERY / FRAME), 1)
-        return Stated(self.motion.time[::every], self.median[::every], self.spread[::every])
+        return Stated(self.motion.time[::every], self.center[::every], self.spread[::every])
 
     @property
     def probability(self) -> float | None:
@@ -94,6 +108,7 @@ def preview(
     seed: int = 0,
     show: Callable[[Piece], None] = lambda piece: None,
     go_on: Callable[[], None] = lambda: None,
+    lacking: tuple[Discrepancy, np.ndarray] | None = None,
 ) -> PlanPreview:
     """Try a plan in `count` futures.
 
@@ -101,13 +116,24 @@ def preview(
         holding: what is asked of the plan; None where nothing is grasped.
         show: called with each piece of the nominal motion, before any future is simulated.
         go_on: called before each piece, and after the last; what it raises ends the preview.
+        lacking: what the model lacks, with how far gravity and cables move the tip at the plan's end, m, (2,).
     """
     begun, samples = [], sample(uncertainty, twin.arm, count, seed)
     for piece in interruptible(nominal(twin, trajectory), go_on):
         show(piece)
         begun.append(piece)
     motion = joined(list(interruptible(rollouts(twin, trajectory, samples), go_on)))
-    return PlanPreview(joined(begun), motion, samples, holding.holds(motion) if holding is not None else None)
+    success, believed = holding.holds(motion) if holding is not None else None, joined(begun)
+    offsets = None if lacking is None else offsets_of(*lacking, believed, count, seed)
+    return PlanPreview(believed, motion, samples, success, offsets)
+
+
+def offsets_of(lacking: Discrepancy, ways: np.ndarray, believed: Piece, count: int, seed: int) -> np.ndarray:
+    """OFFSETS draws for each of `count` futures, across the line from mount to tip where the nominal motion ends, m.
+    Their own generator leaves the draws of everything else as they are. Shape (count, OFFSETS, 3)."""
+    arm = believed.tip[0, -1] - believed.mount[0, -1]
+    drawn = lacking.offsets(ways[None], arm[None], count * OFFSETS, np.random.default_rng([seed, OFFSETS]))
+    return drawn.reshape(count, OFFSETS, 3)
 
 
 def interruptible(pieces: Iterator[Piece], go_on: Callable[[], None]) -> Iterator[Piece]:

@@ -111,8 +111,10 @@ class GraspPreviewer:
         self, twin: ComposedTwin, trajectory: CommandTrajectory, seed: int, go_on: Callable[[], None] = lambda: None
     ) -> PlanPrediction:
         """Futures of which nothing is asked but where the tip goes. `go_on`: as `preview`."""
+        lacking = self.robot_model.lacking_at(trajectory.joints[-1], trajectory.commands[-1])
+        uncertainty, futures = self.robot_model.uncertainty, self.settings.futures
         return PlanPrediction(
-            preview(twin, trajectory, self.robot_model.uncertainty, None, self.settings.futures, seed, go_on=go_on), 0.0
+            preview(twin, trajectory, uncertainty, None, futures, seed, go_on=go_on, lacking=lacking), 0.0
         )
 
     def whole(self, plan: Plan) -> CommandTrajectory:

@@ -17,11 +17,15 @@ from trunkline.ar.preview.settings import Previewing
 from trunkline.ar.teleop.messages import Obstacle, World, WorldObject
 from trunkline.ar.teleop.vectors import Quaternion, unit
 from trunkline.errors import InputError
-from trunkline.frames import STANDARD_GRAVITY, wxyz_from_rotation
+from trunkline.frames import STANDARD_GRAVITY, tilt_of_gravity, wxyz_from_rotation
 from trunkline.kinematics.panda.kinematics import mount_pose
 from trunkline.kinematics.panda.mounts import PandaRobot
+from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.rest import settle
+from trunkline.report.certificate.arms import arm_of
+from trunkline.report.certificate.poses import StaticPoses
 from trunkline.twin import package
+from trunkline.twin.discrepancy import Discrepancy, Lacking
 from trunkline.twin.twin import Twin
 
 GRAVITY = np.array([[0.0, 0.0, -STANDARD_GRAVITY]])  # m/s², where the arm hangs straight down
@@ -31,11 +35,29 @@ LEANS = 4  # times that it is corrected: each leaves a tenth or less
 
 @dataclass(frozen=True)
 class RobotModel:
-    """What the package says. doubts: about the arm's parameters, contacts and places."""
+    """What the package says. uncertainty: about the arm's parameters, contacts and places. lacking: what the model
+    lacks beside them, None where nobody knows."""
 
     arm: mujoco.MjSpec
     uncertainty: GraspUncertainty
     robot: PandaRobot
+    lacking: Lacking | None = None
+
+    def lacking_at(self, joints: np.ndarray, commands: np.ndarray) -> tuple[Discrepancy, np.ndarray] | None:
+        """What the model lacks, with how far gravity and cables move its tip, m, (2,), at rest at `joints` (7,), rad,
+        and `commands` (K,), m, without a load. None where nobody knows: a package without it, a pose beyond what trials
+        went up to, or one without a rest."""
+        if self.lacking is None:
+            return None
+        flange = mount_pose(joints[None], self.robot.mount_offset)[1][0]
+        gravity = (flange @ np.diag([1.0, -1.0, -1.0])).T @ GRAVITY[0]
+        arm = arm_of(self.arm.copy().compile())
+        order = ArmModel(arm.model).actuators
+        pulls = np.maximum(arm.chain.straight_lengths - commands[order], 0)
+        if not self.lacking.holds(pulls, float(np.degrees(tilt_of_gravity(gravity)))):
+            return None
+        ways = arm.ways(StaticPoses(gravity[None], commands[None][:, order]))[0]
+        return (self.lacking.discrepancy, ways) if np.isfinite(ways).all() else None
 
     def lean(self, hangs: np.ndarray | None) -> Rotation | None:
         """How the arm is turned on its mount, by the least turns, so that its tip, straight down, comes to rest in the
@@ -63,7 +85,7 @@ def robot_model_of(settings: Previewing, files: dict[str, bytes]) -> RobotModel:
     if not isinstance(robot, PandaRobot):
         raise InputError(f"package: found a robot of kind {robot.kind}, expected panda: plans move that")
     twin = Twin.of_package(files)
-    return RobotModel(twin.spec, GraspUncertainty(contact, twin.posterior), robot)
+    return RobotModel(twin.spec, GraspUncertainty(contact, twin.posterior), robot, twin.lacking)
 
 
 def compose_twin(

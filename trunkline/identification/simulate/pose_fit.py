@@ -63,7 +63,10 @@ class PoseProblem:
         self.measured = measured[np.argsort(model.site_bodyid[self.sites[measured]])]
         self.hinges = int(np.bincount(model.jnt_bodyid).max())  # of each joint
         self.angles = ArmModel(model).hinge_count
-        rows = np.eye(self.angles, k=self.hinges)[: -self.hinges] - np.eye(self.angles)[: -self.hinges]
+        # of neighbors about the same axis: in every second unit, the hinge about y may be the first
+        alike = np.argsort(np.abs(model.jnt_axis[: self.angles]).argmax(axis=1).reshape(-1, self.hinges), axis=1)
+        along = np.eye(self.angles)[self.hinges * np.arange(len(alike))[:, None] + alike].reshape(-1, self.angles)
+        rows = along[self.hinges :] - along[: -self.hinges]
         self._smooth = rows / BEND_CHANGE_SIGMA
 
     def linearise(self, qpos: np.ndarray, measured: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

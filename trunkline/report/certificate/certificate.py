@@ -28,6 +28,7 @@ from trunkline.report.certificate.poses import draw_poses, posed
 from trunkline.report.certificate.replays import packed
 from trunkline.report.certificate.words import Use, limits_of, next_step, verdict
 from trunkline.settings import Seed
+from trunkline.twin.discrepancy import Lacking
 from trunkline.twin.twin import Twin
 from trunkline.version import __version__
 
@@ -55,13 +56,15 @@ class CertificateSettings:
 @dataclass
 class Certificate:
     """facts: as facts.json has them. metrics: a few of them. replays: as `packed` has them. shapes: name, measured and
-    simulated points of held-out trials, for a picture."""
+    simulated points of held-out trials, for a picture. lacking: of the twin's model, None where too few trials tell it.
+    """
 
     facts: dict
     metrics: dict
     replays: dict
     shapes: list[tuple[str, np.ndarray, np.ndarray]]
     budget: Budget
+    lacking: Lacking | None
 
 
 def certify(
@@ -126,7 +129,8 @@ def certify(
     if uncertainty["measured"]:
         numbers["coverage"] = uncertainty["measured"]
     replays = packed(prediction, model, trials[0].markers)
-    return Certificate(facts, numbers, replays, held_out_shapes(prediction), tip_budget)
+    lacking = Lacking(twin.provenance.digest, inputs.lacking, **vars(conditions)) if inputs.lacking else None
+    return Certificate(facts, numbers, replays, held_out_shapes(prediction), tip_budget, lacking)
 
 
 def inputs_of(twin: Twin, trials: list[Trial], ingested: dict, arms: int, rng: np.random.Generator) -> Inputs:
