@@ -180,7 +180,8 @@ class PreviewPlanner:
             yield PreviewPiece(serial, 0, 0.0, np.empty((0, 0, 7), dtype=np.float32), True)
         for prediction in self._predictions(order, plan, twin, way, go_on):
             self.prediction = prediction
-            yield PredictionAnswer(serial, prediction_message(digest, prediction))
+            target = None if request.targets.object else np.array(request.targets.tip.position)
+            yield PredictionAnswer(serial, prediction_message(digest, prediction, target))
 
     def prepare(self, order: Order) -> None:
         """Compose its twin, which the next order takes, where nothing has changed."""
@@ -275,14 +276,18 @@ class InlinePreviewer:
         self._ready += self._later
 
 
-def prediction_message(digest: str, prediction: PlanPrediction) -> messages.PredictionMessage:
-    """As clients hear it: times from the plan's beginning on."""
+def prediction_message(
+    digest: str, prediction: PlanPrediction, target: np.ndarray | None
+) -> messages.PredictionMessage:
+    """As clients hear it: times from the plan's beginning on. target: of the tip, m, (3,); None of an object."""
     preview, stated = prediction.preview, prediction.preview.stated
     low_high = preview.interval or (None, None)
     tips = tuple((float(x), float(y), float(z)) for x, y, z in stated.tips)
     return messages.PredictionMessage(
         digest, preview.probability, *low_high, tuple(map(float, prediction.begins + stated.times)), tips,
-        tuple(map(float, stated.radii)), WITHIN, len(preview.samples), prediction.offer,
+        tuple(map(float, stated.radii)), WITHIN, len(preview.samples),
+        None if target is None else float(np.linalg.norm(preview.nominal.tip[0, -1] - target)), preview.unknown,
+        prediction.offer,
     )  # fmt: skip
 
 
