@@ -114,10 +114,6 @@ JUDGES = {  # by function, the test that has its table, and its file below tests
         "model/statics/test_newton.py",
         "test_balance_alone_is_no_rest",
     ),
-    "trunkline.twin.discrepancy:Lacking.holds": (
-        "twin/test_discrepancy.py",
-        "test_it_holds_up_to_what_trials_went_up_to",
-    ),
 }
 OTHERWISE = {  # what the word stands for there: no verdict
     "trunkline.identification.results.parameter_table:parameter_table": "looks a name up among those at a bound",

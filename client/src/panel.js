@@ -48,7 +48,9 @@ export function foreseenWords(told) {
   const parts = [];
   if (told.probability !== null)
     parts.push(`Grasp holds in ${percent(told.probability)} of ${told.futures} futures (${percent(told.low)} to ${percent(told.high)})`);
-  if (spread !== null) parts.push(`the tip ends within ${spread} mm in ${percent(told.within)} of ${parts.length ? "them" : `${told.futures} futures`}`);
+  if (told.miss !== null) parts.push(`the preview ends ${Math.round(1000 * told.miss)} mm from the target`);
+  if (spread !== null) parts.push(`in ${percent(told.within)} of cases the robot’s tip ends within ${spread} mm of the preview’s`);
+  else parts.push(`how near the robot’s tip comes to the preview’s is unknown: ${told.unknown}`);
   return sentence(parts.join("; "));
 }
 

@@ -146,7 +146,7 @@ export class RobotScene {
     if (this.believed) this.base.add(this.believed);
   }
 
-  /** The median path of the tip, and how far most futures are from it; null hides both. */
+  /** The preview's path of the tip, and how far the robot's may be from it, where that is known; null hides both. */
   foreseen(told) {
     for (const old of this.future ?? []) {
       old.removeFromParent();
@@ -156,11 +156,14 @@ export class RobotScene {
     if (!told || told.tip.length < 2) return;
     const points = told.tip.map((point) => new Vector3(...point));
     const path = new Line(new BufferGeometry().setFromPoints(points), new LineBasicMaterial({ color: TIP }));
+    this.future = [path];
+    this.base.add(path);
+    if (!told.spread.length) return;
     const band = new MeshBasicMaterial({ color: TIP, transparent: true, opacity: 0.16, depthWrite: false, side: FrontSide });
     const tube = new Mesh(spreadTube(points, told.spread), band);
     tube.renderOrder = 3;
-    this.future = [path, tube];
-    this.base.add(...this.future);
+    this.future.push(tube);
+    this.base.add(tube);
   }
 }
 

@@ -232,6 +232,8 @@ export const ANSWERS = {
     "spread": "required",
     "within": "required",
     "futures": "required",
+    "miss": null,
+    "unknown": "",
     "offer": null,
     "type": "foreseen"
   },

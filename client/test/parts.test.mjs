@@ -6,7 +6,7 @@ import { Playback } from "../src/playback.js";
 import { Recording } from "../src/recording.js";
 import { decode, encode, noHand } from "../src/wire.js";
 import { FROM_CLIENT, FROM_SERVER, HAND, HEAD_BYTES, INPUT_BYTES } from "../src/wire_table.js";
-import { remedy, words } from "../src/panel.js";
+import { foreseenWords, remedy, words } from "../src/panel.js";
 
 /** A message `robot` of one row. */
 function robot(sequence, time, x) {
@@ -87,4 +87,21 @@ test("a robot that has arrived is said to have, until the next plan is asked for
 test("what to do about a wrong token is said, and any other reason as it is", () => {
   assert.match(remedy("token: wrong"), /Open the address anew that the session has printed/);
   assert.equal(remedy("version: found 1"), "version: found 1");
+});
+
+const FORESEEN = { probability: null, low: null, high: null, futures: 12, within: 0.9, miss: null, spread: [], unknown: "" };
+
+test("of a place: how far the preview ends from it, and how far the robot's tip may from that", () => {
+  assert.equal(
+    foreseenWords({ ...FORESEEN, miss: 0.0082, spread: [0.001, 0.012] }),
+    "The preview ends 8 mm from the target; in 90 % of cases the robot’s tip ends within 12 mm of the preview’s.",
+  );
+});
+
+test("a radius that is unknown is said to be, and why", () => {
+  assert.equal(
+    foreseenWords({ ...FORESEEN, probability: 0.84, low: 0.68, high: 0.93, unknown: "mount tilted by 95°, trials up to 90°" }),
+    "Grasp holds in 84 % of 12 futures (68 % to 93 %); how near the robot’s tip comes to the preview’s is unknown: " +
+      "mount tilted by 95°, trials up to 90°.",
+  );
 });

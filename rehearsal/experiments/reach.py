@@ -92,7 +92,7 @@ def _touches(frame: SessionFrame) -> bool:
 
 def tell_end(result: Result, foreseen: PredictionMessage, tips: dict[str, np.ndarray]) -> None:
     """How far the robot's tip was from where the preview had it end, at the end and later; tips (3,), m, by LATER."""
-    result.radius_mm = 1e3 * foreseen.spread[-1]
+    result.radius_mm = 1e3 * foreseen.spread[-1] if foreseen.spread else float("nan")  # unknown
     for name, tip in tips.items():
         setattr(result, f"{name}_mm", 1e3 * float(np.linalg.norm(tip - foreseen.tip[-1])))
 

@@ -1,7 +1,8 @@
 """Whether what previews state comes true: probabilities of grasps and hand-overs, and the radius about the tip's end.
 
-A page says "the tip ends within r mm in 90 % of 12 futures". A run's tip is inside where it is no further than r from
-the middle of that circle; how far it is over r says by how much a radius is too small where none are inside.
+A page says "in 90 % of cases the robot's tip ends within r mm of the preview's", or that this is unknown. A run's tip
+is inside where it is no further than r from where the preview's is; how far it is over r says by how much a radius is
+too small where none are inside.
 """
 
 import numpy as np

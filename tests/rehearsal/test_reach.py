@@ -124,6 +124,13 @@ def test_how_far_the_tip_ends_from_where_it_was_said_to_is_told_in_mm():
     np.testing.assert_allclose(numbers, (4, 3, 5, 0), atol=1e-9)
 
 
+def test_a_radius_that_is_unknown_is_no_number():
+    stated = PredictionMessage("", None, None, None, (0.0,), ((0.1, 0.2, 0.3),), (), 0.9, 12, 0.0, "mount tilted")
+    result = Result("reach", 0, True)
+    tell_end(result, stated, {"at_end": np.array([0.1, 0.2, 0.303])})
+    np.testing.assert_allclose((result.radius_mm, result.at_end_mm), (np.nan, 3))
+
+
 class Drifting:
     """A robot whose tip moves on along x by 1 m/s."""
 

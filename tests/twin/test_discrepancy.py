@@ -62,9 +62,11 @@ def test_a_damaged_file_is_one_line(tmp_path):
         read_lacking(tmp_path / "discrepancy.json", "model")
 
 
-@pytest.mark.parametrize(("pulls", "tilt", "expected"), [
-    ([0.0, 0.0], 60.0, True), ([0.0, 0.0], 60.1, False), ([0.039, 0.0], 10.0, True), ([0.039, 0.0], 10.1, False),
-    ([0.041, 0.0], 0.0, False), ([0.025, 0.0249], 0.0, True), ([0.025, 0.0251], 0.0, False),
+@pytest.mark.parametrize(("pulls", "tilt", "beyond"), [
+    ([0.0, 0.0], 60.0, ""), ([0.0, 0.0], 62.0, "mount tilted by 62°, trials up to 60°"), ([0.039, 0.0], 10.0, ""),
+    ([0.039, 0.0], 12.0, "mount tilted by 12°, trials with pulls up to 10°"), ([0.025, 0.0249], 0.0, ""),
+    ([0.045, 0.0], 0.0, "a motor pulls 45.0 mm, in trials up to 40.0 mm"),
+    ([0.025, 0.0251], 0.0, "motors pull 50.1 mm together, in trials up to 50.0 mm"),
 ])  # fmt: skip
-def test_it_holds_up_to_what_trials_went_up_to(pulls, tilt, expected):
-    assert lacking("model").holds(np.array(pulls), tilt) is expected
+def test_beyond_what_trials_went_up_to_the_number_is_named(pulls, tilt, beyond):
+    assert lacking("model").beyond(np.array(pulls), tilt) == beyond

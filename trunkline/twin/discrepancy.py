@@ -17,11 +17,11 @@ from pathlib import Path
 import numpy as np
 
 from trunkline.errors import InputError
+from trunkline.recordings.trials.conditions import PULLED
 
 FILE = Path("report/discrepancy.json")  # in a folder of artifacts
 UNITS = {"scales": ["m", "1", "1"], "tilt_deg": "deg", "pulled_tilt_deg": "deg", "pull": "m", "pulls": "m",
          "load": "kg"}  # fmt: skip
-PULLED = 1e-3  # m, from which on a tendon counts as pulled, as `recordings/trials/conditions.py` has it
 SAME_TILT = 1e-6  # deg, of rounding
 DIGITS = 6  # of a scale; trials leave each open by far more
 
@@ -75,12 +75,18 @@ class Lacking:
     pulls: float
     load: float = 0.0  # held-out trials with a load tell nothing of the model alone
 
-    def holds(self, pulls: np.ndarray, tilt_deg: float) -> bool:
-        """Whether trials went up to a pose at rest without a load: what each motor draws in, m (K,), and the mount."""
+    def beyond(self, pulls: np.ndarray, tilt_deg: float) -> str:
+        """What of a pose at rest without a load no trial went up to, "" where trials did: what each motor draws in, m
+        (K,), and the mount."""
         pulled = bool((pulls > PULLED).any())
         tilt_bound = self.pulled_tilt_deg if pulled else self.tilt_deg
-        within = pulls.max(initial=0) <= self.pull and pulls.sum() <= self.pulls
-        return bool(within and tilt_deg <= tilt_bound + SAME_TILT)
+        if tilt_deg > tilt_bound + SAME_TILT:
+            return f"mount tilted by {tilt_deg:.0f}°, trials {'with pulls ' if pulled else ''}up to {tilt_bound:.0f}°"
+        if pulls.max(initial=0) > self.pull:
+            return f"a motor pulls {1e3 * pulls.max():.1f} mm, in trials up to {1e3 * self.pull:.1f} mm"
+        if pulls.sum() > self.pulls:
+            return f"motors pull {1e3 * pulls.sum():.1f} mm together, in trials up to {1e3 * self.pulls:.1f} mm"
+        return ""
 
     def table(self) -> dict:
         """As JSON has it."""

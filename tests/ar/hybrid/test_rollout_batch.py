@@ -184,22 +184,26 @@ def test_a_spread_is_about_the_median_wherever_that_is_and_so_is_what_is_shown()
 
 
 def test_a_spread_is_stated_every_tenth_of_a_second_of_sixtieth_frames():
-    stated = of_futures(None, (True,)).stated
+    stated = replace(of_futures(None, (True,)), offsets=np.zeros((1, 1, 3))).stated
     np.testing.assert_array_equal(stated.times, TIME[[0, 6]])
     assert len(stated.tips) == len(stated.radii) == 2
 
 
+def test_where_what_the_model_lacks_is_unknown_no_radius_is_stated():
+    stated = of_futures(None, (True,)).stated
+    assert (len(stated.tips), len(stated.radii)) == (2, 0)
+
+
 @pytest.mark.parametrize("offset", [0.001, 0.05])
-def test_what_the_model_lacks_widens_the_spread_about_the_nominal_tip(offset):
+def test_what_the_model_lacks_widens_the_radius_about_the_nominal_tip(offset):
     tips = np.zeros((2, FRAMES, 3))
     tips[:, :, 0] = 0.01
     lacking = Discrepancy(np.array([[offset, 0.0, 0.0]]), 16)
     believed = replace(piece(), mount=np.zeros((1, FRAMES, 3)) + [0.0, 0.0, 0.5])
     drawn = offsets_of(lacking, np.zeros(2), believed, 2, 0)
     result = PlanPreview(believed, piece(tips, (True, True)), nominal_sample(), None, drawn)
-    np.testing.assert_array_equal(result.center, 0.0)
     np.testing.assert_array_equal(result.stated.tips, 0.0)
     expected = np.quantile(np.linalg.norm(drawn + [0.01, 0, 0], axis=2), 0.9)
-    np.testing.assert_allclose(result.spread, expected)
-    assert result.spread[-1] > 1.2 * offset
+    np.testing.assert_allclose(result.stated.radii, expected)
+    assert expected > 1.2 * offset
     np.testing.assert_allclose(drawn[..., 2], 0.0, atol=1e-12)

@@ -39,6 +39,7 @@ from trunkline.ar.teleop.rigid_ik import RigidIK
 from trunkline.errors import InputError
 from trunkline.model.arm.contact_geometry import read_geometry
 from trunkline.pipeline.config import PROJECT, load_folder
+from trunkline.twin.discrepancy import Discrepancy, Lacking
 
 FUTURES = 3
 
@@ -86,7 +87,34 @@ def test_a_plan_then_its_preview_in_pieces_then_the_batch():
     mount = simulation().bodies.index("base")
     assert np.linalg.norm(poses[-1, mount, :3] - np.array(MOUNT)) < 0.03
     assert (prediction.prediction.futures, prediction.prediction.probability) == (FUTURES, None)
-    assert len(prediction.prediction.times) == len(prediction.prediction.tip) == len(prediction.prediction.spread)
+    assert len(prediction.prediction.times) == len(prediction.prediction.tip)
+    miss = np.linalg.norm(prediction.prediction.tip[-1] - np.array(TIP))
+    assert prediction.prediction.miss == pytest.approx(miss, abs=2e-3)
+    assert (prediction.prediction.spread, prediction.prediction.unknown[:8]) == ((), "no trial")
+
+
+@pytest.mark.parametrize(("pull", "unknown"), [(1.0, ""), (0.0, "a motor pulls")])
+def test_a_radius_is_stated_up_to_what_trials_went_up_to(pull, unknown):
+    """What the model lacks is in it: 10 mm of any pose."""
+    lacking = Lacking("", Discrepancy(np.array([[0.01, 0.0, 0.0]]), 16), 180.0, 180.0, pull, 4.0)
+    robot_model = replace(made().robot_model, lacking=lacking)
+    foresight = replace(made().foresight, robot_model=robot_model)
+    *_, answer = PreviewPlanner(made().planner, foresight, ()).answers(order())
+    stated = answer.prediction
+    assert stated.unknown.startswith(unknown)
+    assert len(stated.spread) == (0 if unknown else len(stated.times))
+    assert bool(unknown) or 0.01 < stated.spread[-1] < 0.03
+
+
+def test_the_preview_of_a_free_motion_leans_as_the_robot_is_seen_to():
+    straight = made().robot_model.lean(np.array([0.0, 0.0, -0.5]))
+    ends = {}
+    for beside in (0.0, 0.02):
+        *_, piece, _ = made().answers(replace(order(), hangs=np.array([beside, 0.0, -0.5])))
+        ends[beside] = piece.poses[-1, :, :3]
+    assert straight is not None
+    assert np.abs(ends[0.0][0] - ends[0.02][0]).max() < 1e-3, "the mount is where it is"
+    assert np.linalg.norm(ends[0.0][-1] - ends[0.02][-1]) > 5e-3, "the tip is not"
 
 
 def test_the_first_plan_in_a_world_that_was_prepared_for_composes_no_twin(monkeypatch):
@@ -211,7 +239,7 @@ def test_a_newer_order_ends_the_one_before_within_a_piece():
 
 def test_what_breaks_a_preview_refuses_its_plan_and_not_the_next():
     class Broken(PreviewPlanner):
-        def _shown(self, *args):
+        def _pieces_of(self, *args):
             raise ValueError("two\nlines")
 
     broken, sent, waiting = Broken(made().planner, made().foresight, made().bodies), [], [(1, order(1))]
@@ -225,7 +253,7 @@ def test_a_process_whose_first_preview_breaks_off_does_not_begin():
     """No plan could ever be confirmed: that is better said before anybody comes."""
 
     class Broken(PreviewPlanner):
-        def _shown(self, *args):
+        def _pieces_of(self, *args):
             raise ValueError("two\nlines")
 
     s, asked = simulation(), order()

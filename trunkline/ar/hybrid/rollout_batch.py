@@ -19,13 +19,14 @@ from trunkline.twin.discrepancy import Discrepancy
 
 WITHIN = 0.9  # share of futures whose tips are within the spread
 OFFSETS = 100  # draws of what the model lacks for each future: a quantile of a dozen is none
+CONTACT = "the arm touches something, and in no trial did it"
 EVERY = 0.1  # s between the times at which a spread is stated
 
 
 @dataclass(frozen=True)
 class Stated:
-    """What people are told of the tip: at `times` (n,), s, it is within `radii` (n,), m, of `tips` (n, 3), m, in WITHIN
-    of sound futures."""
+    """What people are told of the tip: at `times` (n,), s, the robot's is within `radii` (n,), m, of the one that is
+    shown, `tips` (n, 3), m, with probability WITHIN. Without radii where that is unknown."""
 
     times: np.ndarray
     tips: np.ndarray
@@ -41,7 +42,8 @@ class PlanPreview:
         motion: of the B futures.
         samples: what each future has.
         success: which of them hold the object, or do what else was asked; None if nobody asked. Shape (B,).
-        offsets: of the tip by what the model lacks, draws for each future; None where nobody knows. Shape (B, D, 3).
+        offsets: of the tip by what the model lacks, draws for each future; None where that is unknown. Shape (B, D, 3).
+        unknown: why it is unknown; "" where it is known.
     """
 
     nominal: Piece
@@ -49,6 +51,7 @@ class PlanPreview:
     samples: PosteriorSamples
     success: np.ndarray | None
     offsets: np.ndarray | None = None
+    unknown: str = CONTACT
 
     @property
     def median(self) -> np.ndarray:
@@ -62,18 +65,8 @@ class PlanPreview:
         return int(np.argmin(np.where(self.motion.sound, away, np.inf)))
 
     @property
-    def center(self) -> np.ndarray:
-        """What the spread is about: the tip of the nominal motion, which is shown, and where nobody knows what the
-        model lacks the futures' median. Shape (F, 3)."""
-        return self.median if self.offsets is None else self.nominal.tip[0]
-
-    @property
     def spread(self) -> np.ndarray:
-        """Distance from `center` within which the tips of WITHIN of sound futures are, m. Shape (F,)."""
-        if self.offsets is not None:
-            away = self.motion.tip[self.motion.sound] - self.center
-            moved = away[:, None] + self.offsets[self.motion.sound][:, :, None]
-            return np.quantile(np.linalg.norm(moved, axis=3), WITHIN, axis=(0, 1))
+        """Distance from the median within which the tips of WITHIN of sound futures are, m. Shape (F,)."""
         away = np.linalg.norm(self.motion.tip[self.motion.sound] - self.median, axis=2)
         return np.quantile(away, WITHIN, axis=0)
 
@@ -81,7 +74,13 @@ class PlanPreview:
     def stated(self) -> Stated:
         """Every EVERY s, as a page shows it; the last is of where the tip ends."""
         every = max(round(EVERY / FRAME), 1)
-        return Stated(self.motion.time[::every], self.center[::every], self.spread[::every])
+        shown = self.nominal.tip[0]
+        radii = np.empty(0)
+        if self.offsets is not None:
+            futures = self.motion.tip[self.motion.sound] - shown
+            moved = futures[:, None, ::every] + self.offsets[self.motion.sound][:, :, None]
+            radii = np.quantile(np.linalg.norm(moved, axis=3), WITHIN, axis=(0, 1))
+        return Stated(self.motion.time[::every], shown[::every], radii)
 
     @property
     def probability(self) -> float | None:
@@ -108,7 +107,7 @@ def preview(
     seed: int = 0,
     show: Callable[[Piece], None] = lambda piece: None,
     go_on: Callable[[], None] = lambda: None,
-    lacking: tuple[Discrepancy, np.ndarray] | None = None,
+    lacking: tuple[Discrepancy, np.ndarray] | str = CONTACT,
 ) -> PlanPreview:
     """Try a plan in `count` futures.
 
@@ -116,7 +115,8 @@ def preview(
         holding: what is asked of the plan; None where nothing is grasped.
         show: called with each piece of the nominal motion, before any future is simulated.
         go_on: called before each piece, and after the last; what it raises ends the preview.
-        lacking: what the model lacks, with how far gravity and cables move the tip at the plan's end, m, (2,).
+        lacking: what the model lacks, with how far gravity and cables move the tip at the plan's end, m, (2,); or why
+            that is unknown.
     """
     begun, samples = [], sample(uncertainty, twin.arm, count, seed)
     for piece in interruptible(nominal(twin, trajectory), go_on):
@@ -124,8 +124,9 @@ def preview(
         begun.append(piece)
     motion = joined(list(interruptible(rollouts(twin, trajectory, samples), go_on)))
     success, believed = holding.holds(motion) if holding is not None else None, joined(begun)
-    offsets = None if lacking is None else offsets_of(*lacking, believed, count, seed)
-    return PlanPreview(believed, motion, samples, success, offsets)
+    if isinstance(lacking, str):
+        return PlanPreview(believed, motion, samples, success, None, lacking)
+    return PlanPreview(believed, motion, samples, success, offsets_of(*lacking, believed, count, seed), "")
 
 
 def offsets_of(lacking: Discrepancy, ways: np.ndarray, believed: Piece, count: int, seed: int) -> np.ndarray:

@@ -43,21 +43,21 @@ class RobotModel:
     robot: PandaRobot
     lacking: Lacking | None = None
 
-    def lacking_at(self, joints: np.ndarray, commands: np.ndarray) -> tuple[Discrepancy, np.ndarray] | None:
+    def lacking_at(self, joints: np.ndarray, commands: np.ndarray) -> tuple[Discrepancy, np.ndarray] | str:
         """What the model lacks, with how far gravity and cables move its tip, m, (2,), at rest at `joints` (7,), rad,
-        and `commands` (K,), m, without a load. None where nobody knows: a package without it, a pose beyond what trials
-        went up to, or one without a rest."""
+        and `commands` (K,), m, without a load; or why that is unknown."""
         if self.lacking is None:
-            return None
+            return "no trial at rest was held out, or the package is of an earlier release"
         flange = mount_pose(joints[None], self.robot.mount_offset)[1][0]
         gravity = (flange @ np.diag([1.0, -1.0, -1.0])).T @ GRAVITY[0]
         arm = arm_of(self.arm.copy().compile())
         order = ArmModel(arm.model).actuators
         pulls = np.maximum(arm.chain.straight_lengths - commands[order], 0)
-        if not self.lacking.holds(pulls, float(np.degrees(tilt_of_gravity(gravity)))):
-            return None
+        beyond = self.lacking.beyond(pulls, float(np.degrees(tilt_of_gravity(gravity))))
+        if beyond:
+            return beyond
         ways = arm.ways(StaticPoses(gravity[None], commands[None][:, order]))[0]
-        return (self.lacking.discrepancy, ways) if np.isfinite(ways).all() else None
+        return (self.lacking.discrepancy, ways) if np.isfinite(ways).all() else "the twin does not come to rest there"
 
     def lean(self, hangs: np.ndarray | None) -> Rotation | None:
         """How the arm is turned on its mount, by the least turns, so that its tip, straight down, comes to rest in the

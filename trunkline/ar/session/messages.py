@@ -236,8 +236,9 @@ class PredictionMessage:
     """What the batch of futures says of the plan `digest`, once they are simulated.
 
     probability: that the grasp holds, with its interval `low` to `high`; null where nothing is grasped. times: s of the
-    preview, at which `tip` is the median path of the tip and `spread` the distance from it within which `within` of the
-    futures are, m. offer: the assistant's. futures: how many.
+    preview, at which `tip` is where its tip is, and `spread` the distance from it within which the robot's is with
+    probability `within`, m; empty where that is unknown, and `unknown` says why. miss: from the tip at the preview's
+    end to its target, m; null where an object is the target. offer: the assistant's. futures: how many.
     """
 
     digest: str
@@ -249,6 +250,8 @@ class PredictionMessage:
     spread: tuple[float, ...]
     within: float
     futures: int
+    miss: float | None = None
+    unknown: str = ""
     offer: Offer | None = None
     type: Literal["foreseen"] = "foreseen"
 

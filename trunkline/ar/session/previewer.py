@@ -13,6 +13,7 @@ from functools import cache, partial
 from typing import Protocol
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from trunkline.ar.hybrid.rollout_batch import WITHIN, nominal
 from trunkline.ar.hybrid.rollouts import FRAME, CommandTrajectory, ComposedTwin
@@ -124,7 +125,7 @@ class PreviewPlanner:
         self.planner, self.foresight, self.bodies = planner, foresight, bodies
         self.robot_model, self.previewing = foresight.robot_model, foresight.settings
         self.prediction: PlanPrediction | None = None
-        self._composed: tuple[tuple, ComposedTwin | None] = ((), None)
+        self._composed: tuple[tuple, ComposedTwin | None, Rotation | None] = ((), None, None)
         self._grasped: PlanPrediction | None = None  # the last grasp: of an object that is held, the one that was run
 
     @classmethod
@@ -180,26 +181,30 @@ class PreviewPlanner:
             yield PreviewPiece(serial, 0, 0.0, np.empty((0, 0, 7), dtype=np.float32), True)
         for prediction in self._predictions(order, plan, twin, way, go_on):
             self.prediction = prediction
-            yield PredictionAnswer(serial, prediction_message(digest, prediction))
+            target = None if request.targets.object else np.array(request.targets.tip.position)
+            yield PredictionAnswer(serial, prediction_message(digest, prediction, target))
 
     def prepare(self, order: Order) -> None:
         """Compose its twin, which the next order takes, where nothing has changed."""
-        self._twin(order.world, _beside(order), order.joints, order.commands)
+        self._twin(order, order.joints, order.commands)
 
     def _twin_of(self, order: Order, way: CommandTrajectory) -> ComposedTwin:
         held_object = _held_object(order)
         if held_object is not None and self._grasped is not None:
             return self.foresight.carrying(held_object, order.world, way, order.hangs, self._grasped)
-        return self._twin(order.world, _beside(order), way.joints[0], way.commands[0])
+        return self._twin(order, way.joints[0], way.commands[0])
 
-    def _twin(self, world: World, object: WorldObject | None, joints: np.ndarray, commands: np.ndarray) -> ComposedTwin:
-        """The last one where nothing has changed: to compile another takes longer than a piece of a preview."""
-        composed, twin = self._composed
-        if twin is not None and composed == (world.obstacles, object):
-            twin = at_rest(twin, joints, commands, self.robot_model.robot.mount_offset)
+    def _twin(self, order: Order, joints: np.ndarray, commands: np.ndarray) -> ComposedTwin:
+        """It leans as the robot does. The last one where nothing has changed: to compile another takes longer than a
+        piece of a preview."""
+        object, hangs = _beside(order), None if order.hangs is None else order.hangs.tobytes()
+        now, (composed, twin, lean) = (order.world.obstacles, object, hangs), self._composed
+        if twin is not None and composed == now:
+            twin = at_rest(twin, joints, commands, self.robot_model.robot.mount_offset, lean)
         else:
-            twin = compose_twin(self.robot_model, world, object, joints, commands, self.previewing)
-        self._composed = (world.obstacles, object), twin
+            lean = self.robot_model.lean(order.hangs)
+            twin = compose_twin(self.robot_model, order.world, object, joints, commands, self.previewing, lean)
+        self._composed = now, twin, lean
         return twin
 
     def _pieces_of(
@@ -275,14 +280,18 @@ class InlinePreviewer:
         self._ready += self._later
 
 
-def prediction_message(digest: str, prediction: PlanPrediction) -> messages.PredictionMessage:
-    """As clients hear it: times from the plan's beginning on."""
+def prediction_message(
+    digest: str, prediction: PlanPrediction, target: np.ndarray | None
+) -> messages.PredictionMessage:
+    """As clients hear it: times from the plan's beginning on. target: of the tip, m, (3,); None of an object."""
     preview, stated = prediction.preview, prediction.preview.stated
     low_high = preview.interval or (None, None)
     tips = tuple((float(x), float(y), float(z)) for x, y, z in stated.tips)
     return messages.PredictionMessage(
         digest, preview.probability, *low_high, tuple(map(float, prediction.begins + stated.times)), tips,
-        tuple(map(float, stated.radii)), WITHIN, len(preview.samples), prediction.offer,
+        tuple(map(float, stated.radii)), WITHIN, len(preview.samples),
+        None if target is None else float(np.linalg.norm(preview.nominal.tip[0, -1] - target)), preview.unknown,
+        prediction.offer,
     )  # fmt: skip
 
 
