@@ -63,9 +63,10 @@ class PoseProblem:
         self.measured = measured[np.argsort(model.site_bodyid[self.sites[measured]])]
         self.hinges = int(np.bincount(model.jnt_bodyid).max())  # of each joint
         self.angles = ArmModel(model).hinge_count
-        # of neighbors about the same axis: in every second unit, the hinge about y may be the first
-        alike = np.argsort(np.abs(model.jnt_axis[: self.angles]).argmax(axis=1).reshape(-1, self.hinges), axis=1)
-        along = np.eye(self.angles)[self.hinges * np.arange(len(alike))[:, None] + alike].reshape(-1, self.angles)
+        # of each joint, its hinges about x and about y: in every second unit, the one about y may be the first
+        order = np.argsort(np.abs(model.jnt_axis[: self.angles]).argmax(axis=1).reshape(-1, self.hinges), axis=1)
+        self.by_axis = self.hinges * np.arange(len(order))[:, None] + order
+        along = np.eye(self.angles)[self.by_axis.ravel()]
         rows = along[self.hinges :] - along[: -self.hinges]
         self._smooth = rows / BEND_CHANGE_SIGMA
 
@@ -117,7 +118,8 @@ def fit_pose(
         fit = _descend(problem, qpos, measured[:count], free, max_iterations)
         qpos = fit.qpos
         if 0 < first < angles:
-            qpos[first:] = np.resize(qpos[first - hinges : first], angles - first)
+            fitted = first // hinges
+            qpos[problem.by_axis[fitted:]] = qpos[problem.by_axis[fitted - 1]]
     return fit
 
 
