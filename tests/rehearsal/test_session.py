@@ -30,7 +30,8 @@ from trunkline.errors import InputError
 OBJECT = np.array([0.6, 0.1, 0.1])
 PREDICTION = SimpleNamespace(
     preview=SimpleNamespace(
-        stated=Stated(np.zeros(1), np.zeros((1, 3)), np.zeros(1)), interval=None, probability=None, samples=()
+        stated=Stated(np.zeros(1), np.zeros((1, 3)), np.zeros(1)), interval=None, probability=None, samples=(),
+        nominal=SimpleNamespace(tip=np.zeros((1, 1, 3))), unknown="",
     ),
     begins=0.0,
     offer=None,

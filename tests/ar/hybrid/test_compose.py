@@ -35,12 +35,13 @@ def moved(model, gravity=None):
 
 def test_the_attached_arm_moves_as_by_itself(arm):
     """Geoms change nothing of a motion in which nothing touches; elliptic cones and impratio no more than rounding,
-    which rubbing cables magnify."""
+    which rubbing cables magnify, step by step."""
     alone, bare = moved(arm.compile()), moved(compose(arm, FixedMount("fixed"), touch=False).compile())
     touching = moved(compose(arm, FixedMount("fixed")).compile())
     assert np.ptp(alone, axis=0).max() > 0.2
     np.testing.assert_allclose(touching, bare, atol=1e-9)
-    np.testing.assert_allclose(bare, alone, atol=1e-6)
+    np.testing.assert_allclose(bare[: STEPS // 2], alone[: STEPS // 2], atol=1e-10)
+    np.testing.assert_allclose(bare, alone, atol=1e-5)
 
 
 def test_a_tilted_mount_is_tilted_gravity(arm):

@@ -61,7 +61,7 @@ def test_sides_that_no_trial_shows_are_named(model):
     (plane,) = missing_lines([tilted, turned(tilted, 180)])
     assert plane.endswith("all in one plane")
     (half,) = missing_lines([release(model, 0.2), turned(release(model, 0.3), 60)])
-    assert half.startswith("releases: the arm is held to no side within 149° of ")
+    assert half.startswith("releases: the arm is held to no side within 150° of ")
 
 
 def test_tendons_that_never_pull_are_named(model):
@@ -223,6 +223,7 @@ def test_the_command_reads_logs_and_writes_nothing(tmp_path, monkeypatch, capsys
 def test_of_several_sessions_each_is_told_and_what_it_has_for_itself(model, tmp_path, monkeypatch, capsys):
     params = yaml.safe_load((ROOT / "params.yaml").read_text())
     wanted = ("build_mjcf", "identify_stiffness")
+    del params["identify_stiffness"]["parameters"]["capstan_friction"]  # of cables that rub, which this arm's do not
     (tmp_path / "params.yaml").write_text(yaml.safe_dump({stage: params[stage] for stage in wanted}))
     monkeypatch.chdir(tmp_path)
     rested = [tilt(model, 30), tilt(model, 60), *(static_pull(model, (pull, 0, 0)) for pull in (10, 20))]
