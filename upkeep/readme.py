@@ -288,7 +288,7 @@ def preview_table(preview: dict | None, goals: dict[str, Limit]) -> str:
     inside = [f"{count} of {runs}" for count, runs in counts]
     off = [_number(lookup(preview, f"tip_error_radii.{name}.median")) for name in times]
     stated = [_goal(goals.get(f"preview.coverage.{n}.share"), lookup(preview, f"coverage.{n}.share")) for n in times]
-    what = f"reach: the tip ends within a radius ({radius}, median) in 9 of 10 cases: {', '.join(times.values())}"
+    what = f"reach: with nothing in the way, the tip ends within a radius ({radius}, median) in 9 of 10 cases: {', '.join(times.values())}"
     came = f"{' / '.join(inside)}; it is {' / '.join(off)} radii off, median"
     lines.append(f"| {what} | {came} | {_joined(stated)} |")
     likelier, previews = lookup(preview, "agreed"), lookup(preview, "previews")
@@ -486,7 +486,7 @@ def _rehearsal_rows(metrics: dict | None, goals: Mapping[str, Limit]) -> list[st
         counts.append(f"{words} {_marked(f'{inside} of {runs}', goal, share)}")
         missed.append(_goal(goal, share))
     off = _number(lookup(metrics, "preview.tip_error_radii.at_end.median"))
-    what = "Rehearsed reaches that end within the preview's 90 % radius"
+    what = "Rehearsed reaches that, with nothing in the way, end within the preview's 90 % radius"
     rows.append(f"| {what} | {', '.join(counts)} | goal: {_joined(missed)}; the tip is {off} radii off, median |")
     return rows
 

@@ -49,7 +49,7 @@ export function foreseenWords(told) {
   if (told.probability !== null)
     parts.push(`Grasp holds in ${percent(told.probability)} of ${told.futures} futures (${percent(told.low)} to ${percent(told.high)})`);
   if (told.miss !== null) parts.push(`the preview ends ${Math.round(1000 * told.miss)} mm from the target`);
-  if (spread !== null) parts.push(`in ${percent(told.within)} of cases the robot’s tip ends within ${spread} mm of the preview’s`);
+  if (spread !== null) parts.push(`in ${percent(told.within)} of cases the robot’s tip ends within ${spread} mm of the preview’s, where it touches nothing`);
   else parts.push(`how near the robot’s tip comes to the preview’s is unknown: ${told.unknown}`);
   return sentence(parts.join("; "));
 }

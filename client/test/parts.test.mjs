@@ -94,7 +94,7 @@ const FORESEEN = { probability: null, low: null, high: null, futures: 12, within
 test("of a place: how far the preview ends from it, and how far the robot's tip may from that", () => {
   assert.equal(
     foreseenWords({ ...FORESEEN, miss: 0.0082, spread: [0.001, 0.012] }),
-    "The preview ends 8 mm from the target; in 90 % of cases the robot’s tip ends within 12 mm of the preview’s.",
+    "The preview ends 8 mm from the target; in 90 % of cases the robot’s tip ends within 12 mm of the preview’s, where it touches nothing.",
   );
 });
 

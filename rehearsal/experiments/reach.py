@@ -1,7 +1,8 @@
 """Reach a static object: a sphere hangs at a random place; success is that the soft arm's tip touches it.
 
-The first contact of the arm with anything decides. Of plans that were run, what had been stated of the tip's end is
-held against where the robot's tip is then, and some seconds later.
+The first contact of the arm with anything decides. What previews state of the tip's end is of an arm that touches
+nothing, and no client here knows the object. So it is held against the same robot that runs the same plan once more
+with the object away. How far off the tip was beside the object is told as well.
 """
 
 import numpy as np
@@ -11,6 +12,8 @@ from rehearsal.experiments.result import LATER, Result
 from rehearsal.operator.scripts import Ending
 from rehearsal.session import RehearsedSession
 from trunkline.ar.session.messages import PredictionMessage
+from trunkline.ar.teleop.plan import Plan
+from trunkline.errors import InputError
 
 WITHIN = 0.02  # m from the object's place: nearer than its surface, which a tip also touches from the side
 
@@ -31,8 +34,11 @@ def reach(bench: Bench, seed: int) -> Staged:
 
     def watch(result: Result, ending: Ending, frames: list[SessionFrame]) -> None:
         foreseen = session.predict() if ending.done and bench.judged else None
-        if foreseen is not None:
-            tell_end(result, foreseen, tips_after(session, frames))
+        plan, last = session.controller.plan, executed(frames)
+        if foreseen is not None and plan is not None and last is not None:
+            alone = bench.session(operator, None, seed, lambda now: object)
+            tell_end(result, foreseen, plan.duration, tips_after(alone, plan))
+            result.touching_mm = 1e3 * _off(foreseen, plan.duration, session.in_client_frame(last.truth.tip))
 
     return Staged("reach", seed, session, operator.reach(), judge, watch=watch)
 
@@ -90,24 +96,35 @@ def _touches(frame: SessionFrame) -> bool:
     return bool(frame.truth.arm_object.any() or frame.truth.arm_world.any())
 
 
-def tell_end(result: Result, foreseen: PredictionMessage, tips: dict[str, np.ndarray]) -> None:
-    """How far the robot's tip was from where the preview had it end, at the end and later; tips (3,), m, by LATER."""
+def tell_end(result: Result, foreseen: PredictionMessage, duration: float, tips: dict[str, np.ndarray]) -> None:
+    """How far the robot's tip was from where the preview had it then, at the end of a plan of `duration` s and later;
+    tips (3,), m, by LATER."""
     result.radius_mm = 1e3 * foreseen.spread[-1] if foreseen.spread else float("nan")  # unknown
     for name, tip in tips.items():
-        setattr(result, f"{name}_mm", 1e3 * float(np.linalg.norm(tip - foreseen.tip[-1])))
+        setattr(result, f"{name}_mm", 1e3 * _off(foreseen, duration + LATER[name], tip))
 
 
-def tips_after(session: RehearsedSession, frames: list[SessionFrame]) -> dict[str, np.ndarray]:
-    """Where the tip appears, (3,), m, at the end of the first execution, and by LATER after it. What frames do not
-    reach, the robot holds for."""
-    done, tips, now = executed(frames), {}, session.now
-    if done is None:
-        return {}
+def _off(foreseen: PredictionMessage, time: float, tip: np.ndarray) -> float:
+    """From where the preview has the tip at `time`, s, to `tip` (3,), m."""
+    previewed = [np.interp(time, foreseen.times, path) for path in np.transpose(foreseen.tip)]
+    return float(np.linalg.norm(tip - previewed))
+
+
+def tips_after(session: RehearsedSession, plan: Plan) -> dict[str, np.ndarray]:
+    """Where the tip of a robot that has not moved yet appears, (3,), m, when it has run `plan`, and by LATER after it.
+
+    Raises:
+        InputError: it does not run the plan.
+    """
+    robot, tips, held = session.executor, {}, 0.0
+    refused = robot.start(plan, plan.digest())
+    while not refused and robot.state().mode != "done":
+        robot.permit()
+        robot.advance()
+        refused = robot.state().fault
+    if refused:
+        raise InputError(f"plan: {refused}, expected what the robot has run before")
     for name, seconds in LATER.items():
-        frame = next((frame for frame in frames if frame.now >= done.now + seconds), None)
-        if frame is None:
-            session.robot.advance(max(done.now + seconds - now, 0.0))
-            now = max(now, done.now + seconds)
-        truth = session.robot.truth() if frame is None else frame.truth
-        tips[name] = session.in_client_frame(truth.tip)
+        session.robot.advance(seconds - held)
+        tips[name], held = session.in_client_frame(session.robot.truth().tip), seconds
     return tips

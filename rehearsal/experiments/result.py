@@ -26,7 +26,8 @@ class Result:
     to the plan that was confirmed. agreed: 1 if it was at least a half for a success, or less for a failure, else 0.
     path_pct: median distance between the robot's tip and the nominal preview's, % of the arm's length. radius_mm:
     within which the preview had stated that the tip ends; at_end_mm, after_2s_mm, after_10s_mm: of the robot's tip from
-    the middle of that, when the execution had ended and so long after it. seconds: of the whole run. object: what was
+    where that has it then, when the execution had ended and so long after it, with nothing in the way; touching_mm:
+    likewise when it had ended, beside the object. seconds: of the whole run. object: what was
     grasped, in words.
 
     variant: of an ablation, "" for none. package, code: digests of what the run was made of: `rehearsal.runs.Source`.
@@ -51,6 +52,7 @@ class Result:
     at_end_mm: float = float("nan")
     after_2s_mm: float = float("nan")
     after_10s_mm: float = float("nan")
+    touching_mm: float = float("nan")
     seconds: float = 0.0
     object: str = ""
     variant: str = ""

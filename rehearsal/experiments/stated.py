@@ -1,8 +1,8 @@
 """Whether what previews state comes true: probabilities of grasps and hand-overs, and the radius about the tip's end.
 
 A page says "in 90 % of cases the robot's tip ends within r mm of the preview's", or that this is unknown. A run's tip
-is inside where it is no further than r from where the preview's is; how far it is over r says by how much a radius is
-too small where none are inside.
+is inside where it is no further than r from where the preview's is, with nothing in the way; how far it is over r says
+by how much a radius is too small where none are inside.
 """
 
 import numpy as np
@@ -21,7 +21,8 @@ def scores(results: list[Result]) -> dict:
     previews, agreed: how many had a probability, and of how many it came out so; agreement: their share, from `low` to
     `high`, Wilson's; path_pct_median: %; brier, brier_base. radius_mm: median and 95th percentile. coverage: for each
     of LATER, runs with a radius, those `inside`, their share, from `low` to `high`. tip_error_radii: likewise, median
-    of the tip's distance over the radius. A tip that is nowhere is outside, and infinitely far.
+    of the tip's distance over the radius. A tip that is nowhere is outside, and infinitely far. touching_mm: median
+    distance beside the object.
     """
     plain = [result for result in results if not result.variant]
     probable = [row for row in plain if row.experiment in PROBABLE and np.isfinite(row.probability)]
@@ -52,7 +53,9 @@ def _radii(rows: list[Result]) -> dict:
         coverage[name] = {"runs": len(rows), "inside": inside, "share": share, "low": low, "high": high}
         errors[name] = {"median": float(np.median(np.where(np.isfinite(off), off, np.inf) / radius))}
     median, p95 = (float(value) for value in np.quantile(radius, (0.5, 0.95)))
-    return {"radius_mm": {"median": median, "p95": p95}, "coverage": coverage, "tip_error_radii": errors}
+    table = {"radius_mm": {"median": median, "p95": p95}, "coverage": coverage, "tip_error_radii": errors}
+    touching = [row.touching_mm for row in rows if np.isfinite(row.touching_mm)]
+    return table | ({"touching_mm": {"median": float(np.median(touching))}} if touching else {})
 
 
 def covered(off: np.ndarray, radius: np.ndarray) -> np.ndarray:

@@ -127,7 +127,7 @@ class Operator:
         view = yield from self._until(lambda view: view.intent.mode == "aim")
         view = yield from self._place_tip(view, np.zeros(3))
         view, why = yield from self._place_at(view, lambda view: view.object + beside)
-        ending = Ending(False, why)
+        ending, unsure = Ending(False, why), ""
         while not ending.why and ending.plans < self.person.patience:
             ending.plans += 1
             view = yield from self._ask(view)
@@ -139,12 +139,14 @@ class Operator:
             elif view.offer is not None and sure_enough(view.offer.probability, accept):
                 ending.offers += 1
                 view = yield from self._take_offer(view)
+                unsure = "aim: no preview was as sure to hold as its offer"
                 continue
             else:
-                ending.why = "aim: no preview was sure enough to hold"
+                unsure = "aim: no preview was sure enough to hold"
                 view = yield from self._drop(view)
             if ending.plans < self.person.patience:
                 view, ending.why = yield from self._place_at(view, lambda view: view.object + beside)
+        ending.why = ending.why or unsure
         return ending
 
     def handle(self, beside: np.ndarray, spot: Callable[[View], np.ndarray], accept: float, watch: float) -> Script:

@@ -15,6 +15,7 @@ from tests.support.bent_chain import hardening_stump, stump_spec
 from tests.support.operator import config
 from tests.support.twins import posterior_about
 from trunkline.ar.hybrid.friction import TPU_ON
+from trunkline.ar.hybrid.tip_uncertainty import BaseAlignment
 from trunkline.ar.hybrid.uncertainty import Contact, GraspUncertainty, sample
 from trunkline.ar.preview.package import Package
 from trunkline.ar.preview.preview_twin import RobotModel
@@ -37,7 +38,7 @@ def bench() -> Bench:
     robot = PandaRobot("panda", 0.05, 0.8, 0.0, list(READY))
     posterior = posterior_about(stump_spec().compile(), {"kp": 1.0})
     uncertainty = GraspUncertainty(Contact(FRICTION, PLACE, 0.1), posterior)
-    world_model = RobotModel(stump_spec(), uncertainty, robot)
+    world_model = RobotModel(stump_spec(), uncertainty, robot, BaseAlignment(0.0, 0.0))
     return Bench(None, config(), stranger(), stand_in(), settings.person(), settings.free(), world_model=world_model)  # type: ignore[arg-type]
 
 

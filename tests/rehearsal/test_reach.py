@@ -13,6 +13,9 @@ from rehearsal.operator.scripts import Ending
 from rehearsal.session import RehearsedSession
 from tests.rehearsal.frames import FORCE, TIP, UNITS, frame
 from trunkline.ar.session.messages import PredictionMessage
+from trunkline.ar.teleop.messages import ExecutorReport
+from trunkline.ar.teleop.plan import Plan
+from trunkline.errors import InputError
 
 RADIUS = 0.03
 NAN = (np.nan, 0.0, 0.0)
@@ -109,17 +112,18 @@ def test_a_clean_reach_is_near_and_touches_nothing_else(frames, clean):
 
 
 def test_how_far_the_tip_ends_from_where_it_was_said_to_is_told_in_mm():
-    """By the last of what was stated."""
+    """From where the preview has the tip at that time of a plan of 5 s; what it does not go up to, where it ends."""
     stated = PredictionMessage(
-        "", None, None, None, (0.0, 0.1), ((9.0, 9.0, 9.0), (0.1, 0.2, 0.3)), (0.5, 0.004), 0.9, 12
-    )
+        "", None, None, None, (4.0, 6.0, 8.0), ((0.0, 0.2, 0.3), (0.2, 0.2, 0.3), (0.2, 0.2, 0.5)),
+        (0.5, 0.1, 0.004), 0.9, 12,
+    )  # fmt: skip
     tips = {
         "at_end": np.array([0.1, 0.2, 0.303]),
-        "after_2s": np.array([0.1, 0.204, 0.303]),
-        "after_10s": np.array(stated.tip[1]),
+        "after_2s": np.array([0.2, 0.204, 0.403]),
+        "after_10s": np.array(stated.tip[-1]),
     }
     result = Result("reach", 0, True)
-    tell_end(result, stated, tips)
+    tell_end(result, stated, 5.0, tips)
     numbers = (result.radius_mm, result.at_end_mm, result.after_2s_mm, result.after_10s_mm)
     np.testing.assert_allclose(numbers, (4, 3, 5, 0), atol=1e-9)
 
@@ -127,20 +131,29 @@ def test_how_far_the_tip_ends_from_where_it_was_said_to_is_told_in_mm():
 def test_a_radius_that_is_unknown_is_no_number():
     stated = PredictionMessage("", None, None, None, (0.0,), ((0.1, 0.2, 0.3),), (), 0.9, 12, 0.0, "mount tilted")
     result = Result("reach", 0, True)
-    tell_end(result, stated, {"at_end": np.array([0.1, 0.2, 0.303])})
+    tell_end(result, stated, 1.0, {"at_end": np.array([0.1, 0.2, 0.303])})
     np.testing.assert_allclose((result.radius_mm, result.at_end_mm), (np.nan, 3))
 
 
 class Drifting:
-    """A robot whose tip moves on along x by 1 m/s."""
+    """A robot that runs any plan in 1 s of four frames; its tip moves on along x by 1 m/s. `permitted`: frames."""
 
-    def __init__(self, time: float) -> None:
-        self.x = time
-        self.instruments = SimpleNamespace(
-            turn=Rotation.from_rotvec([0.0, 0.0, np.pi / 2]), shift=np.array([0.0, 0.0, 5.0])
-        )
+    def __init__(self, refused: str = "", fault: str = "") -> None:
+        self.x, self.refused, self.fault, self.permitted = 0.0, refused, fault, 0
+        turn = Rotation.from_rotvec([0.0, 0.0, np.pi / 2])
+        self.instruments = SimpleNamespace(turn=turn, shift=np.array([0.0, 0.0, 5.0]))
 
-    def advance(self, dt: float) -> None:
+    def start(self, plan, digest):
+        assert plan.digest() == digest
+        return self.refused
+
+    def permit(self):
+        self.permitted += 1
+
+    def state(self):
+        return ExecutorReport("done" if self.x >= 1.0 else "running", "", self.fault)
+
+    def advance(self, dt: float = 0.25) -> None:
         assert dt >= 0
         self.x += dt
 
@@ -148,24 +161,26 @@ class Drifting:
         return SimpleNamespace(tip=np.array([self.x, 0.0, 0.0]))
 
 
-def run(last: float) -> tuple[RehearsedSession, list]:
-    """Frames until `last` s, the plan run from 1 to 2 s, and the session then."""
+PLAN = Plan(0.1, np.zeros((11, 7)), np.zeros((11, 3)), (("approach", 0),), "package", "world")
+
+
+def alone(robot: Drifting) -> RehearsedSession:
     session = object.__new__(RehearsedSession)
-    session.robot, session.now = Drifting(last), last  # type: ignore[assignment]
-    modes = [(t, "execute" if 1.0 <= t <= 2.0 else "aim") for t in np.arange(0.0, last + 1e-9, 0.25)]
-    return session, [frame(now, mode, tip=np.array([now, 0.0, 0.0])) for now, mode in modes]
+    session.robot = session.executor = robot  # type: ignore[assignment]
+    return session
 
 
-@pytest.mark.parametrize("last", [2.25, 3.0, 4.25, 12.25, 20.0])
-def test_the_tip_is_looked_at_as_long_after_the_end_as_is_said_and_as_the_client_sees_it(last):
-    """By frames as far as there are any, then by the robot that holds; in the client's frame."""
-    tips = tips_after(*run(last))
+def test_the_tip_is_looked_at_as_long_after_the_end_as_is_said_and_as_the_client_sees_it():
+    robot = Drifting()
+    tips = tips_after(alone(robot), PLAN)
     assert list(tips) == ["at_end", "after_2s", "after_10s"]
-    for tip, at in zip(tips.values(), (2.25, 4.25, 12.25), strict=True):
+    for tip, at in zip(tips.values(), (1.0, 3.0, 11.0), strict=True):
         np.testing.assert_allclose(tip, (0.0, at, 5.0), atol=1e-9)
+    assert robot.permitted == 4, "of every frame, else it would come to rest"
 
 
-@pytest.mark.parametrize("frames", [[], [frame(0.0, "execute")], [frame(0.0, "aim"), frame(1.0, "execute")]])
-def test_nothing_is_told_of_an_execution_that_did_not_end(frames):
-    session, _ = run(1.0)
-    assert tips_after(session, frames) == {}
+@pytest.mark.parametrize("how", ["refused", "fault"])
+def test_a_plan_that_is_not_run_again_is_an_error(how):
+    robot = Drifting(**{how: "a joint leaves its range"})
+    with pytest.raises(InputError, match=r"^plan: a joint leaves its range, expected what the robot has run before$"):
+        tips_after(alone(robot), PLAN)

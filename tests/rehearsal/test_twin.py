@@ -11,6 +11,7 @@ from rehearsal import settings
 from tests.ar.hybrid.conftest import hybrid_settings, rubbing_arm
 from trunkline.ar.hybrid.rollout_batch import joined
 from trunkline.ar.hybrid.rollouts import CommandTrajectory, rollouts
+from trunkline.ar.hybrid.tip_uncertainty import BaseAlignment
 from trunkline.ar.hybrid.uncertainty import GraspUncertainty, nominal_sample
 from trunkline.ar.preview.preview_twin import RobotModel, compose_twin
 from trunkline.ar.teleop.messages import Obstacle, World, WorldObject
@@ -29,7 +30,7 @@ def world_model() -> RobotModel:
     arm = rubbing_arm(spiral_chain(length=0.2, base_width=0.05, tip_width=0.02, units=6), 3)
     robot = hybrid_settings(robot="panda").robot
     assert isinstance(robot, PandaRobot)
-    return RobotModel(arm, GraspUncertainty(), robot)
+    return RobotModel(arm, GraspUncertainty(), robot, BaseAlignment(0.0, 0.0))
 
 
 def composed(world_model: RobotModel, object: WorldObject, lean: Rotation, left=None):

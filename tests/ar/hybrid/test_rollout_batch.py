@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from trunkline.ar.hybrid.assistant import best
+from trunkline.ar.hybrid.assistant import surest
 from trunkline.ar.hybrid.outcomes import Holding
 from trunkline.ar.hybrid.rates import wilson
 from trunkline.ar.hybrid.rollout_batch import PlanPreview, interruptible, joined, offsets_of
 from trunkline.ar.hybrid.rollouts import Piece
+from trunkline.ar.hybrid.tip_uncertainty import BaseAlignment, TipUncertainty
 from trunkline.ar.hybrid.uncertainty import nominal_sample
 from trunkline.twin.discrepancy import Discrepancy
 
@@ -156,7 +157,12 @@ def test_it_is_asked_before_each_piece_and_after_the_last_whether_to_go_on(after
     [([3, 1, 2], [0.5, 0.5, 0.5], 1), ([3, 1, 2], [0.9, 0.5, 0.5], 0), ([3, 1, 2], [0.9, 0.5, 0.9], 2), ([1], [0], 0)],
 )
 def test_the_assistant_takes_the_surest_place_and_of_equals_the_nearest(offsets, shares, place):
-    assert best(np.outer(offsets, [0.0, 0.01, 0.0]), np.array(shares)) == place
+    assert surest(np.outer(offsets, [0.0, 0.01, 0.0]), np.array(shares))[0] == place
+
+
+def test_the_assistants_places_come_with_the_surest_first():
+    offsets = np.outer([3, 1, 2, 4], [0.0, 0.01, 0.0])
+    assert surest(offsets, np.array([0.5, 0.25, 0.5, 0.75])).tolist() == [3, 2, 0, 1]
 
 
 @pytest.mark.parametrize(("off", "holds"), [(0.5, False), (np.nextafter(0.5, 0), True)])
@@ -200,7 +206,8 @@ def test_what_the_model_lacks_widens_the_radius_about_the_nominal_tip(offset):
     tips[:, :, 0] = 0.01
     lacking = Discrepancy(np.array([[offset, 0.0, 0.0]]), 16)
     believed = replace(piece(), mount=np.zeros((1, FRAMES, 3)) + [0.0, 0.0, 0.5])
-    drawn = offsets_of(lacking, np.zeros(2), believed, 2, 0)
+    tip = TipUncertainty(lacking, np.zeros(2), np.zeros(3), BaseAlignment(0.0, 0.0), np.eye(3))
+    drawn = offsets_of(tip, believed, 2, 0)
     result = PlanPreview(believed, piece(tips, (True, True)), nominal_sample(), None, drawn)
     np.testing.assert_array_equal(result.stated.tips, 0.0)
     expected = np.quantile(np.linalg.norm(drawn + [0.01, 0, 0], axis=2), 0.9)

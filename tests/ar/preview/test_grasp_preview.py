@@ -39,12 +39,12 @@ class Grip:
 class Tried:
     """What `preview` and `try_places` were called with, in place of any physics."""
 
-    def __init__(self, monkeypatch, probability, shares):
+    def __init__(self, monkeypatch, probability, shares, again=None):
         self.previewed, self.places = [], []
         monkeypatch.setattr(grasp_preview, "compose_twin", lambda *arguments: arguments)
         monkeypatch.setattr(grasp_preview, "preview", self._preview)
         monkeypatch.setattr(grasp_preview, "try_places", self._try)
-        self._probability, self._shares = probability, shares
+        self._probability, self._shares, self._again = probability, shares, shares if again is None else again
 
     def _preview(self, twin, way, doubts, holding, count, seed, go_on):
         self.previewed.append((way, holding, count, seed))
@@ -52,12 +52,15 @@ class Tried:
 
     def _try(self, twin, way, doubts, holding, offsets, count, seed, go_on):
         self.places.append((way, holding, offsets, count, seed))
-        return np.array(self._shares)
+        away = PLACES - (np.array(MOUNT) - CUP.position)
+        at = [int(np.abs(away - offset).sum(axis=1).argmin()) for offset in offsets]
+        return np.array(self._shares if len(self.places) == 1 else self._again)[at]
 
 
-def grasped(monkeypatch, probability, shares=(0.0, 0.0, 0.0), **settings):
-    """What is foreseen of a grasp whose futures hold with this `probability`, the places' with these `shares`."""
-    tried, grip = Tried(monkeypatch, probability, shares), Grip()
+def grasped(monkeypatch, probability, shares=(0.0, 0.0, 0.0), again=None, **settings):
+    """What is foreseen of a grasp whose futures hold with this `probability`, the places' with these `shares`, and with
+    those of `again` where they are tried once more."""
+    tried, grip = Tried(monkeypatch, probability, shares, again), Grip()
     robot_model = SimpleNamespace(uncertainty=GraspUncertainty(), lean=lambda hangs: None)
     made = GraspPreviewer(robot_model, {"hanging": grip}, replace(SETTINGS, **settings))
     asked = replace(targets(MOUNT, CUP.position), object=CUP.name)
@@ -98,23 +101,41 @@ def test_of_places_that_hold_as_surely_the_nearest_to_the_users_is_offered(monke
 
 
 @pytest.mark.parametrize(
+    ("again", "place", "probability"),
+    [
+        ((0.5, 0.75, 1.0), 1, 0.75),  # the third was not among the best two, so nobody asks it again
+        ((0.7, 0.6, 0.0), 0, 0.7),
+        ((0.5, 0.5, 1.0), None, None),
+    ],
+)
+def test_what_is_offered_is_as_sure_as_it_was_when_it_was_tried_once_more(monkeypatch, again, place, probability):
+    """Of few futures of many places the best seems surer than it is."""
+    (_, last), tried, _ = grasped(monkeypatch, 0.5, (1.0, 0.75, 0.5), again)
+    assert len(tried.places[1][2]) == 2
+    assert (last.offer and last.offer.probability) == probability
+    if place is not None:
+        assert last.offer.rigid == pytest.approx(tuple(np.array(CUP.position) + PLACES[place]))
+
+
+@pytest.mark.parametrize(
     ("probability", "assistant", "asked"), [(0.89, 2, True), (0.9, 2, False), (1.0, 2, False), (0.0, 0, False)]
 )
 def test_it_is_asked_where_a_grasp_is_not_sure_to_hold_and_there_is_one(monkeypatch, probability, assistant, asked):
     foreseen, tried, _ = grasped(monkeypatch, probability, (1.0, 1.0, 1.0), assistant=assistant)
     assert len(foreseen) == 1 + asked
-    assert len(tried.places) == asked
+    assert len(tried.places) == 2 * asked
 
 
 def test_places_are_tried_as_the_plan_is_with_other_futures(monkeypatch):
     """From where the arm closes on, and until it has held for a while; about the middle of what is grasped."""
     _, tried, grip = grasped(monkeypatch, 0.0)
-    ((way, holding, count, seed),), ((same, again, offsets, few, other),) = tried.previewed, tried.places
-    assert way is same
+    ((way, holding, count, seed),), ((same, again, offsets, few, other), last) = tried.previewed, tried.places
+    assert way is same is last[0]
+    assert (last[1], last[3]) == (holding, SETTINGS.futures)
+    assert len({seed, other, last[4]}) == 3
     assert holding == again == Holding(PLAN.duration - 1.0, SETTINGS.sag, SETTINGS.slip, SETTINGS.lifted)
     assert way.duration == pytest.approx(PLAN.duration - 1.0 + SETTINGS.hold)
     assert (count, few) == (SETTINGS.futures, SETTINGS.assistant)
-    assert other != seed
     np.testing.assert_allclose(offsets, PLACES - (np.array(MOUNT) - CUP.position))
     np.testing.assert_allclose(grip.turned[1], np.array(MOUNT) - CUP.position)
     assert grip.turned[2] == CUP.diameter

@@ -42,6 +42,7 @@ from trunkline.pipeline.config import PROJECT, load_folder
 from trunkline.twin.discrepancy import Discrepancy, Lacking
 
 FUTURES = 3
+REST = 1.0  # s of an arm without branches: as futures that hold something
 
 
 @cache
@@ -56,7 +57,7 @@ def made() -> PreviewPlanner:
     grasping = Grasping(rigid, OFFSET, s.commands, grips, config().handling)
     bends = lambda poses: {k: v - 0.5 + s.commands if k != "tip" else v for k, v in NETWORK.ask(poses).items()}  # noqa: E731
     planner = Planner(rigid, replace(NETWORK, ask=bends), s.commands, LIMITS, OFFSET, step=0.01, grasping=grasping)
-    robot_model = RobotModel(spec, GraspUncertainty(contact=Contact()), robot)
+    robot_model = RobotModel(spec, GraspUncertainty(contact=Contact()), robot, live.preview.alignment)
     return PreviewPlanner(planner, GraspPreviewer(robot_model, grips, replace(live.preview, futures=FUTURES)), s.bodies)
 
 
@@ -81,7 +82,7 @@ def test_a_plan_then_its_preview_in_pieces_then_the_batch():
     frames = np.cumsum([0] + [len(piece.poses) for piece in pieces])
     assert [piece.first for piece in pieces] == list(frames[:-1])
     assert abs(frames[-1] * begun.preview.step - begun.preview.duration) < 2 * begun.preview.step
-    assert begun.preview.duration == pytest.approx(planned.plan.duration + made().previewing.hold, abs=0.02)
+    assert begun.preview.duration == pytest.approx(planned.plan.duration + REST, abs=0.02)
     poses = np.concatenate([piece.poses for piece in pieces])
     assert np.isfinite(poses).all()
     mount = simulation().bodies.index("base")
@@ -296,7 +297,7 @@ def test_where_no_body_is_shown_nothing_is_simulated_to_be_shown():
     assert unseen == prediction
     assert piece.last
     assert len(piece.poses) == 0
-    assert begun.preview.duration == pytest.approx(planned.plan.duration + made().previewing.hold, abs=0.02)
+    assert begun.preview.duration == pytest.approx(planned.plan.duration + REST, abs=0.02)
 
 
 @pytest.mark.parametrize("tip", [TIP, (0.5, 0.1, -0.6)], ids=["a plan", "a refusal"])

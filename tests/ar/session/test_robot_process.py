@@ -15,6 +15,7 @@ from tests.support.small_arm import small_spec
 from trunkline.ar.hybrid.rollout_batch import joined, nominal
 from trunkline.ar.hybrid.rollouts import CommandTrajectory
 from trunkline.ar.hybrid.settings import HybridModelSettings
+from trunkline.ar.hybrid.tip_uncertainty import BaseAlignment
 from trunkline.ar.hybrid.uncertainty import GraspUncertainty
 from trunkline.ar.preview.preview_twin import RobotModel, compose_twin
 from trunkline.ar.preview.world_model import make_world
@@ -55,7 +56,8 @@ def simulation():
     )
     spec = small_spec()
     arm = spec.compile()
-    straight, robot_model = arm.tendon_length0[arm.actuator_trnid[:, 0]], RobotModel(spec, GraspUncertainty(), robot)
+    straight = arm.tendon_length0[arm.actuator_trnid[:, 0]]
+    robot_model = RobotModel(spec, GraspUncertainty(), robot, BaseAlignment(0.0, 0.0))
     twin = compose_twin(robot_model, make_world(()), None, SEARCH, straight, live.preview)
     limits, offset = limits_of(config().motors), config().mount_offset
     return Simulation(twin, SEARCH, straight, drawn_bodies(twin.model), limits, PACKAGE, offset)

@@ -1,5 +1,8 @@
 """The assistant: a few places of the mount near the user's own, tried in one batch.
 
+Of many places tried in few futures, the best seems surer than it is. So the best few are tried once more, in futures of
+their own and as many as of a plan: by these one is chosen, and these are its probability.
+
 A mount that is elsewhere, turned alike, is an object that is elsewhere the other way. So one composed model and one
 plan serve all places, each with the same futures: places differ by what they are, not by their luck.
 """
@@ -38,7 +41,6 @@ def try_places(
     return holding.holds(motion).reshape(places, count).mean(axis=1)
 
 
-def best(offsets: np.ndarray, shares: np.ndarray) -> int:
-    """The place that holds most surely, the nearest to the plan's own among equals."""
-    away = np.linalg.norm(offsets, axis=1)
-    return int(np.lexsort((away, -shares))[0])
+def surest(offsets: np.ndarray, shares: np.ndarray) -> np.ndarray:
+    """The places, the surest first, the nearest to the plan's first among equals. Shape (P,)."""
+    return np.lexsort((np.linalg.norm(offsets, axis=1), -shares))

@@ -14,11 +14,11 @@ import numpy as np
 from trunkline.ar.hybrid.outcomes import Criterion
 from trunkline.ar.hybrid.rates import wilson
 from trunkline.ar.hybrid.rollouts import FRAME, CommandTrajectory, ComposedTwin, Piece, rollouts
+from trunkline.ar.hybrid.tip_uncertainty import TipUncertainty
 from trunkline.ar.hybrid.uncertainty import GraspUncertainty, PosteriorSamples, nominal_sample, sample
-from trunkline.twin.discrepancy import Discrepancy
 
 WITHIN = 0.9  # share of futures whose tips are within the spread
-OFFSETS = 100  # draws of what the model lacks for each future: a quantile of a dozen is none
+OFFSETS = 100  # draws of where the tip rests for each future: a quantile of a dozen is none
 CONTACT = "the arm touches something, and in no trial did it"
 EVERY = 0.1  # s between the times at which a spread is stated
 
@@ -42,8 +42,8 @@ class PlanPreview:
         motion: of the B futures.
         samples: what each future has.
         success: which of them hold the object, or do what else was asked; None if nobody asked. Shape (B,).
-        offsets: of the tip by what the model lacks, draws for each future; None where that is unknown. Shape (B, D, 3).
-        unknown: why it is unknown; "" where it is known.
+        offsets: of the tip beside the futures', draws for each; None where they are unknown. Shape (B, D, 3).
+        unknown: why they are unknown; "" where they are known.
     """
 
     nominal: Piece
@@ -107,7 +107,7 @@ def preview(
     seed: int = 0,
     show: Callable[[Piece], None] = lambda piece: None,
     go_on: Callable[[], None] = lambda: None,
-    lacking: tuple[Discrepancy, np.ndarray] | str = CONTACT,
+    tip: TipUncertainty | str = CONTACT,
 ) -> PlanPreview:
     """Try a plan in `count` futures.
 
@@ -115,8 +115,7 @@ def preview(
         holding: what is asked of the plan; None where nothing is grasped.
         show: called with each piece of the nominal motion, before any future is simulated.
         go_on: called before each piece, and after the last; what it raises ends the preview.
-        lacking: what the model lacks, with how far gravity and cables move the tip at the plan's end, m, (2,); or why
-            that is unknown.
+        tip: by how far it may be elsewhere at the plan's end, beside what is drawn; or why that is unknown.
     """
     begun, samples = [], sample(uncertainty, twin.arm, count, seed)
     for piece in interruptible(nominal(twin, trajectory), go_on):
@@ -124,16 +123,16 @@ def preview(
         begun.append(piece)
     motion = joined(list(interruptible(rollouts(twin, trajectory, samples), go_on)))
     success, believed = holding.holds(motion) if holding is not None else None, joined(begun)
-    if isinstance(lacking, str):
-        return PlanPreview(believed, motion, samples, success, None, lacking)
-    return PlanPreview(believed, motion, samples, success, offsets_of(*lacking, believed, count, seed), "")
+    if isinstance(tip, str):
+        return PlanPreview(believed, motion, samples, success, None, tip)
+    return PlanPreview(believed, motion, samples, success, offsets_of(tip, believed, count, seed), "")
 
 
-def offsets_of(lacking: Discrepancy, ways: np.ndarray, believed: Piece, count: int, seed: int) -> np.ndarray:
-    """OFFSETS draws for each of `count` futures, across the line from mount to tip where the nominal motion ends, m.
-    Their own generator leaves the draws of everything else as they are. Shape (count, OFFSETS, 3)."""
-    arm = believed.tip[0, -1] - believed.mount[0, -1]
-    drawn = lacking.offsets(ways[None], arm[None], count * OFFSETS, np.random.default_rng([seed, OFFSETS]))
+def offsets_of(tip: TipUncertainty, believed: Piece, count: int, seed: int) -> np.ndarray:
+    """OFFSETS draws for each of `count` futures, where the nominal motion ends, m. Their own generator leaves the draws
+    of everything else as they are. Shape (count, OFFSETS, 3)."""
+    rng = np.random.default_rng([seed, OFFSETS])
+    drawn = tip.offsets(believed.mount[0, -1], believed.tip[0, -1], count * OFFSETS, rng)
     return drawn.reshape(count, OFFSETS, 3)
 
 

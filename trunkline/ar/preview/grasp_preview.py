@@ -6,10 +6,11 @@ and the object as the nominal preview of its grasp left them, and end when the a
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from trunkline.ar.hybrid.assistant import best, try_places
+from trunkline.ar.hybrid.assistant import surest, try_places
 from trunkline.ar.hybrid.grasp_poses import Grip
 from trunkline.ar.hybrid.outcomes import Holding, RestCriterion
 from trunkline.ar.hybrid.rollout_batch import PlanPreview, preview
@@ -24,6 +25,7 @@ from trunkline.ar.teleop.plan import Plan
 from trunkline.frames import rotation_from_wxyz
 
 NOWHERE = (0.0, 0.0, 0.0)
+FINALISTS = 2  # places that the assistant tries once more
 
 
 @dataclass(frozen=True)
@@ -108,22 +110,24 @@ class GraspPreviewer:
         return PlanPrediction(preview(twin, trajectory, uncertainty, resting, s.futures, seed, go_on=go_on), begins)
 
     def free(
-        self, twin: ComposedTwin, trajectory: CommandTrajectory, seed: int, go_on: Callable[[], None] = lambda: None
+        self,
+        twin: ComposedTwin,
+        trajectory: CommandTrajectory,
+        hangs: np.ndarray | None,
+        seed: int,
+        go_on: Callable[[], None] = lambda: None,
     ) -> PlanPrediction:
-        """Futures of which nothing is asked but where the tip goes. `go_on`: as `preview`."""
-        lacking = self.robot_model.lacking_at(trajectory.joints[-1], trajectory.commands[-1])
+        """Futures of which nothing is asked but where the tip goes. `hangs`, `go_on`: as of `grasp`."""
+        tip = self.robot_model.tip_uncertainty(trajectory, hangs)
         uncertainty, futures = self.robot_model.uncertainty, self.settings.futures
         return PlanPrediction(
-            preview(twin, trajectory, uncertainty, None, futures, seed, go_on=go_on, lacking=lacking), 0.0
+            preview(twin, trajectory, uncertainty, None, futures, seed, go_on=go_on, tip=tip), 0.0
         )
 
-    def whole(self, plan: Plan) -> CommandTrajectory:
-        """All of a plan, held for a while at its end where it has phases."""
-        return (
-            self.trajectory_from(plan, plan.phases[0][0])[0]
-            if plan.phases
-            else CommandTrajectory(plan.step, plan.joints, plan.commands)
-        )
+    def whole(self, plan: Plan, grasps: bool) -> CommandTrajectory:
+        """All of a plan, then held as futures are that grasp or bring something, else at least until the arm rests."""
+        s = self.settings
+        return self._held(plan, 0, s.hold if grasps else max(s.hold, self.robot_model.rest_time))
 
     def carrying(
         self,
@@ -141,11 +145,17 @@ class GraspPreviewer:
 
     def trajectory_from(self, plan: Plan, first: str) -> tuple[CommandTrajectory, float]:
         """The plan from the phase `first` on, held for a while at its end, and when that phase begins, s."""
-        row, more = dict(plan.phases)[first], round(self.settings.hold / plan.step)
+        row = dict(plan.phases)[first]
+        return self._held(plan, row, self.settings.hold), plan.step * row
+
+    @staticmethod
+    def _held(plan: Plan, row: int, hold: float) -> CommandTrajectory:
+        """The plan from `row` on, held for `hold` s at its end."""
+        more = round(hold / plan.step)
         joints, commands = (
             np.concatenate([rows[row:], np.tile(rows[-1], (more, 1))]) for rows in (plan.joints, plan.commands)
         )
-        return CommandTrajectory(plan.step, joints, commands), plan.step * row
+        return CommandTrajectory(plan.step, joints, commands)
 
     def _offer(
         self,
@@ -161,13 +171,13 @@ class GraspPreviewer:
         s, centre = self.settings, np.array(grip_of(object))
         mount = np.array(targets.rigid.position) - centre
         places = self.grips[way_of_grasping(object)].near(_rotation(targets), mount, object.diameter)
-        shares = try_places(
-            twin, trajectory, self.robot_model.uncertainty, holding, places - mount, s.assistant, seed + 1, go_on
-        )
-        chosen = best(places - mount, shares)
+        tried = partial(try_places, twin, trajectory, self.robot_model.uncertainty, holding)
+        few = places[surest(places - mount, tried(places - mount, s.assistant, seed + 1, go_on))[:FINALISTS]]
+        shares = tried(few - mount, s.futures, seed + 2, go_on)
+        chosen = surest(few - mount, shares)[0]
         if shares[chosen] <= probability:
             return None
-        x, y, z = (float(value) for value in centre + places[chosen])
+        x, y, z = (float(value) for value in centre + few[chosen])
         return Offer(object.name, (x, y, z), targets.pointing, float(shares[chosen]))
 
 

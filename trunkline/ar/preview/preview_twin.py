@@ -1,6 +1,7 @@
 """The twin that plans are tried on: the identified arm on the Panda, the world as the client believes it, an object."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -8,8 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from trunkline.ar.hybrid.compose import Placed, compose, panda_joints
 from trunkline.ar.hybrid.objects import GraspObject
-from trunkline.ar.hybrid.rollouts import ComposedTwin
+from trunkline.ar.hybrid.rollouts import CommandTrajectory, ComposedTwin
 from trunkline.ar.hybrid.string import hang
+from trunkline.ar.hybrid.tip_uncertainty import BaseAlignment, Hanging, TipUncertainty
 from trunkline.ar.hybrid.uncertainty import Contact, GraspUncertainty
 from trunkline.ar.hybrid.worlds import SupportSurface
 from trunkline.ar.hybrid.worlds import WorldGeometry as Room
@@ -25,39 +27,54 @@ from trunkline.model.simulation.rest import settle
 from trunkline.report.certificate.arms import arm_of
 from trunkline.report.certificate.poses import StaticPoses
 from trunkline.twin import package
-from trunkline.twin.discrepancy import Discrepancy, Lacking
+from trunkline.twin.discrepancy import Lacking
 from trunkline.twin.twin import Twin
 
 GRAVITY = np.array([[0.0, 0.0, -STANDARD_GRAVITY]])  # m/s², where the arm hangs straight down
 
 LEANS = 4  # times that it is corrected: each leaves a tenth or less
+CREEP = 0.01  # share of the way to rest that may be left
 
 
 @dataclass(frozen=True)
 class RobotModel:
-    """What the package says. uncertainty: about the arm's parameters, contacts and places. lacking: what the model
-    lacks beside them, None where nobody knows."""
+    """What the package says. uncertainty: about the arm's parameters, contacts and places. alignment: of the frame in
+    which it is shown. lacking: what the model lacks beside them, None where nobody knows."""
 
     arm: mujoco.MjSpec
     uncertainty: GraspUncertainty
     robot: PandaRobot
+    alignment: BaseAlignment
     lacking: Lacking | None = None
 
-    def lacking_at(self, joints: np.ndarray, commands: np.ndarray) -> tuple[Discrepancy, np.ndarray] | str:
-        """What the model lacks, with how far gravity and cables move its tip, m, (2,), at rest at `joints` (7,), rad,
-        and `commands` (K,), m, without a load; or why that is unknown."""
+    @cached_property
+    def rest_time(self) -> float:
+        """Time, s, in which the arm creeps to rest but for a hundredth of the way: its slowest branch's."""
+        model = self.arm.copy().compile()
+        times = [model.dof_damping[part.branch] / model.tendon_stiffness[part.tendon]
+                 for part in ArmModel(model).branches]  # fmt: skip
+        return float(-np.log(CREEP) * np.max([time.max(initial=0.0) for time in times], initial=0.0))
+
+    def tip_uncertainty(self, trajectory: CommandTrajectory, hangs: np.ndarray | None) -> TipUncertainty | str:
+        """By how far its tip may be elsewhere, at rest without a load where a trajectory ends; or why that is unknown.
+        hangs: where the straight arm's tip was seen where the trajectory begins, in the base frame, (3,), m."""
         if self.lacking is None:
             return "no trial at rest was held out, or the package is of an earlier release"
-        flange = mount_pose(joints[None], self.robot.mount_offset)[1][0]
-        gravity = (flange @ np.diag([1.0, -1.0, -1.0])).T @ GRAVITY[0]
+        places, bases = _base_frames(trajectory.joints[[0, -1]], self.robot.mount_offset)
+        base, commands = bases[-1], trajectory.commands[-1]
+        gravity = base.T @ GRAVITY[0]
         arm = arm_of(self.arm.copy().compile())
         order = ArmModel(arm.model).actuators
         pulls = np.maximum(arm.chain.straight_lengths - commands[order], 0)
         beyond = self.lacking.beyond(pulls, float(np.degrees(tilt_of_gravity(gravity))))
         if beyond:
             return beyond
-        ways = arm.ways(StaticPoses(gravity[None], commands[None][:, order]))[0]
-        return (self.lacking.discrepancy, ways) if np.isfinite(ways).all() else "the twin does not come to rest there"
+        pose = StaticPoses(gravity[None], commands[None][:, order])
+        ways, friction = arm.ways(pose)[0], base @ arm.friction(pose)[0]
+        if not np.isfinite(ways).all():
+            return "the twin does not come to rest there"
+        hanging = None if hangs is None else Hanging(hangs, places[0], bases[0])
+        return TipUncertainty(self.lacking.discrepancy, ways, friction, self.alignment, base, hanging)
 
     def lean(self, hangs: np.ndarray | None) -> Rotation | None:
         """How the arm is turned on its mount, by the least turns, so that its tip, straight down, comes to rest in the
@@ -85,7 +102,7 @@ def robot_model_of(settings: Previewing, files: dict[str, bytes]) -> RobotModel:
     if not isinstance(robot, PandaRobot):
         raise InputError(f"package: found a robot of kind {robot.kind}, expected panda: plans move that")
     twin = Twin.of_package(files)
-    return RobotModel(twin.spec, GraspUncertainty(contact, twin.posterior), robot, twin.lacking)
+    return RobotModel(twin.spec, GraspUncertainty(contact, twin.posterior), robot, settings.alignment, twin.lacking)
 
 
 def compose_twin(
@@ -139,8 +156,8 @@ def _start(
     lean: Rotation,
 ) -> np.ndarray:
     """The composed model's pose (nq,) with the arm at rest."""
-    flange = mount_pose(joints[None], mount_offset)[1][0]
-    gravity = lean.inv().apply((flange @ np.diag([1.0, -1.0, -1.0])).T @ GRAVITY[0])
+    base = _base_frames(joints[None], mount_offset)[1][0]
+    gravity = lean.inv().apply(base.T @ GRAVITY[0])
     rest = settle(arm, commands[None], gravity).qpos[0]
     pose = model.qpos0.copy()
     pose[model.jnt_qposadr[panda_joints(model)]] = joints
@@ -149,6 +166,13 @@ def _start(
         if name:
             pose[model.joint(name).qposadr[0]] = rest[arm.jnt_qposadr[number]]
     return pose
+
+
+def _base_frames(joints: np.ndarray, mount_offset: float) -> tuple[np.ndarray, np.ndarray]:
+    """Origins (N, 3), m, and rotations (N, 3, 3) of the arm's base frame at `joints` (N, 7), rad: its y and z are
+    opposite to the flange's."""
+    places, flanges = mount_pose(joints, mount_offset)
+    return places, flanges @ np.diag([1.0, -1.0, -1.0])
 
 
 def _upright(quaternion: Quaternion) -> Quaternion:

@@ -5,6 +5,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from trunkline.ar.hybrid.tip_uncertainty import BaseAlignment
 from trunkline.ar.hybrid.worlds import Material
 
 Positive = Annotated[float, Field(gt=0, le=100)]
@@ -27,5 +28,6 @@ class Previewing:
     friction: Share
     place: Annotated[list[Share], Field(min_length=3, max_length=3)]
     turn_deg: Zero
+    alignment: BaseAlignment
     material: Material
     string: Positive

@@ -167,7 +167,7 @@ class PreviewPlanner:
             return
         digest = plan.digest()
         yield PlanAnswer(PlanReport(serial, digest, "", plan.package, plan.world), plan)
-        way = self.foresight.whole(plan)
+        way = self.foresight.whole(plan, bool(request.targets.object))
         twin = cache(partial(self._twin_of, order, way))
         if self.bodies:
             twin()  # a preview's time begins once it is composed
@@ -243,7 +243,7 @@ class PreviewPlanner:
                 plan, targets, held_object, order.world, order.hangs, self._grasped, serial, go_on
             )
         else:
-            yield self.foresight.free(twin(), way, serial, go_on)
+            yield self.foresight.free(twin(), way, order.hangs, serial, go_on)
 
 
 class InlinePreviewer:
