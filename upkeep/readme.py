@@ -288,7 +288,8 @@ def preview_table(preview: dict | None, goals: dict[str, Limit]) -> str:
     inside = [f"{count} of {runs}" for count, runs in counts]
     off = [_number(lookup(preview, f"tip_error_radii.{name}.median")) for name in times]
     stated = [_goal(goals.get(f"preview.coverage.{n}.share"), lookup(preview, f"coverage.{n}.share")) for n in times]
-    what = f"reach: with nothing in the way, the tip ends within a radius ({radius}, median) in 9 of 10 cases: {', '.join(times.values())}"
+    what = f"reach: with nothing in the way, the tip ends within a radius ({radius}, median) in 9 of 10 cases: "
+    what += ", ".join(times.values())
     came = f"{' / '.join(inside)}; it is {' / '.join(off)} radii off, median"
     lines.append(f"| {what} | {came} | {_joined(stated)} |")
     likelier, previews = lookup(preview, "agreed"), lookup(preview, "previews")

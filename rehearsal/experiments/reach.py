@@ -116,7 +116,7 @@ def tips_after(session: RehearsedSession, plan: Plan) -> dict[str, np.ndarray]:
     Raises:
         InputError: it does not run the plan.
     """
-    robot, tips, held = session.executor, {}, 0.0
+    robot, tips, waited = session.executor, {}, 0.0
     refused = robot.start(plan, plan.digest())
     while not refused and robot.state().mode != "done":
         robot.permit()
@@ -125,6 +125,6 @@ def tips_after(session: RehearsedSession, plan: Plan) -> dict[str, np.ndarray]:
     if refused:
         raise InputError(f"plan: {refused}, expected what the robot has run before")
     for name, seconds in LATER.items():
-        session.robot.advance(seconds - held)
-        tips[name], held = session.in_client_frame(session.robot.truth().tip), seconds
+        session.robot.advance(seconds - waited)
+        tips[name], waited = session.in_client_frame(session.robot.truth().tip), seconds
     return tips

@@ -64,8 +64,8 @@ class TipUncertainty:
         lacking = self.discrepancy.offsets(self.ways[None], (tip - mount)[None], draws, rng)[:, 0]
         rubbing = rng.uniform(-1, 1, (draws, 1)) * self.friction
         shift, turn = self.alignment.draw(draws, rng)
-        seen = shift + np.cross(turn, tip)
+        shown = shift + np.cross(turn, tip)
         if self.hanging is not None:
             lean = self.hanging.lean_errors(shift, turn)
-            seen = seen - np.cross(lean, (tip - mount) @ self.rotation) @ self.rotation.T
-        return lacking + rubbing + seen
+            shown = shown - np.cross(lean, (tip - mount) @ self.rotation) @ self.rotation.T
+        return lacking + rubbing + shown

@@ -127,7 +127,7 @@ class GraspPreviewer:
     def whole(self, plan: Plan, grasps: bool) -> CommandTrajectory:
         """All of a plan, then held as futures are that grasp or bring something, else at least until the arm rests."""
         s = self.settings
-        return self._held(plan, 0, s.hold if grasps else max(s.hold, self.robot_model.rest_time))
+        return self._extended(plan, 0, s.hold if grasps else max(s.hold, self.robot_model.rest_time))
 
     def carrying(
         self,
@@ -146,10 +146,10 @@ class GraspPreviewer:
     def trajectory_from(self, plan: Plan, first: str) -> tuple[CommandTrajectory, float]:
         """The plan from the phase `first` on, held for a while at its end, and when that phase begins, s."""
         row = dict(plan.phases)[first]
-        return self._held(plan, row, self.settings.hold), plan.step * row
+        return self._extended(plan, row, self.settings.hold), plan.step * row
 
     @staticmethod
-    def _held(plan: Plan, row: int, hold: float) -> CommandTrajectory:
+    def _extended(plan: Plan, row: int, hold: float) -> CommandTrajectory:
         """The plan from `row` on, held for `hold` s at its end."""
         more = round(hold / plan.step)
         joints, commands = (
