@@ -331,7 +331,7 @@ def test_what_previews_state_stands_beside_what_came_true_and_its_goal():
     goals = {"preview.coverage.at_end.share": Limit(better="higher", goal=0.9)}
     goals |= {"preview.agreement": Limit(min=0.95), "preview.path_pct_median": Limit(better="lower", goal=1.5)}
     _, _, radius, holds, path = preview_table(preview, goals).splitlines()
-    what = "| reach: with nothing in the way, the tip ends within a radius (2.3 mm, median) in 9 of 10 cases: at the end, 2 "
+    what = "| reach: with nothing in the way, the tip ends within a radius (2.3 mm, median) in 9 of 10 cases: "
     assert radius.startswith(what)
     came = "3 of 42 / 1 of 42 / 0 of 42; it is 1 / 3 / 4 radii off, median"
     assert radius.endswith(f"10 s later | {came} | ≥ 0.9 (missed) / – / – |")
