@@ -15,7 +15,6 @@ from rehearsal.robot.stand_in import StandInRobot
 from trunkline.ar.preview.grasp_preview import GraspPreviewer, PlanPrediction
 from trunkline.ar.preview.package import Package
 from trunkline.ar.session.controller import SessionController
-from trunkline.ar.session.messages import PredictionMessage
 from trunkline.ar.session.previewer import InlinePreviewer, PreviewPlanner
 from trunkline.ar.session.robot_process import DEAD_MAN, RobotState
 from trunkline.ar.teleop.config import TeleoperationConfig
@@ -128,9 +127,7 @@ class RehearsedSession:
     ) -> None:
         self.package, self.config, self.robot, self.hands, self.place = package, config, robot, hands, place
         self.planner = PreviewPlanner(package.planner(config), foresight, ())
-        self.previewer = InlinePreviewer(
-            self.planner.answers, lambda order: judged and bool(order.request.targets.object)
-        )
+        self.previewer, self.judged = InlinePreviewer(self.planner.answers), judged
         self.executor = RehearsedRobot(robot, package, self.planner.planner.limits, config.mount_offset)
         core = Teleoperation(config.core, package.reach, package.digest, config.mount_offset)
         lift, period = config.handling.lift, package.period
@@ -155,13 +152,6 @@ class RehearsedSession:
     def prediction(self) -> PlanPrediction | None:
         """Of the newest plan, where its batch has been rolled out."""
         return self.planner.prediction
-
-    def predict(self) -> PredictionMessage | None:
-        """What a page tells of where the tip of the newest plan goes, which grasps nothing; None where there is no
-        plan."""
-        self.previewer.predict()
-        self.controller.poll(self.now)
-        return self.controller.prediction
 
     def frame(self) -> View:
         """Let a frame pass."""
@@ -188,7 +178,7 @@ class RehearsedSession:
         view = View(self.now, intent, self.in_client_frame(self.place(self.now)), tip, None, controller.world)
         if intent.mode in ("preview", "ready", "delay"):
             view.previewed = self.previewed
-            if controller.prediction is not None:
+            if controller.prediction is not None and self.judged:
                 view.probability, view.offer = controller.prediction.probability, controller.prediction.offer
         return view
 

@@ -33,7 +33,7 @@ def reach(bench: Bench, seed: int) -> Staged:
         return failure(ending, frames, least, radius)
 
     def watch(result: Result, ending: Ending, frames: list[SessionFrame]) -> None:
-        foreseen = session.predict() if ending.done and bench.judged else None
+        foreseen = session.controller.prediction if ending.done and bench.judged else None
         plan, last = session.controller.plan, executed(frames)
         if foreseen is not None and plan is not None and last is not None:
             alone = bench.session(operator, None, seed, lambda now: object)

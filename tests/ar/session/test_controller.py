@@ -457,6 +457,28 @@ def test_what_runs_is_still_known_where_its_preview_breaks_off_meanwhile(session
     assert controller._believed == plan.digest()
 
 
+def test_a_plan_is_ready_only_once_its_preview_states_how_sure_it_is(session):
+    answers, late = session.planning._answers, []
+
+    def but_the_prediction(order):
+        every = list(answers(order))
+        late.extend(every[-1:])
+        return iter(every[:-1])
+
+    session.planning._answers = but_the_prediction
+    session.aimed()
+    session.right = {"grip": 1.0, "trigger": 1.0}
+    session.until(lambda intent: intent.mode == "preview")
+    session.right = {"grip": 1.0}
+    session.wait(PREVIEW + 0.1)
+    assert session.controller.preview_shown(session.controller.intent.preview, session.now) == ""
+    session.wait(1.0)
+    assert session.controller.intent.mode == "preview"
+    assert isinstance(late[0], PredictionAnswer)
+    session.controller.answered(late[0], session.now)
+    session.until(lambda intent: intent.mode == "ready", 0.1)
+
+
 def let_go(session):
     session.left, session.right = {}, {}
     session.wait(0.1)

@@ -276,17 +276,12 @@ def test_an_order_that_is_left_goes_no_further():
         next(answers)
 
 
-@pytest.mark.parametrize("at_once", [True, False])
-def test_in_line_the_same_is_answered_and_the_batch_when_it_is_asked_for(at_once):
-    expected = list(made().answers(order(7)))
-    inline = InlinePreviewer(made().answers, lambda order: at_once)
+def test_in_line_the_same_is_answered_at_once():
+    inline = InlinePreviewer(made().answers)
     inline.submit(order(7))
-    first = inline.poll()
-    inline.predict()
-    then = inline.poll()
-    assert [type(answer) for answer in first + then] == [type(answer) for answer in expected]
-    assert (first + then)[-1] == expected[-1]
-    assert [isinstance(answer, PredictionAnswer) for answer in then] == ([] if at_once else [True])
+    first, expected = inline.poll(), list(made().answers(order(7)))
+    assert [type(answer) for answer in first] == [type(answer) for answer in expected]
+    assert first[-1] == expected[-1]
     assert inline.poll() == []
 
 
@@ -298,15 +293,3 @@ def test_where_no_body_is_shown_nothing_is_simulated_to_be_shown():
     assert piece.last
     assert len(piece.poses) == 0
     assert begun.preview.duration == pytest.approx(planned.plan.duration + REST, abs=0.02)
-
-
-@pytest.mark.parametrize("tip", [TIP, (0.5, 0.1, -0.6)], ids=["a plan", "a refusal"])
-def test_in_line_the_batch_of_an_older_order_is_left(tip):
-    planner = PreviewPlanner(made().planner, made().foresight, ())
-    inline = InlinePreviewer(planner.answers, lambda order: order.request.serial == 2)
-    inline.submit(order(1))
-    inline.submit(order(2, tip=tip))
-    newest, _ = planner.prediction, inline.poll()
-    inline.predict()
-    assert inline.poll() == []
-    assert planner.prediction is newest

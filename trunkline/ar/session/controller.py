@@ -210,9 +210,10 @@ class SessionController:
             left, right = hands.left, hands.right
             if self._stop:
                 left, self._stop = replace(left, secondary=True), False
+            shown = self._shown_digest if self.prediction is not None else ""  # without what it states, none is ready
             core_input = Input(
-                hands.stamp, left, right, self.alignment, joints, self.world, self.core.package, self.report,
-                self._shown_digest, executor, offer,
+                hands.stamp, left, right, self.alignment, joints, self.world, self.core.package, self.report, shown,
+                executor, offer,
             )  # fmt: skip
             self.state, intent = self.core.step(self.state, core_input, dt / len(steps))
             self._ask(intent, robot_state)

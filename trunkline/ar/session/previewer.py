@@ -247,26 +247,14 @@ class PreviewPlanner:
 
 
 class InlinePreviewer:
-    """A `Previewer` in the caller's process: the same `answers`, all there at the next poll. Where an order is not
-    `predicted`, its batch is rolled out once `predict` asks for it."""
+    """A `Previewer` in the caller's process: the same `answers`, all there at the next poll."""
 
-    def __init__(
-        self,
-        answers: Callable[[Order | FollowRequest], Iterator[Answer]],
-        predicted: Callable[[Order], bool] = lambda order: True,
-    ) -> None:
-        self._answers, self._predicted = answers, predicted
+    def __init__(self, answers: Callable[[Order | FollowRequest], Iterator[Answer]]) -> None:
+        self._answers = answers
         self._ready: list[Answer | None] = []
-        self._later: Iterator[Answer] = iter(())
 
     def submit(self, order: Order | FollowRequest) -> None:
-        answers, self._later = self._answers(order), iter(())
-        waits = isinstance(order, FollowRequest) or self._predicted(order)
-        for answer in answers:
-            self._ready.append(answer)
-            if not waits and isinstance(answer, PreviewPiece) and answer.last:
-                self._later = answers
-                return
+        self._ready += self._answers(order)
 
     def leave(self) -> None:
         """Nothing goes on by itself here."""
@@ -274,10 +262,6 @@ class InlinePreviewer:
     def poll(self) -> list[Answer | None]:
         answers, self._ready = self._ready, []
         return answers
-
-    def predict(self) -> None:
-        """What was not rolled out of the plan that was ordered last is answered at the next poll."""
-        self._ready += self._later
 
 
 def prediction_message(
