@@ -54,6 +54,14 @@ def test_of_a_frame_that_is_shifted_a_lean_that_was_seen_in_it_takes_what_is_acr
     assert rms(drawn) == pytest.approx(0.003 / np.sqrt(3), rel=0.02)
 
 
+def test_a_straight_arm_is_where_it_was_seen_in_a_frame_that_is_turned_as_well_but_for_its_length():
+    hanging = Hanging(TIP - MOUNT, MOUNT, np.eye(3))
+    drawn = offsets(alignment=BaseAlignment(0.003, 0.5), hanging=hanging)
+    along = (TIP - MOUNT) / np.linalg.norm(TIP - MOUNT)
+    np.testing.assert_allclose(drawn, (drawn @ along)[:, None] * along, atol=1e-12)
+    assert rms(drawn) > 0.002
+
+
 def test_where_the_arm_is_turned_half_round_since_the_shift_counts_twice():
     half = Rotation.from_rotvec([0.0, 0.0, np.pi]).as_matrix()
     tip = np.array([0.0, 0.0, -0.4])

@@ -117,6 +117,14 @@ def test_what_is_offered_is_as_sure_as_it_was_when_it_was_tried_once_more(monkey
         assert last.offer.rigid == pytest.approx(tuple(np.array(CUP.position) + PLACES[place]))
 
 
+def test_of_places_that_seem_as_sure_the_nearest_two_are_tried_once_more(monkeypatch):
+    _, tried, _ = grasped(monkeypatch, 0.2, (0.8, 0.8, 0.8))
+    (_, _, offsets, _, _), (_, _, few, _, _) = tried.places
+    away = np.linalg.norm(offsets, axis=1)
+    np.testing.assert_allclose(few, offsets[np.argsort(away)[:2]])
+    assert away.argmax() != 2, "a sort by shares alone would leave out the third"
+
+
 @pytest.mark.parametrize(
     ("probability", "assistant", "asked"), [(0.89, 2, True), (0.9, 2, False), (1.0, 2, False), (0.0, 0, False)]
 )
