@@ -202,14 +202,14 @@ def test_where_what_the_model_lacks_is_unknown_no_radius_is_stated():
 
 @pytest.mark.parametrize("offset", [0.001, 0.05])
 def test_what_the_model_lacks_widens_the_radius_about_the_nominal_tip(offset):
-    tips = np.zeros((2, FRAMES, 3))
-    tips[:, :, 0] = 0.01
+    at = np.array([0.3, -0.2, 0.1])
+    tips = np.zeros((2, FRAMES, 3)) + at + [0.01, 0.0, 0.0]
     lacking = Discrepancy(np.array([[offset, 0.0, 0.0]]), 16)
-    believed = replace(piece(), mount=np.zeros((1, FRAMES, 3)) + [0.0, 0.0, 0.5])
+    believed = piece(np.zeros((1, FRAMES, 3)) + at, mount=np.zeros((1, FRAMES, 3)) + at + [0.0, 0.0, 0.5])
     tip = TipUncertainty(lacking, np.zeros(2), np.zeros(3), BaseAlignment(0.0, 0.0), np.eye(3))
     drawn = offsets_of(tip, believed, 2, 0)
     result = PlanPreview(believed, piece(tips, (True, True)), nominal_sample(), None, drawn)
-    np.testing.assert_array_equal(result.stated.tips, 0.0)
+    np.testing.assert_array_equal(result.stated.tips, [at] * len(result.stated.tips))
     expected = np.quantile(np.linalg.norm(drawn + [0.01, 0, 0], axis=2), 0.9)
     np.testing.assert_allclose(result.stated.radii, expected)
     assert expected > 1.2 * offset
