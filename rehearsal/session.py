@@ -130,7 +130,7 @@ class RehearsedSession:
         self.previewer, self.judged = InlinePreviewer(self.planner.answers), judged
         self.executor = RehearsedRobot(robot, package, self.planner.planner.limits, config.mount_offset)
         core = Teleoperation(config.core, package.reach, package.digest, config.mount_offset)
-        lift, period = config.handling.lift, package.period
+        lift, period = config.handling.least_lift, package.period
         self.controller = SessionController(core, self.executor, self.previewer, world, lift, period=period)
         self.controller.control(REFERENCE)
         self.previewed: np.ndarray | None = None

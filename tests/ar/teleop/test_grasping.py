@@ -74,6 +74,42 @@ def test_a_grasp_comes_from_the_side_closes_and_lifts(planner):
     np.testing.assert_allclose(closed, [config().hanging.pull, *opened[1:]], atol=1e-9)
 
 
+class Low(RigidIK):
+    """A rigid robot that reaches up to `ceiling` m."""
+
+    ceiling = 0.0
+
+    def solve(self, start, mount, *turned):
+        if mount[2] > self.ceiling + 1e-9:
+            raise InputError(f"out of reach: {mount[2]:.3f} m")
+        return super().solve(start, mount, *turned)
+
+
+@pytest.mark.parametrize(("room", "lift"), [(0.2, 0.1), (0.1, 0.1), (0.099, 0.09), (0.07, 0.07), (0.06, 0.06)])
+def test_a_grasp_lifts_as_high_as_the_rigid_robot_reaches(planner, room, lift):
+    rigid = Low(OFFSET)
+    rigid.ceiling = MOUNT[2] + room
+    low = replace(planner, grasping=replace(planner.grasping, rigid=rigid))
+    plan = low.plan(request(BALL, MOUNT), world(BALL), START, STRAIGHT)
+    mounts = mount_pose(plan.joints, OFFSET)[0]
+    np.testing.assert_allclose(mounts[-1] - MOUNT, [0, 0, lift], atol=1e-3)
+    whole = planner.plan(request(BALL, MOUNT), world(BALL), START, STRAIGHT)
+    assert plan.duration <= whole.duration, "no slower for less"
+
+
+def test_what_it_could_lift_no_higher_than_the_least_is_refused(planner):
+    rigid = Low(OFFSET)
+    rigid.ceiling = MOUNT[2] + HANDLING.least_lift - 0.001
+    low = replace(planner, grasping=replace(planner.grasping, rigid=rigid))
+    with pytest.raises(InputError, match=f"out of reach: {MOUNT[2] + HANDLING.least_lift:.3f} m"):
+        low.plan(request(BALL, MOUNT), world(BALL), START, STRAIGHT)
+
+
+def test_a_least_lift_above_the_highest_is_refused():
+    with pytest.raises(ValueError, match="least_lift: found 0.2 m, expected at most lift, 0.1 m"):
+        replace(HANDLING, least_lift=0.2)
+
+
 def test_a_tip_that_is_seen_beside_the_bending_plane_is_made_up_for(planner):
     plan = planner.plan(request(BALL, MOUNT), world(BALL), START, STRAIGHT, beside=0.01)
     at = mount_pose(plan.joints[[dict(plan.phases)["curl"]]], OFFSET)[0][0]

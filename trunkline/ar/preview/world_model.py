@@ -20,7 +20,7 @@ def update_world(world: World, pose: np.ndarray, phases: Collection[str], lift: 
     """The world with its one object seen at `pose` (7,), NaN where nothing is seen.
 
     Args:
-        phases: of a plan that has just been run to its end, none else. lift: m by which a grasp lifts.
+        phases: of a plan that has just been run to its end, none else. lift: m by which a grasp lifts at least.
     """
     if len(world.objects) != 1 or not np.isfinite(pose).all():
         return world

@@ -74,7 +74,8 @@ def make(
     log_writer = LogWriterProcess(new_path(Path(config.journal.folder)), subject, config.journal.period)
     robot = robot_of(simulation, hardware)
     core = Teleoperation(teleop.core, package.reach, package.digest, teleop.mount_offset)
-    controller = SessionController(core, robot, previewer, world, teleop.handling.lift, log_writer, package.period)
+    lift = teleop.handling.least_lift
+    controller = SessionController(core, robot, previewer, world, lift, log_writer, package.period)
     controller.begin(config.rate, __version__)
     log_writer.await_begun()
     return SessionParts(controller, package.digest, drawing, Shells.of(maps), robot, previewer, log_writer)

@@ -73,7 +73,7 @@ class HandInput:
 
 
 class SessionController:
-    """One robot, one core. `lift`: m by which an object is lifted by a grasp. `log_writer`: of the session.
+    """One robot, one core. `lift`: m by which a grasp lifts at least. `log_writer`: of the session.
     `period`: s, of the arm's slowest vibration mode."""
 
     def __init__(

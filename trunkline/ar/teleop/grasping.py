@@ -1,5 +1,7 @@
 """The legs of a grasp and of a hand-over: what all ten axes do one after the other, each from rest to rest."""
 
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -18,6 +20,7 @@ from trunkline.frames import rotation_from_wxyz
 from trunkline.kinematics.panda.kinematics import mount_pose
 
 UP = np.array([0.0, 0.0, 1.0])
+LIFTS = 5  # that are tried, from the highest on
 Seconds = Annotated[float, Field(ge=0, le=30)]
 Metres = Annotated[float, Field(gt=0, le=1)]
 Mass = Annotated[float, Field(ge=0, le=20)]
@@ -28,15 +31,16 @@ class Handling:
     """How objects are grasped and brought elsewhere.
 
     close: s, at least, for the cables to close. calm: s for which all waits before it and after it.
-    lift: m. carry: m/s, of the mount with something in the arm, on the average. above: m over its place from which a
-    object comes down. open: s, at least, in which the arm opens while the mount rises. beneath: m, at most, that a
-    object may fall as it is let go. payload: of each shape, rows of diameter, m, and the heaviest mass, kg, that is
-    grasped, linear between.
+    lift: m, where the rigid robot reaches so high, else less, down to least_lift. carry: m/s, of the mount with
+    something in the arm, on the average. above: m over its place from which a object comes down. open: s, at least, in
+    which the arm opens while the mount rises. beneath: m, at most, that a object may fall as it is let go. payload: of
+    each shape, rows of diameter, m, and the heaviest mass, kg, that is grasped, linear between.
     """
 
     close: Seconds
     calm: Seconds
     lift: Metres
+    least_lift: Metres
     carry: Metres
     above: Metres
     open: Seconds
@@ -44,6 +48,8 @@ class Handling:
     payload: dict[Shape, Annotated[list[tuple[Metres, Mass]], Field(min_length=1, max_length=50)]]
 
     def __post_init__(self):
+        if self.least_lift > self.lift:
+            raise ValueError(f"least_lift: found {self.least_lift} m, expected at most lift, {self.lift} m")
         for name, rows in self.payload.items():
             diameters = [diameter for diameter, _ in rows]
             if diameters != sorted(set(diameters)):
@@ -115,13 +121,25 @@ class Grasping:
         come = at(joints, placement.come)
         there = at(come, placement.mount)
         sunk = at(there, placement.mount - placement.sink * UP)
-        up = h.lift + placement.sink
+        lift, lifted = self._highest(lambda lift: at(sunk, placement.mount + lift * UP))
         return [
             Leg("approach", come, opened, gravity, still),
             Leg("approach", there, opened, gravity, still, calm=h.calm),
             Leg("curl", sunk, closed, seconds=h.close, calm=h.calm),
-            Leg("lift", at(sunk, placement.mount + h.lift * UP), closed, seconds=up / h.carry, gentle=True),
+            Leg("lift", lifted, closed, seconds=(lift + placement.sink) / h.carry, gentle=True),
         ]
+
+    def _highest(self, at: Callable[[float], np.ndarray]) -> tuple[float, np.ndarray]:
+        """The highest of LIFTS lifts, m, that the rigid robot reaches, and its joints (7,), rad, there.
+
+        Raises:
+            InputError: of the lowest, if it reaches none.
+        """
+        *higher, least = np.linspace(self.handling.lift, self.handling.least_lift, LIFTS)
+        for lift in higher:
+            with suppress(InputError):
+                return float(lift), at(lift)
+        return float(least), at(least)
 
     def placement(self, targets: Targets, object: WorldObject) -> GraspPose:
         """Of the user's own targets."""
