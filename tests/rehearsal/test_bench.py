@@ -97,7 +97,7 @@ def test_what_was_stated_of_a_reach_is_told_where_it_was_done(monkeypatch, done,
     """And where anybody looks at previews."""
     stated = SimpleNamespace(spread=(0.004,), times=(0.0,), tip=((0.0, 0.0, 0.0),))
     session = SimpleNamespace(
-        predict=lambda: stated, controller=SimpleNamespace(plan=SimpleNamespace(duration=1.0)),
+        controller=SimpleNamespace(plan=SimpleNamespace(duration=1.0), prediction=stated),
         in_client_frame=lambda tip: tip + [0.0, 0.0, 0.01],
     )
     monkeypatch.setattr(reaches, "tips_after", lambda alone, plan: {"after_2s": np.array([0.0, 0.003, 0.0])})

@@ -359,19 +359,19 @@ def test_which_intervals_of_the_demo_session_hold_the_truth():
         "mount_tilt_y": False,
         "rest_bend_x": True,
         "rest_bend_y": True,
-        "rest_gradient_x": True,
-        "rest_gradient_y": True,
+        "rest_gradient_x": False,
+        "rest_gradient_y": False,
         "damping": False,
         "relaxation": None,  # the lab's arm has three branches, the model two
         "relaxation_time": None,
         "relaxation_2": None,
         "relaxation_time_2": None,
         "kp": True,
-        "kv": False,
+        "kv": True,
         "time_constant": True,
-        "dead_time": True,
-        "force_range": False,
-        "capstan_friction": True,
+        "dead_time": False,
+        "force_range": True,
+        "capstan_friction": False,
     }
 
 
