@@ -110,3 +110,13 @@ def test_what_a_command_moves_is_along_the_surface_and_its_normal_is_across(chai
     lost = np.full_like(normal, np.nan)
     assert np.isnan(across_surface(chain, commands, gravity, lost)).all()
     assert position_of(drawn.targets).shape == normal.shape
+
+
+def test_beyond_the_session_s_pulls_where_the_tip_comes_is_in_doubt(model, chain, drawn):
+    """All are 1 % and more of the length off; without a doubt of the network's, those within say nothing."""
+    far = score(model, chain, drawn, Shifted(model, chain, 0.02 * chain.length), pulls=np.inf)
+    assert (far["beyond_1pct"], far["beyond_1pct_unsaid"], far["doubted"]) == (12, 12, 0.0)
+    pulls = np.maximum(chain.straight_lengths - exact(chain)(drawn.targets)["commands"], 0).sum(axis=1)
+    half = score(model, chain, drawn, Shifted(model, chain, 0.02 * chain.length), pulls=float(np.sort(pulls)[5]))
+    assert (half["beyond_1pct"], half["beyond_1pct_unsaid"], half["doubted"]) == (12, 6, 0.5)
+    assert half["within"]["beyond_1pct_unsaid"] == 6

@@ -42,7 +42,8 @@ def score_on_plant(
     """The network's commands on the arm itself, for `targets`, and for tips at which the arm itself rests under the
     `commands` of these ("own_surface"; turned as the twin's).
 
-    Each of all targets, and "within": where the commands' pulls add up to no more than in the session.
+    Each of all targets, and "within": where the commands' pulls add up to no more than in the session. Beyond, where the
+    tip is counts as doubted: a package has what its session went up to, and previews say so.
 
     Args:
         ask: the network, targets to its answer.
@@ -74,6 +75,7 @@ def _score(chain: Chain, ask: Ask, targets: np.ndarray, reach, most: float) -> d
     end.rested = np.isfinite(tips).all(axis=1)
     across = across_surface(chain, answer["commands"], gravity_of(targets), tips - position_of(targets))
     within = np.maximum(pulls, 0).sum(axis=1) <= most
+    end.doubtful = end.doubtful | ~within
     summary = _summary(end, across, chain.length)
     return summary | {"within": _summary(end[within], across[within], chain.length) if within.any() else {"targets": 0}}
 
