@@ -222,3 +222,57 @@ def test_what_is_followed_is_held_against_it_too(aimed):
     there = mount + joint_positions(CHAIN, rest.qpos)[0][-1] @ (flange * [1, -1, -1]).T
     assert sought(planner, asked, READY, about(there)) == (None, "world: the arm would come into the table")
     assert sought(planner, None, READY, about(there)) == (None, "")
+
+
+# --- a reach ends along the tip's axis, from as far back as the way is free
+
+
+class Short(RigidIK):
+    """Of a robot that comes no further back than `short` m from `there`, joints as they are in any case."""
+
+    def __init__(self, there: np.ndarray, short: float):
+        super().__init__(OFFSET)
+        self.there, self.short = there, short
+
+    def solve(self, joints, mount, pointing, heading):
+        if np.linalg.norm(np.array(mount) - self.there) > self.short:
+            raise InputError("out of reach: the rigid robot comes no nearer")
+        return super().solve(joints, mount, pointing, heading)
+
+
+def advancing(planner: Planner, asked: Targets) -> Plan:
+    return replace(planner, advance=0.06).plan(Request(1, asked, "world", "package"), World("world"), READY, STRAIGHT)
+
+
+def test_a_reach_ends_along_the_axis_of_the_tip(aimed):
+    plan = advancing(*aimed)
+    assert [name for name, _ in plan.phases] == ["approach", "curl", "advance"]
+    begin = dict(plan.phases)["advance"]
+    np.testing.assert_allclose(plan.commands[begin:], np.tile(plan.commands[-1], (len(plan.commands) - begin, 1)))
+    mounts, flanges = mount_pose(plan.joints[[begin, -1]], OFFSET)
+    rest = actuated(CHAIN, plan.commands[-1:], gravity_in_base(0.0))
+    *_, last, tip = joint_positions(CHAIN, rest.qpos)[0] @ (flanges[-1] * [1, -1, -1]).T
+    np.testing.assert_allclose(mounts[1] - mounts[0], 0.06 * (tip - last) / np.linalg.norm(tip - last), atol=1e-3)
+    plain = aimed[0].plan(Request(1, aimed[1], "world", "package"), World("world"), READY, STRAIGHT)
+    np.testing.assert_allclose(mounts[1], mount_pose(plain.joints[-1:], OFFSET)[0][0], atol=1e-3)
+    np.testing.assert_allclose(plan.commands[-1], plain.commands[-1])
+
+
+@pytest.mark.parametrize(("short", "back"), [(0.05, 0.03), (0.02, 0.0)])
+def test_where_the_robot_comes_less_far_back_so_does_the_reach(aimed, short, back):
+    planner, asked = aimed
+    there = mount_pose(advancing(planner, asked).joints[-1:], OFFSET)[0][0]
+    plan = advancing(replace(planner, rigid=Short(there, short)), asked)
+    assert ("advance" in dict(plan.phases)) == (back > 0)
+    begin = dict(plan.phases).get("advance", len(plan.joints) - 1)
+    mounts, _ = mount_pose(plan.joints[[begin, -1]], OFFSET)
+    assert np.linalg.norm(mounts[1] - mounts[0]) == pytest.approx(back, abs=1e-3)
+
+
+def test_a_solid_in_the_way_of_an_advance_leaves_the_reach_without(aimed, monkeypatch):
+    def checked(plan, *_):
+        if "advance" in dict(plan.phases):
+            raise InputError("world: the arm would come into the table")
+
+    monkeypatch.setattr("trunkline.ar.teleop.planner.check_plan", checked)
+    assert [name for name, _ in advancing(*aimed).phases] == ["approach", "curl"]

@@ -15,7 +15,7 @@ from trunkline.settings import settings
 @settings
 class TeleoperationConfig:
     """`hanging`, `basket`: how what hangs and what has a handle is grasped. `mount_offset`: m, from the Panda's flange
-    to the soft arm's mount."""
+    to the soft arm's mount. `advance`: m, the last part of a reach, along the tip's axis; 0 for none."""
 
     core: Teleop
     motors: MotorLimits
@@ -24,3 +24,4 @@ class TeleoperationConfig:
     hanging: SideSettings
     basket: SideSettings
     mount_offset: Annotated[float, Field(ge=0, le=0.5)]
+    advance: Annotated[float, Field(ge=0, le=0.3)]

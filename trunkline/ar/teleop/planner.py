@@ -1,6 +1,7 @@
 """From targets to a plan: rigid inverse kinematics, the network, jerk-limited ways, shaped, and what forbids them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +17,9 @@ from trunkline.ar.teleop.tendons import Network, bend
 from trunkline.ar.teleop.trajectory import JOINTS, MotionLimits, gentle, point_to_point
 from trunkline.ar.teleop.vectors import DOWN, Vector, add, conjugate, rotate, subtract
 from trunkline.errors import InputError
+from trunkline.frames import STANDARD_GRAVITY, rotation_from_wxyz
 from trunkline.model.statics.chain import Chain
+from trunkline.model.statics.equilibria import actuated
 
 # The shaper for the arm's swings: of a gravity direction (3,) in its base frame, the commands at the end (K,), and by
 # how much they change (K,), m; `trunkline.ar.teleop.vibration` has it of a MuJoCo model.
@@ -27,7 +30,8 @@ ShaperOf = Callable[[np.ndarray, np.ndarray, np.ndarray], Shaper]
 class Planner:
     """What plans are made with. `straight`: commands that leave the arm straight, m, (K,). `tolerance`: m, how far
     from its target the tip may be foreseen. `step`: s, between a plan's rows. `chain`: the arm's statics, by which the
-    network's answers are corrected, and no obstacle may be in the arm's way. `grasping`: how objects are grasped."""
+    network's answers are corrected, and no obstacle may be in the arm's way. `grasping`: how objects are grasped.
+    `advance`: m, the last part of a reach, along the tip's axis, of an arm with a `chain`."""
 
     rigid: RigidIK
     network: Network
@@ -39,12 +43,14 @@ class Planner:
     shaper: ShaperOf | None = None
     chain: Chain | None = None
     grasping: Grasping | None = None
+    advance: float = 0.0
 
     def plan(
         self, request: Request, world: World, joints: np.ndarray, commands: np.ndarray, beside: float = 0.0
     ) -> Plan:
-        """From rest at `joints` (7,), rad, and `commands` (K,), m: approach with a straight arm and curl; of an object
-        that the tip target marks, approach, curl and lift; of one that the arm holds, transfer and release.
+        """From rest at `joints` (7,), rad, and `commands` (K,), m: approach with a straight arm, curl, and advance, so
+        that the tip comes first to what is at its target; of an object that the tip target marks, approach, curl and
+        lift; of one that the arm holds, transfer and release.
 
         Args:
             beside: m, by which the straight arm's tip is seen beside the bending plane (`Grasping.grasp`).
@@ -53,8 +59,15 @@ class Planner:
             InputError: beginning with what forbids it: limit, self-collision, out of reach, gravity, world, payload,
                 grasp or release.
         """
+        *better, last = self._ways(request.targets, world, joints, commands, beside)
+        for legs in better:
+            with suppress(InputError):
+                return self._along(legs, request, world, joints, commands)
+        return self._along(last, request, world, joints, commands)
+
+    def _along(self, legs: list[Leg], request: Request, world: World, joints: np.ndarray, commands: np.ndarray) -> Plan:
         rows, phases = [np.append(joints, commands)[None]], []
-        for leg in self._legs(request.targets, world, joints, commands, beside):
+        for leg in legs:
             here, end = rows[-1][-1], np.append(leg.joints, leg.commands)
             profile = gentle if leg.gentle else point_to_point
             way = profile(here, end, self.limits, self.step, leg.seconds)
@@ -69,19 +82,41 @@ class Planner:
         check_plan(plan, world, self.mount_offset, self.chain)
         return plan
 
-    def _legs(
+    def _ways(
         self, targets: Targets, world: World, joints: np.ndarray, commands: np.ndarray, beside: float
-    ) -> list[Leg]:
+    ) -> Iterator[list[Leg]]:
+        """The legs of each way there, the best first."""
         if targets.object:
             object = world.object(targets.object)
             if self.grasping is None:
                 raise InputError(f"grasp: found no way of grasping {object.name}, expected a planner that has one")
             if object.support == "held":
-                return self.grasping.bring(targets, object, world, joints, commands)
-            return self.grasping.grasp(targets, object, joints, beside)
-        there, curled = self.goal(targets, joints)
+                yield self.grasping.bring(targets, object, world, joints, commands)
+            else:
+                yield self.grasping.grasp(targets, object, joints, beside)
+            return
+        mount, curled = self._curled(targets)
+        there = self._solve(joints, mount, targets)
         gravity = np.array(_soft_target(targets)[1])
-        return [Leg("approach", there, self.straight, gravity), Leg("curl", there, curled, gravity)]
+        for back in self._stand_offs(targets, curled):
+            with suppress(InputError):
+                here = self._solve(joints, add(mount, back), targets)
+                yield [
+                    Leg("approach", here, self.straight, gravity),
+                    Leg("curl", here, curled, gravity),
+                    Leg("advance", self._solve(here, mount, targets), curled, gravity, np.zeros(len(curled))),
+                ]
+        yield [Leg("approach", there, self.straight, gravity), Leg("curl", there, curled, gravity)]
+
+    def _stand_offs(self, targets: Targets, curled: np.ndarray) -> list[Vector]:
+        """From where the mount advances, seen from where it goes, m: back along the axis of the tip at rest under the
+        commands `curled` (K,)."""
+        if self.chain is None or not self.advance:
+            return []
+        rest = actuated(self.chain.smooth, curled[None], STANDARD_GRAVITY * np.array(_soft_target(targets)[1]))
+        x, y, z = (float(value) for value in -rotation_from_wxyz(rest.quaternion[0]).apply(DOWN))
+        turn = base_quaternion(targets.pointing, targets.heading)
+        return [rotate(turn, (part * x, part * y, part * z)) for part in (self.advance, self.advance / 2)]
 
     def goal(self, targets: Targets, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Joints (7,), rad, the nearest to `joints`, and commands (K,), m, that bring mount and tip to their targets.
@@ -90,7 +125,10 @@ class Planner:
             InputError: beginning with what forbids it, as `plan`.
         """
         mount, curled = self._curled(targets)
-        return self.rigid.solve(joints, mount, targets.pointing, targets.heading), curled
+        return self._solve(joints, mount, targets), curled
+
+    def _solve(self, start: np.ndarray, mount: Vector, targets: Targets) -> np.ndarray:
+        return self.rigid.solve(start, mount, targets.pointing, targets.heading)
 
     def _curled(self, targets: Targets) -> tuple[Vector, np.ndarray]:
         """Where the mount goes, m, and the commands (K,) that then bring the tip to its target.
