@@ -47,7 +47,7 @@ def repetitions(request) -> Repetitions:
     for _ in range(REPETITIONS):
         experiments = [prepare(measured(trial, rng), model, FRAMES) for trial in clean]
         problem = Problem(model, experiments, markers_of(model), bounds, "positions", WEIGHTS)
-        result = descend(problem, exact + rng.normal(0, 0.02, len(exact)), 12, 1e-6, lambda best: None)
+        result = descend(problem, exact + rng.normal(0, 0.02, len(exact)), 24, 1e-6, lambda best: None)
         assert result.converged
         around = surrogate(problem, result.vector)
         errors.append(result.vector - exact)
