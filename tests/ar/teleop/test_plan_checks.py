@@ -189,15 +189,20 @@ def bending(pull: np.ndarray) -> Network:
     return Network(ask, 8)
 
 
-@pytest.fixture(scope="module")
-def aimed():
+def aim(pull: np.ndarray) -> tuple[Planner, Targets]:
     """A planner of that arm, and targets that its bend reaches with the mount near where it is."""
-    made = Planner(RigidIK(OFFSET), bending(PULL), STRAIGHT, limits_of(config().motors), OFFSET, step=STEP, chain=CHAIN)
+    network = bending(pull)
+    made = Planner(RigidIK(OFFSET), network, STRAIGHT, limits_of(config().motors), OFFSET, step=STEP, chain=CHAIN)
     (mount,), (flange,) = mount_pose(READY[None], OFFSET)
     turn = base_quaternion(DOWN, 0.0)
-    tip = add(tuple(map(float, mount)), rotate(turn, tuple(map(float, bending(PULL).ask(np.zeros((1, 8)))["tip"][0]))))
+    tip = add(tuple(map(float, mount)), rotate(turn, tuple(map(float, network.ask(np.zeros((1, 8)))["tip"][0]))))
     asked = Targets(Target(tuple(map(float, mount))), Target(tip), DOWN, 0.0, 0, 0.0)
     return made, asked
+
+
+@pytest.fixture(scope="module")
+def aimed():
+    return aim(PULL)
 
 
 def test_a_planner_that_knows_the_arm_refuses_a_plan_that_leads_it_into_a_solid(aimed):
@@ -244,7 +249,9 @@ def advancing(planner: Planner, asked: Targets) -> Plan:
     return replace(planner, advance=0.06).plan(Request(1, asked, "world", "package"), World("world"), READY, STRAIGHT)
 
 
-def test_a_reach_ends_along_the_axis_of_the_tip(aimed):
+@pytest.mark.parametrize("pull", [PULL, PULL / 2, PULL[[1, 0, 2]] / 3])
+def test_a_reach_ends_along_the_axis_of_the_tip(pull):
+    aimed = aim(pull)
     plan = advancing(*aimed)
     assert [name for name, _ in plan.phases] == ["approach", "curl", "advance"]
     begin = dict(plan.phases)["advance"]
@@ -256,6 +263,12 @@ def test_a_reach_ends_along_the_axis_of_the_tip(aimed):
     plain = aimed[0].plan(Request(1, aimed[1], "world", "package"), World("world"), READY, STRAIGHT)
     np.testing.assert_allclose(mounts[1], mount_pose(plain.joints[-1:], OFFSET)[0][0], atol=1e-3)
     np.testing.assert_allclose(plan.commands[-1], plain.commands[-1])
+    assert [name for name, _ in plain.phases] == ["approach", "curl"]
+
+
+def test_of_an_arm_without_statics_the_tips_axis_is_not_known(aimed):
+    planner, asked = aimed
+    assert [name for name, _ in advancing(replace(planner, chain=None), asked).phases] == ["approach", "curl"]
 
 
 @pytest.mark.parametrize(("short", "back"), [(0.05, 0.03), (0.02, 0.0)])
