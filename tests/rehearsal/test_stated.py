@@ -96,6 +96,12 @@ def test_how_many_radii_the_tip_is_off_is_told_at_each_time():
     assert metrics["radius_mm"]["median"] == 2.0
 
 
+def test_how_far_off_the_tip_was_beside_the_object_is_of_reaches_that_have_it():
+    rows = [reach(2.0, 1.0, touching_mm=off) for off in (3.0, NAN, 5.0, 10.0)]
+    assert scores(rows)["touching_mm"] == {"median": 5.0}
+    assert "touching_mm" not in scores(rows[1:2])
+
+
 @pytest.mark.parametrize(("rows", "keys"), [
     ([], set()),
     ([grasp(True, NAN, NAN)], set()),

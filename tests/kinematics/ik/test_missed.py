@@ -79,6 +79,12 @@ def test_what_did_not_rest_is_counted_as_a_share():
     assert "seconds_to_rest" not in scores
 
 
+def test_some_of_the_targets_keep_whether_they_rested():
+    some = reached([0.001, 0.002, 0.003], rested=[True, False, True])[[1, 2]]
+    assert some.rested is not None and some.rested.tolist() == [False, True]
+    assert Reached(np.zeros(2), np.zeros(2, bool), np.zeros(2))[[1]].rested is None
+
+
 def test_of_rest_that_nobody_looked_at_nothing_is_said():
     """As of an arm on which a rig sends commands and gives back tips."""
     scores = Reached(np.zeros(2), np.zeros(2, bool), np.full(2, np.nan)).metrics(LENGTH)
