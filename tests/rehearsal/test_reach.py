@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rehearsal.experiments.bench import SessionFrame
-from rehearsal.experiments.reach import WITHIN, failure, is_clean, tell_end, tips_after
+from rehearsal.experiments.reach import failure, is_clean, tell_end, tips_after
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending
 from rehearsal.session import Session
@@ -79,15 +79,19 @@ def test_the_first_contact_decides_who_has_reached(ending, frames, cause):
     assert failure(ending, frames, TIP, RADIUS) == cause
 
 
+PLACE = np.array([0.0, 0.5, -0.25])  # of the object, m
+
+
 def at(x: float, **touched) -> SessionFrame:
-    return frame(tip=np.array([x, 0.0, 0.0]), **touched)
+    """With the tip x m beside PLACE."""
+    return frame(tip=PLACE + [x, 0.0, 0.0], **touched)
 
 
 @pytest.mark.parametrize(("frames", "clean"), [
-    ([at(1.0), at(WITHIN)], True),
-    ([at(WITHIN), at(1.0)], True),
-    ([at(WITHIN, object={TIP: FORCE, UNITS - 1: FORCE})], True),
-    ([at(np.nextafter(WITHIN, 1))], False),
+    ([at(1.0), at(0.02)], True),
+    ([at(0.02), at(1.0)], True),
+    ([at(0.02, object={TIP: FORCE, UNITS - 1: FORCE})], True),
+    ([at(np.nextafter(0.02, 1))], False),
     ([at(1.0, object={TIP: FORCE})], False),
     ([at(np.nan)], False),
     ([], False),
@@ -101,7 +105,7 @@ def at(x: float, **touched) -> SessionFrame:
     ([at(0.0), at(0.0, world={0: NAN})], False),
 ])  # fmt: skip
 def test_a_clean_reach_is_near_and_touches_nothing_else(frames, clean):
-    assert is_clean(frames, np.zeros(3), TIP) is clean
+    assert is_clean(frames, PLACE, TIP) is clean
 
 
 def test_how_far_the_tip_ends_from_where_it_was_said_to_is_told_in_mm():
