@@ -81,7 +81,8 @@ def test_what_did_not_rest_is_counted_as_a_share():
 
 def test_some_of_the_targets_keep_whether_they_rested():
     some = reached([0.001, 0.002, 0.003], rested=[True, False, True])[[1, 2]]
-    assert some.rested is not None and some.rested.tolist() == [False, True]
+    assert some.rested is not None
+    assert some.rested.tolist() == [False, True]
     assert Reached(np.zeros(2), np.zeros(2, bool), np.zeros(2))[[1]].rested is None
 
 
