@@ -42,8 +42,8 @@ def score_on_plant(
     """The network's commands on the arm itself, for `targets`, and for tips at which the arm itself rests under the
     `commands` of these ("own_surface"; turned as the twin's).
 
-    Each of all targets, and "within": where the commands' pulls add up to no more than in the session. Beyond, where the
-    tip is counts as doubted: a package has what its session went up to, and previews say so.
+    Each of all targets, and "within": where the commands' pulls add up to no more than in the session. Beyond, where
+    the tip is counts as doubted: a package has what its session went up to, and previews say so.
 
     Args:
         ask: the network, targets to its answer.
