@@ -9,7 +9,7 @@ import json
 import re
 import shutil
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise, zip_longest
 from pathlib import Path
@@ -101,7 +101,11 @@ RESULTS = {
             "… to the twin with friction, sent at once",
             as_sent("as_controls.friction", "as_controls.friction.targets"),
         ),
-        ("… to the simulated lab's arm", as_sent("on_plant", "on_plant.targets")),
+        (
+            "… to the simulated lab's arm; beside the network's warnings that the pulls go beyond the session's",
+            as_sent("on_plant", "on_plant.targets"),
+        ),
+        ("… share of these targets with a warning", (Shown("on_plant.doubted"),)),
         (
             "… pulling by no more in all than in the session's trials at rest",
             as_sent("on_plant.within", "on_plant.within.targets"),
@@ -457,17 +461,30 @@ def _family_rows(root: Path) -> list[str]:
 
 
 def _command_row(root: Path) -> str:
-    """Tip errors of the network's commands on the twin, and on the simulated lab's arm, where they are worse."""
-    metrics, cells = _metrics(root, "train_ik"), []
-    for at, targets in (("as_controls.frictionless", "as_controls.targets"), ("on_plant", "on_plant.targets")):
+    """Tip errors of the network's commands on the twin without and with friction, and on the simulated lab's arm, where
+    they are worse."""
+    metrics = _metrics(root, "train_ik")
+
+    def sent(at: str, targets: str) -> str:
         *errors, silent = as_sent(at, targets)
-        tip = " / ".join(_number(lookup(metrics, figure.key)) for figure in errors)
         counts = f"{_number(lookup(metrics, silent.key))} of {_number(lookup(metrics, targets))}"
-        cells.append(f"{tip} mm; {counts} targets missed by more than 1 % of length without a warning")
-    within = " / ".join(_number(lookup(metrics, figure.key)) for figure in both("on_plant.within.position_error_mm"))
-    cells[1] += f"; {within} mm where it pulls by no more than in the session"
-    what = "Tip error of the network's commands, median / 95th percentile"
-    return f"| {what} | on the twin, without friction: {cells[0]} | **on the simulated lab's arm: {cells[1]}** |"
+        return f"{_pair_of(metrics, errors)} mm, {counts}"
+
+    twin = sent("as_controls.frictionless", "as_controls.targets")
+    rubbing = sent("as_controls.friction", "as_controls.friction.targets")
+    band = _pair_of(_metrics(root, "fk_dataset"), both("friction_band_mm"))
+    arm = f"{sent('on_plant', 'on_plant.targets')} (a warning at {_percent(lookup(metrics, 'on_plant.doubted'))})"
+    within = f"{sent('on_plant.within', 'on_plant.within.targets')} where it pulls by no more than in the session"
+    what = "Tip error of the network's commands, median / 95th percentile, and missed by more than 1 % of length without a "
+    what += "warning"
+    return (
+        f"| {what} | on the twin, without friction: {twin}; with friction, in whose band of {band} mm it may stop: "
+        f"{rubbing} | **on the simulated lab's arm: {arm}; {within}** |"
+    )
+
+
+def _pair_of(metrics: dict | None, figures: Iterable[Shown]) -> str:
+    return " / ".join(_number(lookup(metrics, figure.key)) for figure in figures)
 
 
 def _rehearsal_rows(metrics: dict | None, goals: Mapping[str, Limit]) -> list[str]:

@@ -66,22 +66,25 @@ def test_the_headline_shows_what_misses_its_goal_beside_what_meets_it(tmp_path):
     rehearsed["preview"] = {"coverage": coverage, "tip_error_radii": {"at_end": {"median": 4.0}}}
     sent = {"position_error_mm": {"median": 0.5, "p95": 1.5}, "beyond_1pct_unsaid": 0, "targets": 50}
     bad = {"position_error_mm": {"median": 13.0, "p95": 29.0}, "beyond_1pct_unsaid": 170, "targets": 200}
-    bad["within"] = {"position_error_mm": {"median": 8.0, "p95": 19.0}}
-    network = {"as_controls": {"frictionless": sent, "targets": 50}, "on_plant": bad}
+    bad["doubted"] = 0.25
+    bad["within"] = {"position_error_mm": {"median": 8.0, "p95": 19.0}, "beyond_1pct_unsaid": 60, "targets": 90}
+    rubbing = {"position_error_mm": {"median": 2.0, "p95": 6.0}, "beyond_1pct_unsaid": 7, "targets": 40}
+    network = {"as_controls": {"frictionless": sent, "friction": rubbing, "targets": 50}, "on_plant": bad}
+    band = {"friction_band_mm": {"median": 22.0, "p95": 38.0}}
     goals = "rehearse:\n  reach.rate: {better: higher, goal: 0.98}\n  follow.rate: {min: 0.95}\n"
     goals += "".join(f"  preview.coverage.{name}.share: {{better: higher, goal: 0.9}}\n" for name in COVERAGE_TIMES)
     (tmp_path / "tests").mkdir()
     (tmp_path / "tests/limits.yaml").write_text(goals)
     assert "**" not in headline(tmp_path).replace("**on the", "").replace("session** |", "")
-    for stage, metrics in {"train_ik": network, "rehearse": rehearsed}.items():
+    for stage, metrics in {"train_ik": network, "rehearse": rehearsed, "fk_dataset": band}.items():
         (tmp_path / f"artifacts/{stage}").mkdir(parents=True)
         write_json(tmp_path / f"artifacts/{stage}/metrics.json", metrics)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("upkeep.readme.source_words", lambda root, metrics: "**STALE**: of code abc")
         text = headline(tmp_path)
-    assert "without friction: 0.5 / 1.5 mm; 0 of 50 targets missed" in text
-    assert "**on the simulated lab's arm: 13 / 29 mm; 170 of 200 targets missed" in text
-    assert "without a warning; 8 / 19 mm where it pulls by no more than in the session**" in text
+    assert "on the twin, without friction: 0.5 / 1.5 mm, 0 of 50; with friction, " in text
+    assert "in whose band of 22 / 38 mm it may stop: 2 / 6 mm, 7 of 40 |" in text
+    assert "**on the simulated lab's arm: 13 / 29 mm, 170 of 200 (a warning at 25 %); 8 / 19 mm, 60 of 90 where" in text
     reached = "| **reach 90 %** (within 20 mm, and no other part touched anything: 80 %), follow 100 %, grasp 95 %, "
     assert f"{reached}hand-over 50 % | goal: reach ≥ 98 %, follow ≥ 95 % |" in text
     assert "at the end **3 of 40**, 2 s later **3 of 40**, 10 s later **3 of 40** | goal: ≥ 0.9 (missed) / " in text
