@@ -282,10 +282,49 @@ def test_where_the_robot_comes_less_far_back_so_does_the_reach(aimed, short, bac
     assert np.linalg.norm(mounts[1] - mounts[0]) == pytest.approx(back, abs=1e-3)
 
 
-def test_a_solid_in_the_way_of_an_advance_leaves_the_reach_without(aimed, monkeypatch):
+def stand_off_tip(planner: Planner, asked: Targets) -> np.ndarray:
+    """Where the curled arm's tip is as the advance begins, base frame, m."""
+    plan = advancing(planner, asked)
+    begin = dict(plan.phases)["advance"]
+    (mount,), (flange,) = mount_pose(plan.joints[begin : begin + 1], OFFSET)
+    rest = actuated(CHAIN, plan.commands[-1:], gravity_in_base(0.0))
+    return mount + joint_positions(CHAIN, rest.qpos)[0][-1] @ (flange * [1, -1, -1]).T
+
+
+@pytest.mark.parametrize(("refused", "phases"), [
+    (1, ["approach", "curl", "advance"]), (2, ["approach", "curl"]), (3, None),
+])  # fmt: skip
+def test_a_way_that_a_solid_forbids_gives_place_to_the_next(aimed, monkeypatch, refused, phases):
+    """The whole advance to half of it, and that to none, whose reason is the plan's."""
+    tried = []
+
     def checked(plan, *_):
-        if "advance" in dict(plan.phases):
-            raise InputError("world: the arm would come into the table")
+        tried.append(len(plan.joints) - dict(plan.phases).get("advance", len(plan.joints)))
+        if len(tried) <= refused:
+            raise InputError(f"world: way {len(tried)}")
 
     monkeypatch.setattr("trunkline.ar.teleop.planner.check_plan", checked)
-    assert [name for name, _ in advancing(*aimed).phases] == ["approach", "curl"]
+    if phases is None:
+        with pytest.raises(InputError, match="world: way 3"):
+            advancing(*aimed)
+        assert tried[0] > tried[1] > tried[2] == 0
+    else:
+        assert [name for name, _ in advancing(*aimed).phases] == phases
+
+
+def test_a_solid_beside_the_stand_off_is_gone_round(aimed):
+    """Its tip would be in it; the way without an advance is free."""
+    planner, asked = aimed
+    solid = about(stand_off_tip(planner, asked), 0.002)
+    plan = replace(planner, advance=0.06).plan(Request(1, asked, "world", "package"), solid, READY, STRAIGHT)
+    check_plan(plan, solid, OFFSET, CHAIN)
+
+
+def test_the_mount_advances_nearly_straight_and_hardly_turns(aimed):
+    """All joints move evenly: in between the mount is some mm beside the straight line."""
+    plan = advancing(*aimed)
+    mounts, flanges = mount_pose(plan.joints[dict(plan.phases)["advance"] :], OFFSET)
+    way = (mounts[-1] - mounts[0]) / np.linalg.norm(mounts[-1] - mounts[0])
+    beside = (mounts - mounts[0]) - ((mounts - mounts[0]) @ way)[:, None] * way
+    assert np.linalg.norm(beside, axis=1).max() < 10e-3
+    assert np.abs(flanges - flanges[0]).max() < 0.02
