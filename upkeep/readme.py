@@ -475,8 +475,8 @@ def _command_row(root: Path) -> str:
     band = _pair_of(_metrics(root, "fk_dataset"), both("friction_band_mm"))
     arm = f"{sent('on_plant', 'on_plant.targets')} (a warning at {_percent(lookup(metrics, 'on_plant.doubted'))})"
     within = f"{sent('on_plant.within', 'on_plant.within.targets')} where it pulls by no more than in the session"
-    what = "Tip error of the network's commands, median / 95th percentile, and missed by more than 1 % of length without "
-    what += "a warning"
+    what = "Tip error of the network's commands, median / 95th percentile, and "
+    what += "targets missed by more than 1 % of length without a warning"
     return (
         f"| {what} | on the twin, without friction: {twin}; with friction, in whose band of {band} mm it may stop: "
         f"{rubbing} | **on the simulated lab's arm: {arm}; {within}** |"
