@@ -105,11 +105,11 @@ RESULTS = {
             "… to the simulated lab's arm; beside the network's warnings that the pulls go beyond the session's",
             as_sent("on_plant", "on_plant.targets"),
         ),
-        ("… share of these targets with a warning", (Shown("on_plant.doubted"),)),
         (
             "… pulling by no more in all than in the session's trials at rest",
             as_sent("on_plant.within", "on_plant.within.targets"),
         ),
+        ("… share of targets sent to that arm with a warning", (Shown("on_plant.doubted"),)),
         (
             "… to tips at which that arm itself rested, tip error: median / 95th percentile / of those within the "
             "session's pulls",
