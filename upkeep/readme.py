@@ -339,7 +339,7 @@ def path_table(folder: Path) -> str:
     lines.append("|---" + "|---:" * len(PATHS) + "|")
     for split, metrics in ((TEST, scored), *((split, fitted) for split in reversed(DECIDING))):
         ways = [f"{split}.e_tip_{way}_mm" for way in ("centred_rms", "rms")]
-        cells = [" / ".join(_number(lookup(metrics, f"{model}.{way}")) for way in ways) for model in PATHS]
+        cells = [_numbers(metrics, (f"{model}.{way}" for way in ways)) for model in PATHS]
         lines.append(f"| of `{split}` | {' | '.join(cells)} |")
     return "\n".join(lines)
 
@@ -468,11 +468,11 @@ def _command_row(root: Path) -> str:
     def sent(at: str, targets: str) -> str:
         *errors, silent = as_sent(at, targets)
         counts = f"{_number(lookup(metrics, silent.key))} of {_number(lookup(metrics, targets))}"
-        return f"{_pair_of(metrics, errors)} mm, {counts}"
+        return f"{_numbers(metrics, (figure.key for figure in errors))} mm, {counts}"
 
     twin = sent("as_controls.frictionless", "as_controls.targets")
     rubbing = sent("as_controls.friction", "as_controls.friction.targets")
-    band = _pair_of(_metrics(root, "fk_dataset"), both("friction_band_mm"))
+    band = _numbers(_metrics(root, "fk_dataset"), (figure.key for figure in both("friction_band_mm")))
     arm = f"{sent('on_plant', 'on_plant.targets')} (a warning at {_percent(lookup(metrics, 'on_plant.doubted'))})"
     within = f"{sent('on_plant.within', 'on_plant.within.targets')} where it pulls by no more than in the session"
     what = "Tip error of the network's commands, median / 95th percentile, and "
@@ -481,10 +481,6 @@ def _command_row(root: Path) -> str:
         f"| {what} | on the twin, without friction: {twin}; with friction, in whose band of {band} mm it may stop: "
         f"{rubbing} | **on the simulated lab's arm: {arm}; {within}** |"
     )
-
-
-def _pair_of(metrics: dict | None, figures: Iterable[Shown]) -> str:
-    return " / ".join(_number(lookup(metrics, figure.key)) for figure in figures)
 
 
 def _rehearsal_rows(metrics: dict | None, goals: Mapping[str, Limit]) -> list[str]:
@@ -543,12 +539,17 @@ def _internal(metrics: dict | None, at: str) -> str:
     return f"{millimeters} mm ({share} %)"
 
 
+def _numbers(metrics: dict | None, keys: Iterable[str]) -> str:
+    """The figures of dotted `keys`, side by side."""
+    return " / ".join(_number(lookup(metrics, key)) for key in keys)
+
+
 def _pair(metrics: dict | None, at: str, share: bool = False) -> str:
     """Position / tip error in mm; with `share` in % of the arm's length first."""
     if lookup(metrics, f"{at}e_position_mm") is None:
         return "–"
     pairs = {
-        unit: " / ".join(_number(lookup(metrics, f"{at}{error}_{unit}")) for error in ("e_position", "e_tip"))
+        unit: _numbers(metrics, (f"{at}{error}_{unit}" for error in ("e_position", "e_tip")))
         for unit in ("mm", "pct")
     }
     return f"{pairs['pct']} % ({pairs['mm']} mm)" if share else pairs["mm"]
