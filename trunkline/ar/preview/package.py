@@ -106,7 +106,7 @@ def read_package(path: Path) -> Package:
         contents.network_of(files),
         compiled,
         read_chain(compiled).smooth,
-        read_geometry(mujoco.MjSpec.from_string(files[MODEL].decode())),
+        read_geometry(package.spec_of(files, MODEL)),
         np.array([compiled.tendon_length0[compiled.tendon(name).id] for name in network["output_order"]]),
         float(model["rate_limit"]),
         files,
