@@ -157,12 +157,12 @@ def test_mjcf_cut_in_half_and_mjcf_that_mujoco_refuses_are_one_line(files):
 def test_a_manifest_that_lacks_a_block_is_one_line(blocks, line, files):
     broken = sealed({MODEL: MJCF}, **blocks)
     with pytest.raises(InputError, match=line):
-        package.package_digest(broken)
-        package.arm_of(broken)
+        (package.package_digest(broken), package.arm_of(broken))
 
 
 def test_tables_and_robots_of_another_form_are_one_line(files):
-    assert package.tables_of(files) == {} and package.lacking_of(files) is None
+    assert package.tables_of(files) == {}
+    assert package.lacking_of(files) is None
     with pytest.raises(InputError, match=f"{TABLES}: stages: found no list of blocks"):
         package.tables_of(files | {TABLES: b'{"stages": [1]}'})
     with pytest.raises(InputError, match=f"{TABLES}: found no JSON at character 0"):
