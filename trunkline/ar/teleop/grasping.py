@@ -65,7 +65,7 @@ class Handling:
 @dataclass(frozen=True)
 class Leg:
     """To `joints` (7,), rad, and `commands` (K,), m, in `seconds` at least, then at rest for `calm` s; `gentle` with
-    something in the arm.
+    something in the arm, or before the tip.
 
     `gravity`: in the arm's base frame, for legs that are shaped so that the arm does not swing on; None for the others.
     `change` (K,): m, what swings it: a command's change, or zero, the mount's way.
