@@ -27,7 +27,7 @@ STEP = 1e-5  # rad, rad/s and m, of the differences
 STILL = 0.1  # rad/s, swings slower than that are creep
 SHARE = 0.1  # of the largest swing of the tip; smaller ones are not worth a longer way
 ALIKE = 0.05  # share by which periods differ that one shaper suits: ZVD leaves 0.6 % of such a swing
-KEPT = 16  # shapers
+SHAPERS = 16  # of last, that are not computed again
 HEAVY = 0.2  # damping ratio from which on a swing dies within a period
 
 
@@ -109,7 +109,7 @@ def shaper_for(model: mujoco.MjModel, settings: Shaping) -> ShaperOf:
     """What a `Planner` shapes with: the swings of `model` under the gravity, and where the commands end. Those of last
     are kept: ways to one target differ in little else than joints."""
 
-    @lru_cache(KEPT)
+    @lru_cache(SHAPERS)
     def shaper(*arrays: bytes) -> Shaper:
         if settings.kind == "none":
             return Shaper(np.zeros(1), np.ones(1))
