@@ -113,7 +113,7 @@ class Grasping:
         placement = self.placement(targets, object)
         centre = np.array(grip_of(object)) - beside * placement.rotation[:, 1]
         opened = self.straight - placement.opened
-        closed, still, gravity = self.straight - placement.closed, np.zeros(len(opened)), _gravity(targets)
+        closed, still, gravity = self.straight - placement.closed, np.zeros(len(opened)), gravity_direction(targets)
 
         def at(start: np.ndarray, place: np.ndarray) -> np.ndarray:
             return self._solve(start, centre + place, targets)
@@ -172,7 +172,8 @@ class Grasping:
         return self.rigid.solve(start, (x, y, z), targets.pointing, targets.heading)
 
 
-def _gravity(targets: Targets) -> np.ndarray:
+def gravity_direction(targets: Targets) -> np.ndarray:
+    """In the soft arm's base frame, as `targets` turn it. Shape (3,)."""
     return np.array(rotate(conjugate(base_quaternion(targets.pointing, targets.heading)), DOWN))
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trunkline.ar.teleop.alignment import base_quaternion
-from trunkline.ar.teleop.grasping import Grasping, Leg
+from trunkline.ar.teleop.grasping import Grasping, Leg, gravity_direction
 from trunkline.ar.teleop.messages import Request, Targets, World
 from trunkline.ar.teleop.minimum_jerk import PEAK
 from trunkline.ar.teleop.plan import Plan
@@ -104,8 +104,8 @@ class Planner:
                 yield self.grasping.grasp(targets, object, joints, beside)
             return
         mount, curled = self._curled(targets)
-        gravity = np.array(_soft_target(targets)[1])
-        for back in self._stand_offs(targets, curled):
+        gravity = gravity_direction(targets)
+        for back in self._stand_offs(targets, curled, gravity):
             with suppress(InputError):
                 here = self._solve(joints, add(mount, back), targets)
                 there = self._solve(here, mount, targets)
@@ -118,12 +118,12 @@ class Planner:
         there = self._solve(joints, mount, targets)
         yield [Leg("approach", there, self.straight, gravity), Leg("curl", there, curled, gravity)]
 
-    def _stand_offs(self, targets: Targets, curled: np.ndarray) -> list[Vector]:
+    def _stand_offs(self, targets: Targets, curled: np.ndarray, gravity: np.ndarray) -> list[Vector]:
         """From where the mount advances, seen from where it goes, m: back along the axis of the tip at rest under the
-        commands `curled` (K,)."""
+        commands `curled` (K,) and `gravity` along a unit vector (3,)."""
         if self.chain is None or not self.advance:
             return []
-        rest = actuated(self.chain.smooth, curled[None], STANDARD_GRAVITY * np.array(_soft_target(targets)[1]))
+        rest = actuated(self.chain.smooth, curled[None], STANDARD_GRAVITY * gravity)
         x, y, z = (float(value) for value in -rotation_from_wxyz(rest.quaternion[0]).apply(DOWN))
         turn = base_quaternion(targets.pointing, targets.heading)
         return [rotate(turn, (part * x, part * y, part * z)) for part in (self.advance, self.advance / 2)]
@@ -154,14 +154,9 @@ class Planner:
         An arm that only bends passes its target by some mm, within `tolerance`: the mount makes up for what is
         foreseen.
         """
-        tip, gravity = _soft_target(targets)
-        bent = bend(self.network, tip, gravity, self.tolerance, self.chain)
         turn = base_quaternion(targets.pointing, targets.heading)
+        back = conjugate(turn)
+        tip = rotate(back, subtract(targets.tip.position, targets.rigid.position))
+        bent = bend(self.network, tip, rotate(back, DOWN), self.tolerance, self.chain)
         missed = rotate(turn, subtract(tip, (float(bent.tip[0]), float(bent.tip[1]), float(bent.tip[2]))))
         return add(targets.rigid.position, missed), bent.commands
-
-
-def _soft_target(targets: Targets) -> tuple[Vector, Vector]:
-    """Tip target and gravity direction in the soft arm's base frame."""
-    back = conjugate(base_quaternion(targets.pointing, targets.heading))
-    return rotate(back, subtract(targets.tip.position, targets.rigid.position)), rotate(back, DOWN)
