@@ -7,13 +7,23 @@ import pytest
 
 from tests.support.bent_chain import stump
 from trunkline.ar.teleop import vibration
-from trunkline.ar.teleop.shaping import Shaping, mode_shaper, residual, shaped, shaper_of
+from trunkline.ar.teleop.shaping import Shaper, Shaping, mode_shaper, shaped, shaper_of
 from trunkline.ar.teleop.vibration import VibrationModes, shaper_for, slowest, vibration_modes
 from trunkline.frames import gravity_in_base
 from trunkline.model.simulation.rest import settle
 from trunkline.model.statics.chain import read_chain
 
 PERIOD, DAMPING = 0.6, 0.03
+
+
+def residual(shaper: Shaper, period: float, damping: float) -> float:
+    """Amplitude of the swing of a mode after the last impulse, as a share of that after one impulse of 1 (there is less
+    than 1 % left where a shaper suits the mode)."""
+    decay = 2 * np.pi / period * damping / np.sqrt(1 - damping**2)
+    phase = 2 * np.pi / period * shaper.times
+    grown = shaper.shares * np.exp(decay * shaper.times)
+    left = np.exp(-decay * shaper.delay) * np.hypot((grown * np.cos(phase)).sum(), (grown * np.sin(phase)).sum())
+    return float(left)
 
 
 def swing_left(rows: np.ndarray, step: float, period: float, damping: float, at: int) -> float:
