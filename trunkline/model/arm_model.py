@@ -190,6 +190,11 @@ class ArmModel:
         return self.number(CAPSTAN_FRICTION)
 
     @property
+    def rubs(self) -> bool:
+        """Whether its cables rub while it moves: statics know the friction of a model without the tendons for it."""
+        return self.guide_holes.size > 0 and self.capstan_friction > 0
+
+    @property
     def slip_length(self) -> float:
         """m of sliding within which the friction of its cables builds up."""
         return self.number(SLIP_LENGTH, SLIP)

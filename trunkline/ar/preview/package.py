@@ -55,7 +55,7 @@ class Package:
         grasping = Grasping(rigid, config.mount_offset, self.straight, self.grips(config), config.handling)
         return Planner(
             rigid, self.network, self.straight, limits, config.mount_offset, shaper=shaper, chain=self.chain,
-            grasping=grasping, advance=config.advance,
+            grasping=grasping, advance=config.advance, advance_speed=config.advance_speed,
         )  # fmt: skip
 
     def grips(self, config: TeleoperationConfig) -> dict[str, Grip]:
