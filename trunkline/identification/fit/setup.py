@@ -72,8 +72,8 @@ def unidentifiable_mass(config: IdentificationSettings, trials: list[Trial]) -> 
     fitted = [trial for trial in trials if trial.split == IDENTIFY and trial.experiment in config.experiments]
     if MASS not in config.parameters or any(trial.load for trial in fitted):
         return []
-    found = f"found no {' or '.join(config.experiments)} with split identify that carries a load"
-    return [f"parameters.{MASS}: {found}, expected one with its `load`, kg, in session.yaml, or no {MASS}"]
+    reason = f"found no {' or '.join(config.experiments)} with split identify that carries a load"
+    return [f"parameters.{MASS}: {reason}, expected one with its `load`, kg, in session.yaml, or no {MASS}"]
 
 
 def check_parameters(stage: str, config: IdentificationSettings, model: mujoco.MjModel) -> None:
