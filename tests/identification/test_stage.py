@@ -144,6 +144,21 @@ def test_a_missing_model_is_named(project):
         run("identify_stiffness", config, root / "nowhere.xml")
 
 
+def test_a_mass_that_no_load_tells_is_refused(project):
+    _, model, write = project
+    write([tilt(model, 30), tilt(model, 60), replace(tilt(model, 75, "validate"), load=0.05)])
+    config = settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.3, 12.0), "mass": (0.05, 5.0)})
+    expected = "found no static_tilt with split identify that carries a load, expected one with its `load`"
+    with pytest.raises(InputError, match=f"^identify_stiffness.parameters.mass: {expected}"):
+        run("identify_stiffness", config, CAD_MODEL)
+
+
+def test_a_mass_beside_a_measured_rest_shape_is_refused():
+    """What springs bear in it follows from the masses that are described."""
+    with pytest.raises(ValueError, match="parameters.mass: found it beside rest_shape: measured, expected one"):
+        settings(["release"], ["release"], {"mass": (0.05, 5.0)}, rest_shape="measured")
+
+
 def test_more_folds_than_trials_are_refused(project):
     root, model, write = project
     write([tilt(model, 30), tilt(model, 60), tilt(model, 75, "validate")])

@@ -16,8 +16,8 @@ from trunkline.identification.fit.fit import Fit
 from trunkline.identification.fit.identify import Identification, identify, with_parameters
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.settings import IdentificationSettings
-from trunkline.identification.fit.setup import check_parameters, set_up, with_every
-from trunkline.identification.parameters.parameters import NAMES
+from trunkline.identification.fit.setup import check_parameters, set_up, unidentifiable_mass, with_every
+from trunkline.identification.parameters.parameters import MASS, NAMES
 from trunkline.identification.parameters.per_session import (
     make_room,
     names_in,
@@ -97,7 +97,7 @@ def load(stage: str, config: IdentificationSettings, model_path: Path) -> FitInp
     every = read_trials(TRIALS, DECIDING)
     check_trials(every if model.nu else reported, model)
     names = per_session_names(list(config.parameters), config.per_session, sessions_of(every)[1:])
-    for line in unidentifiable_per_session(names, every, config.experiments):
+    for line in unidentifiable_per_session(names, every, config.experiments) + unidentifiable_mass(config, every):
         raise InputError(f"{stage}.{line}")
     if names:
         make_room(spec, names)
@@ -113,7 +113,7 @@ def load(stage: str, config: IdentificationSettings, model_path: Path) -> FitInp
 def fit(stage: str, inputs: FitInputs) -> tuple[Identification, str]:
     """Identify the parameters; returns the result and the MJCF of the identified model."""
     kinds = inputs.config.experiments
-    if inputs.from_cad and not any(map(is_static, kinds)):
+    if inputs.from_cad and MASS not in inputs.config.parameters and not any(map(is_static, kinds)):
         sources = " and ".join(EXPERIMENTS[kind].plural for kind in kinds)
         print(f"{stage}: without trials at rest, stiffness comes from {sources}, as a ratio to the masses")
     result = identify(stage, inputs.model, inputs.fitted, inputs.fit)

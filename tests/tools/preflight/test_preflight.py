@@ -21,7 +21,7 @@ from trunkline.identification.diagnostics.identifiability import (
     unidentifiable,
 )
 from trunkline.identification.fit.search import search
-from trunkline.identification.fit.setup import set_up
+from trunkline.identification.fit.setup import set_up, unidentifiable_mass
 from trunkline.recordings.trials.inventory import missing_lines, recorded_lines
 from trunkline.recordings.trials.raw_trial import RawTrial
 from trunkline.recordings.trials.trial import Trial, write_trials
@@ -196,6 +196,13 @@ def test_a_stage_without_its_trials_says_what_to_set(model):
     config = settings(["static_tilt", "static_pull"], ["static_tilt", "static_pull"], {"stiffness": (0.1, 10.0)})
     (line,) = unidentifiable(config, [tilt(model, 30)])
     assert line.startswith("no static_pull of the split identify: `source: tilts` under identify_stiffness")
+
+
+def test_a_mass_wants_a_trial_with_a_load(model):
+    config = settings(["static_tilt"], ["static_tilt"], {"mass": (0.1, 10.0)})
+    (line,) = unidentifiable_mass(config, [tilt(model, 30)])
+    assert line.startswith("parameters.mass: found no static_tilt with split identify that carries a load")
+    assert not unidentifiable_mass(config, [replace(tilt(model, 30), load=0.1)])
 
 
 def test_the_command_reads_logs_and_writes_nothing(tmp_path, monkeypatch, capsys):

@@ -17,7 +17,7 @@ from trunkline.identification.fit.robust import reweighted
 from trunkline.identification.fit.search import Convergence, SearchResult, descend, search
 from trunkline.identification.fit.surrogate import Surrogate, surrogate
 from trunkline.identification.parameters.parameter import Fields
-from trunkline.identification.parameters.parameters import candidate_fields, parameter_named, set_fields
+from trunkline.identification.parameters.parameters import MASS, candidate_fields, parameter_named, set_fields
 from trunkline.identification.simulate.experiment import Experiment
 from trunkline.identification.simulate.resting import RestShape, hang_in
 from trunkline.recordings.trials.experiments import is_static
@@ -69,7 +69,10 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
     """
     method, parameters, per_joint, rest = fit.method, fit.parameters, fit.per_joint, fit.rest
     fitted = [e for e in experiments if e.split == IDENTIFY]
-    short = [e.shortened(method.rough.frames) for e in _few(fitted, method.rough.trials)]
+    few = _few(fitted, method.rough.trials)
+    if MASS in parameters and not any(e.load for e in few):  # without one, every mass does
+        few += [e for e in fitted if e.load][:1]
+    short = [e.shortened(method.rough.frames) for e in few]
     coarse_problem, exact = fit.problem(model, short, method.rough.step_factor), fit.problem(model, fitted)
     searches = {"coarse": _search(coarse_problem, method.optimizer, method.seed, f"{label} coarse")}
     problems, result = [coarse_problem, exact], searches["coarse"]

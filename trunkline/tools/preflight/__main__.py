@@ -16,7 +16,7 @@ from trunkline.identification.diagnostics.identifiability import (
     to_identify_from,
     unidentifiable,
 )
-from trunkline.identification.fit.setup import check_parameters
+from trunkline.identification.fit.setup import check_parameters, unidentifiable_mass
 from trunkline.identification.parameters.per_session import (
     make_room,
     per_session_names,
@@ -67,7 +67,9 @@ def main(arguments: list[str] | None = None) -> int:
         names = per_session_names(list(config.parameters), config.per_session, sessions_of(trials)[1:])
         make_room(spec, names)
         model = spec.compile()
-        lacking = unidentifiable(config, trials) or unidentifiable_per_session(names, trials, config.experiments)
+        lacking = unidentifiable(config, trials) or [
+            *unidentifiable_per_session(names, trials, config.experiments), *unidentifiable_mass(config, trials),
+        ]  # fmt: skip
         chosen = [t for t in trials if t.experiment in config.experiments and t.split == IDENTIFY]
         print(f"{stage}, from {len(chosen)} trials:", flush=True)
         for line in lacking:
