@@ -74,7 +74,7 @@ def check_session(
     if not gathered.raw_trials:
         first = next(iter(gathered.refused.values()))
         raise InputError(f"{where}: all {len(gathered.refused)} trials refused, the first: {first}")
-    missing = _missing(gathered.raw_trials)
+    missing = _missing(gathered.raw_trials) + _unlisted(session)
     for record in gathered.findings:
         record.warnings += record.faults + session_faults + missing
     set_gravity_direction(gathered.raw_trials, gathered.findings, session)
@@ -100,6 +100,15 @@ def require_enough(gathered: CheckedSession, planned: list[TrialEntry]) -> None:
         if trial.name in gathered.refused and (trial.experiment, trial.split) not in left:
             expected = f"expected another {trial.experiment} of the split {trial.split} to go on with"
             raise InputError(f"{gathered.refused[trial.name]}; {expected}")
+
+
+def _unlisted(session: Session) -> list[str]:
+    """The logs beside those of the trials, in a sentence."""
+    logs = session.unlisted
+    if not logs:
+        return []
+    names = ", ".join(logs[:3]) + (f" and {len(logs) - 3} more" if len(logs) > 3 else "")
+    return [f"logs: {names} in the folder, but in no trial of session.yaml: left out"]
 
 
 def _missing(raw_trials: list[RawTrial]) -> list[str]:
