@@ -46,6 +46,7 @@ def read_stretch(
     poses, where = source.poses, findings.where
     if poses.undecodable:
         findings.repairs.append(f"{poses.undecodable} messages that do not fit their schema dropped")
+    findings.repairs += poses.notes
     findings.logged = _log_fit(poses)
     stamps, findings.frames = _stamps(poses, session.clock, where, source.pose_topic)
     rows = in_order(stamps, limits.disorder, f"{where}: {source.pose_topic}", findings)
