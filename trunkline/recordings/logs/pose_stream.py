@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from trunkline.recordings.logs.cdr import short_name
-from trunkline.recordings.logs.encodings import decode
+from trunkline.recordings.logs.encodings import decode, readable_topic
 from trunkline.recordings.logs.mcap_log import Topic
 from trunkline.recordings.logs.messages import POSES, READING, DecodedPoses
 from trunkline.recordings.logs.samples import PoseSamples, union
@@ -89,7 +89,10 @@ def pose_stream(
         ValueError: the messages cannot be read at all, or frames are no tree, or `frame` is none of them.
     """
     unnamed, twice, read = None, None, []
+    notes: list[str] = []
     for name, topic in topics.items():
+        topic, some = readable_topic(topic)
+        notes += some
         batches = list(_read_poses(topic))
         declared = bodies if name is None else [name]
         if declared is None and any(poses.names is None for _, poses in batches):
@@ -105,11 +108,14 @@ def pose_stream(
     else:
         samples = _samples(read)
         if parents and list(parents) != [frame or next(iter(parents))]:
-            fixed = [(t, [part for batch in _read_poses(t) for part in _batches(*batch, t, ())]) for t in statics]
+            readable_statics = [readable_topic(topic)[0] for topic in statics]
+            fixed = [
+                (t, [part for batch in _read_poses(t) for part in _batches(*batch, t, ())]) for t in readable_statics
+            ]
             samples, parents = in_one_frame(samples, _samples(fixed), list(parents), frame)
         stream = _gather(samples)
     stream.undecodable = sum(len(topic.messages) for topic in topics.values()) - readable
-    stream.unnamed, stream.parents, stream.twice = unnamed, tuple(parents), twice
+    stream.unnamed, stream.parents, stream.twice, stream.notes = unnamed, tuple(parents), twice, notes
     return without_repeats(stream)
 
 

@@ -94,7 +94,7 @@ def _topics(survey: LogSurvey) -> list[str]:
     else:
         poses = next(iter(survey.pose_topics.values())).name
     named = {"poses": poses, "commands": survey.command_topic, "tendon_positions": survey.position_topic}
-    return ["topics: {" + ", ".join(f"{key}: {name}" for key, name in named.items() if name) + "}"]
+    return ["topics: {" + ", ".join(f"{key}: {_topic(name)}" for key, name in named.items() if name) + "}"]
 
 
 def _experiment(
@@ -104,7 +104,9 @@ def _experiment(
     names = {word: name for name, kind in EXPERIMENTS.items() for word in kind.words}
     word = re.match(rf"(?:.*_)?({'|'.join(names)})", survey.log.path.stem.lower())
     wound = survey.tendon_positions or survey.commands
-    pull = 0.0 if wound is None or not wound.positions.size else float(np.nanmax(np.ptp(wound.positions, axis=0)))
+    pull = 0.0
+    if wound is not None and wound.positions.size:
+        pull = float(np.nanmax(np.nanmax(wound.positions, axis=0) - np.nanmin(wound.positions, axis=0)))
     positions = poses.positions
     travel = np.nanpercentile(np.abs(positions - np.nanmedian(positions, axis=0)), 99) * scale
     if word:
@@ -128,6 +130,11 @@ def _tilt(poses: PoseStream, base: str | None, up: np.ndarray) -> float:
     w, x, y, z = np.nanmedian(poses.quaternions[:, poses.names.index(base)], axis=0)
     axis = np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
     return float(np.round(np.degrees(np.arccos(np.clip(axis @ up / np.linalg.norm(axis), -1, 1)))))
+
+
+def _topic(names: str) -> str:
+    """As YAML has a topic, or several."""
+    return f"[{names}]" if ", " in names and not names.startswith("{") else names
 
 
 def _quoted(name: str) -> str:
