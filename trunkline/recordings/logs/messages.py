@@ -142,8 +142,9 @@ def markers(message) -> DecodedPoses:
 
 @joints("sensor_msgs/JointState")
 def joint_state(message) -> DecodedJoints:
-    names = message.name if any(message.name) else None
-    return DecodedJoints(moment(message.header.stamp), names, np.asarray(message.position, dtype=float))
+    positions = np.asarray(message.position, dtype=float)
+    names = message.name if any(message.name) or not positions.shape[-1] else None
+    return DecodedJoints(moment(message.header.stamp), names, positions)
 
 
 @joints("std_msgs/Float64MultiArray", "std_msgs/Float32MultiArray")
