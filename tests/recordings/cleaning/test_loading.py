@@ -82,7 +82,8 @@ def test_stamp_and_log_clocks(tmp_path):
     np.testing.assert_allclose(raw.time, np.sort(m.stamps - m.stamps.min()) * 1e-9, atol=1e-9)
     edit_session(tmp_path, "clock: stamp", "clock: log")
     ((raw, _),) = taken(tmp_path)
-    np.testing.assert_allclose(raw.time[[0, -1]], (m.logged[[0, -1]] - m.logged[0]) * 1e-9, atol=1e-9)
+    np.testing.assert_allclose(raw.time[-1], (m.logged[-1] - m.logged[0]) * 1e-9, atol=0.02)
+    assert np.diff(raw.time).min() > 0.9 / 120, "what deliveries delayed is evened out"
 
 
 def test_markers_by_the_name_of_the_release_before(tmp_path, capsys):

@@ -100,7 +100,7 @@ def _raw_trial(
             stretch = stretch.part(part)
     motors = read_motors(source, session, stretch, trial.experiment, limits, where, findings)
     if EXPERIMENTS[trial.experiment].needs_motors:
-        check_motors(source, session, reference.joint_topics, motors, stretch, limits, where)
+        check_motors(source, session, reference.joint_topics, motors, stretch, trial.experiment, limits, where)
     raw = RawTrial(
         name=trial.name,
         experiment=trial.experiment,

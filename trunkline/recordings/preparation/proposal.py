@@ -131,7 +131,7 @@ def _topics(survey: LogSurvey) -> list[str]:
     else:
         poses = next(iter(survey.pose_topics.values())).name
     named = {"poses": poses, "commands": survey.command_topic, "tendon_positions": survey.position_topic}
-    return ["topics: {" + ", ".join(f"{key}: {name}" for key, name in named.items() if name) + "}"]
+    return ["topics: {" + ", ".join(f"{key}: {_topic(name)}" for key, name in named.items() if name) + "}"]
 
 
 def _experiment(
@@ -143,7 +143,7 @@ def _experiment(
     words = (re.match(rf"(?:.*_)?({'|'.join(names)})", name.lower()) for name in (path.stem, path.parent.name))
     word = next(words) or (next(words) if not re.search("[A-Za-z]{3}", path.stem) else None)
     wound = survey.tendon_positions or survey.commands
-    travels = wound is not None and wound.positions.size and float(np.nanmax(np.ptp(wound.positions, axis=0)))
+    travels = _largest_travel(wound.positions) if wound is not None and wound.positions.size else 0.0
     positions = poses.positions
     travel = np.nanpercentile(np.abs(positions - np.nanmedian(positions, axis=0)), 99) * scale
     if word:
@@ -169,7 +169,12 @@ def _drawn_in(commands: JointStream | None, measured: JointStream | None) -> flo
     highest = float(np.nanmax(pulls - first))
     if stream is commands:
         highest = min(highest, float(np.nanmax(pulls)))
-    return highest if highest > 0 else float(np.nanmax(np.ptp(pulls, axis=0)))
+    return highest if highest > 0 else _largest_travel(pulls)
+
+
+def _largest_travel(positions: np.ndarray) -> float:
+    """Between the ends of the way of the motor that goes farthest, of positions (T, K) with gaps."""
+    return float(np.nanmax(np.nanmax(positions, axis=0) - np.nanmin(positions, axis=0)))
 
 
 def _tilt(poses: PoseStream, base: str | None, up: np.ndarray) -> float:
@@ -179,6 +184,11 @@ def _tilt(poses: PoseStream, base: str | None, up: np.ndarray) -> float:
     w, x, y, z = np.nanmedian(poses.quaternions[:, poses.names.index(base)], axis=0)
     axis = np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
     return float(np.round(np.degrees(np.arccos(np.clip(axis @ up / np.linalg.norm(axis), -1, 1)))))
+
+
+def _topic(names: str) -> str:
+    """As YAML has a topic, or several."""
+    return f"[{names}]" if ", " in names and not names.startswith("{") else names
 
 
 def _quoted(name: str) -> str:

@@ -22,10 +22,12 @@ from pydantic import (
 
 from trunkline.errors import InputError, nearest
 from trunkline.recordings.session.shared_recordings import check_shared
+from trunkline.recordings.signals.held import Between
 from trunkline.recordings.trials.experiments import EXPERIMENTS, LOAD, ExperimentName, Level
 from trunkline.recordings.trials.splits import SplitName
 from trunkline.settings import read_yaml, rename_keys
 
+NONE = "none"  # in place of a topic's name
 RENAMED = {"segments": "markers"}  # keys of the release before
 
 
@@ -104,11 +106,25 @@ class FixedBase(Entry):
 
 
 class Topics(Entry):
-    """Topic names; what is left out is found by its schema. poses: one topic, or body to topic."""
+    """Topic names; what is left out is found by its schema. poses: one topic, or body to topic.
+
+    commands, tendon_positions: one topic, several, or motor to topic; `none` where no topic is one.
+    """
 
     poses: str | dict[str, str] | None = None
-    commands: str | None = None
-    tendon_positions: str | None = None
+    commands: str | list[str] | dict[str, str] | None = None
+    tendon_positions: str | list[str] | dict[str, str] | None = None
+
+    @field_validator("commands", "tendon_positions", mode="before")
+    @classmethod
+    def _left_out(cls, names):
+        return names or NONE  # an empty value in session.yaml means that there is none
+
+    def of(self, key: str) -> list[str]:
+        """All topics that `commands` or `tendon_positions` names."""
+        names = getattr(self, key)
+        names = [] if names in (None, NONE) else names
+        return [names] if isinstance(names, str) else list(names.values() if isinstance(names, dict) else names)
 
 
 UNITS = {"m": 1.0, "mm": 1e-3, "rad": 1.0, "deg": np.pi / 180}
@@ -134,6 +150,11 @@ class MotorEntry(Entry):
             raise ValueError(f"spool_radius: found {self.spool_radius}, expected none for a motor that counts "
                              f"{self.unit}")
         return self
+
+    @property
+    def full_turn(self) -> float | None:
+        """In the unit of its numbers; None of a motor that does not count angles."""
+        return {"rad": 2 * np.pi, "deg": 360.0}.get(self.unit)
 
     @property
     def metres(self) -> float:
@@ -186,6 +207,8 @@ class Session(Entry):
     that the stamps show. With `log`, commands and tendon positions are dated by it too.
     motors: name in the log to what it moves, in place of `tendons`, where motors count otherwise than in metres of a
     tendon's pull, or move several.
+    commands: whether they hold until the next, or go on in a straight line to it; by default they hold, but for ramps
+    whose samples come evenly.
     shared: what is to be said of trials that share data, by trial; see `check_shared`. unlisted: the folder's logs that
     no trial is of.
     """
@@ -198,6 +221,7 @@ class Session(Entry):
     topics: Topics = Topics()
     bodies: list[str] | None = Field(default=None, min_length=1)
     clock: Literal["stamp", "log", "frame"] = "stamp"
+    commands: Between | None = None
     trials: list[TrialEntry] = Field(min_length=1)
     _shared: dict[str, list[str]] = PrivateAttr(default_factory=dict)
     _unlisted: list[str] = PrivateAttr(default_factory=list)
