@@ -38,9 +38,8 @@ def pytest_configure(config):
     config.pluginmanager.register(Workers())
 
 
-@pytest.fixture(autouse=True)
-def _figures_not_laid_out(monkeypatch):
+def pytest_collection_finish():
     """Figures are drawn whole, but where their parts lie is not sought: most of the time, and nobody looks. The demo in
     little draws them laid out."""
     if "trunkline.report.figures.style" in sys.modules:
-        monkeypatch.setitem(sys.modules["matplotlib"].rcParams, "figure.constrained_layout.use", False)
+        sys.modules["matplotlib"].rcParams["figure.constrained_layout.use"] = False
