@@ -95,7 +95,7 @@ def test_control_stage_finds_the_actuators_and_scores_the_cad_model(project):
     ranges = {name: (0.2 * value, 5 * value) for name, value in
               {n: PARAMETERS[n].read(truth) for n in ("kp", "kv", "force_range", "time_constant")}.items()}  # fmt: skip
     evolution = DifferentialEvolution(
-        method="differential_evolution", population=6, population_per_parameter=2, generations=12, tolerance=1e-2
+        method="differential_evolution", population=6, population_per_parameter=1, generations=6, tolerance=1e-2
     )
     config = settings(["curl"], ["release", "curl"], ranges, iterations=25, optimizer=evolution)
     (root / "artifacts/identify_damping").mkdir()

@@ -440,7 +440,6 @@ def run_here(project: Path, monkeypatch) -> None:
     runpy.run_path(str(ROOT / "stages/package_unity.py"), run_name="__main__")
 
 
-@pytest.mark.usefixtures("figures_not_laid_out")
 @pytest.mark.parametrize("change", [str, harden])
 def test_the_stage_writes_package_manifest_and_metrics(project, change, monkeypatch):
     """It makes shared vectors, and settles arms in the plug-in's order of calls: 4 s each."""

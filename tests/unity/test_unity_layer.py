@@ -8,6 +8,7 @@ source file; set TRUNKLINE_MUJOCO to a checkout of google-deepmind/mujoco to com
 import json
 import os
 import re
+import shutil
 import subprocess
 from copy import deepcopy
 from dataclasses import replace
@@ -60,13 +61,15 @@ RAY = about((1.0, 0.0, 0.0), np.pi / 2)  # from a hand of Unity's, ray ahead, to
 
 class Project:
     """A Unity project with some packages, as far as a compiler goes: its assemblies, in a folder. Of `stubs` that are
-    compiled already, those that it has are taken."""
+    compiled already, those that it has are copied."""
 
     def __init__(self, folder: Path, packages: list[str], stubs: dict[str, Path] | None = None) -> None:
         self.folder, self.packages = folder, packages
         hidden = [] if "org.mujoco" in packages else ["Mujoco.Runtime", "Mujoco.Editor"]
         hidden += [] if "com.unity.ai.inference" in packages else ["Unity.InferenceEngine"]
-        self.assemblies = {name: path for name, path in (stubs or {}).items() if name not in hidden}
+        self.assemblies = {
+            name: Path(shutil.copy(path, folder)) for name, path in (stubs or {}).items() if name not in hidden
+        }
         for name, (stub, references) in STUBBED.items():
             if name not in hidden and name not in self.assemblies:
                 uses = [self.assemblies[reference] for reference in references]
