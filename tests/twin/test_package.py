@@ -95,8 +95,8 @@ def test_a_bit_turned_or_an_end_cut_off_is_damage(files, tmp_path):
 
 def test_no_archive_and_no_file_are_said_as_such(tmp_path):
     (tmp_path / "text.tgz").write_bytes(b"no archive")
-    for name, found in (("text.tgz", "Not a gzipped file"), ("none.tgz", "No such file")):
-        with pytest.raises(InputError, match=rf"{name}: found {found}.*, expected a package's \.tgz"):
+    for name, fault in (("text.tgz", "Not a gzipped file"), ("none.tgz", "No such file")):
+        with pytest.raises(InputError, match=rf"{name}: found {fault}.*, expected a package's \.tgz"):
             package.read_tarball(tmp_path / name)
 
 
