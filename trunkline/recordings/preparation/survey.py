@@ -12,7 +12,15 @@ from trunkline.recordings.logs.joint_stream import JointStream, joint_stream
 from trunkline.recordings.logs.mcap_log import Log, Topic, read_log
 from trunkline.recordings.logs.messages import JOINTS, POSES
 from trunkline.recordings.logs.pose_stream import PoseStream, pose_stream
-from trunkline.recordings.session.source import COMMAND_WORDS, POSITION_WORDS, TWIN, choose, pose_topics, static_topics
+from trunkline.recordings.session.source import (
+    COMMAND_WORDS,
+    POSITION_WORDS,
+    TWIN,
+    choose,
+    pose_topics,
+    several_frames,
+    static_topics,
+)
 
 LIVE = "/core/input"  # a topic of a live session alone
 OTHERS = re.compile(r"/headset/|/joint_states$|/joints/command$")  # of people and of the rigid robot
@@ -45,6 +53,8 @@ def survey(path: Path) -> LogSurvey:
         result.pose_topics = pose_topics(arms, None)
         if result.pose_topics:
             result.poses = pose_stream(result.pose_topics, statics=static_topics(result.log))
+            if clash := several_frames(result.poses, result.pose_topics):
+                result.notes.append(f"poses: {clash}")
     except (InputError, ValueError) as error:
         result.notes.append(f"poses: {error}")
     for role, words in (("command", COMMAND_WORDS), ("position", POSITION_WORDS)):
