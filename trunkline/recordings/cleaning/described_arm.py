@@ -13,8 +13,9 @@ from trunkline.recordings.signals.base_frame import average_base, to_base_frame
 from trunkline.recordings.signals.units import METRES_PER
 from trunkline.recordings.trials.raw_trial import RawTrial
 
-FITS = 1.5  # ratio of distances to the described ones, or its inverse, of an arm that is described well
-LONE = 2.5  # the inverse, of one body alone: it comes as near to the base as the arm bends
+FITS = 1.5  # ratio of distances to the described ones, or its inverse, by which another unit is taken
+WRONG = 2.0  # from which on the declared unit, or the description, is wrong; inches over centimetres are 2.54
+LONE = 2.5  # the inverse of both, of one body alone: it comes as near to the base as the arm bends
 OFF = 0.3  # share of the arm's length by which a body may be from where its neighbours would have it
 SIDE = np.radians(60)  # between the described arm and what is measured, next to the base, in every trial
 
@@ -32,14 +33,14 @@ def size_ratio(distances: np.ndarray, markers: Sequence[str], arm: Places) -> fl
     return float(np.nanmedian(ratios)) if np.isfinite(ratios).any() else float("nan")
 
 
-def fits(ratio: float, lone: bool) -> bool:
+def fits(ratio: float, lone: bool, limit: float = WRONG) -> bool:
     """Whether an arm may be of that many times the described size. lone: one body alone tells it."""
-    return 1 / (LONE if lone else FITS) <= ratio <= FITS
+    return 1 / (LONE if lone else limit) <= ratio <= limit
 
 
 def unit_that_fits(ratios: Mapping[str, float], lone: bool) -> str | None:
     """The only unit with which bodies are as far apart as on the described arm, of `ratios` by unit; else None."""
-    fitting = [unit for unit, ratio in ratios.items() if fits(ratio, lone)]
+    fitting = [unit for unit, ratio in ratios.items() if fits(ratio, lone, FITS)]
     return fitting[0] if len(fitting) == 1 else None
 
 
@@ -59,7 +60,7 @@ def against_arm(raw_trials: list[RawTrial], arm: Places, base: str | None, unit:
     length = max(float(np.linalg.norm(place)) for place in arm.values())
     names = (base or "base", *markers)
     faults = [
-        f"{names[b]!r} is usually {1e3 * usual[a, b]:.4g} mm from {names[a]!r}, {1e3 * described:.4g} mm on the "
+        f"{names[b]!r} is usually {1e3 * usual[a, b]:.0f} mm from {names[a]!r}, {1e3 * described:.0f} mm on the "
         "described arm: are its poses in another frame or unit, or are names exchanged?"
         for a, b, described in pairs
         if abs(usual[a, b] - described) > OFF * length
@@ -69,7 +70,7 @@ def against_arm(raw_trials: list[RawTrial], arm: Places, base: str | None, unit:
         other = unit_that_fits(others, len(pairs) == 1)
         remedy = f"`frame.unit: {other}` would fit" if other else f"no unit fits ({', '.join(METRES_PER)})"
         far = f"bodies are {ratio:.3g} times as far apart as on the arm under build_mjcf, in {unit}"
-        return [f"unit: {far}, expected {1 / FITS:.2g} to {FITS:g} times: {remedy}"]
+        return [f"unit: {far}, expected {1 / WRONG:.2g} to {WRONG:g} times: {remedy}"]
     return faults or _base_axes(raw_trials, arm, base, length)
 
 
