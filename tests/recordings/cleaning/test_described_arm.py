@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import yaml
 from scipy.spatial.transform import Rotation
 
 from tests.recordings.cleaning.test_loading import LIMITS
@@ -138,3 +139,48 @@ def test_honest_sessions_have_no_fault(tmp_path):
     gathered = checked(tmp_path)
     assert gathered.refused == {}
     assert not any("unit" in line or "attitudes" in line for record_ in gathered.findings for line in record_.warnings)
+
+
+def levelled(folder, up, levels) -> CheckedSession:
+    """Tilts and a release in a z-up world, declared with another vertical and levels."""
+    record(folder, FREE, replace(quiet(), up=(0.0, 0.0, 1.0)))
+    path = folder / "session.yaml"
+    content = yaml.safe_load(path.read_text())
+    content["frame"]["up"] = up
+    for trial, level in zip(content["trials"], levels, strict=False):
+        trial["level"] = level
+    path.write_text(yaml.safe_dump(content))
+    return checked(folder)
+
+
+def said_of_up(gathered: CheckedSession) -> str:
+    return "; ".join({line for record_ in gathered.findings for line in record_.warnings + record_.repairs
+                      if line.startswith("up:")})  # fmt: skip
+
+
+def test_releases_are_looked_at_beside_levels_that_fit_a_wrong_vertical(tmp_path):
+    """As where levels were computed with it."""
+    base = Rotation.from_euler("z", 40, degrees=True)
+    axes = [(base * Rotation.from_euler("y", tilt, degrees=True)).apply([0, 0, 1]) for tilt in (0, 30, 60)]
+    levels = [float(np.degrees(np.arccos(axis[1]))) for axis in axes]
+    assert "released arms come to rest 90° from hanging with [0, 1, 0]" in said_of_up(
+        levelled(tmp_path, [0, 1, 0], levels)
+    )
+    assert said_of_up(levelled(tmp_path / "right", [0, 0, 1], [0, 30, 60])) == ""
+
+
+def test_a_vertical_that_releases_exclude_is_not_taken(tmp_path):
+    """Levels that are upside down prove nothing against an arm that hangs."""
+    gathered = levelled(tmp_path, [0, 0, 1], [180, 150, 120])
+    assert "levels would fit [0, 0, -1], along which released arms do not hang: check" in said_of_up(gathered)
+    assert gathered.raw_trials[0].up.tolist() == [0, 0, 1]
+
+
+def test_a_log_that_no_trial_is_of_is_said(tmp_path):
+    record(tmp_path, FREE, quiet())
+    path = tmp_path / "session.yaml"
+    content = yaml.safe_load(path.read_text())
+    content["trials"] = content["trials"][:-1]
+    path.write_text(yaml.safe_dump(content))
+    (line_,) = {line for record_ in checked(tmp_path).findings for line in record_.warnings if "logs:" in line}
+    assert line_ == "logs: release_a.mcap in the folder, but in no trial of session.yaml: left out"

@@ -49,8 +49,8 @@ def up_by_sags(surveys: list[LogSurvey], base: str | None) -> Axis | None:
     sags = np.einsum("kij,kj->ki", across, tips)
     down, _, _, sizes = np.linalg.lstsq(across.reshape(-1, 3), sags.ravel(), rcond=None)
     left = np.sum((sags.ravel() - across.reshape(-1, 3) @ down) ** 2)
-    told = sizes[-1] ** 2 >= LEAST * len(arms) and np.linalg.norm(sags, axis=1).max() >= SAGS
-    if not told or left > (1 - EXPLAINED) * np.sum(sags**2):
+    enough = sizes[-1] ** 2 >= LEAST * len(arms) and np.linalg.norm(sags, axis=1).max() >= SAGS
+    if not enough or left > (1 - EXPLAINED) * np.sum(sags**2):
         return None
     up = -down / np.linalg.norm(down)
     return nearest_axis(up) if np.abs(up).max() >= SNAPS else None

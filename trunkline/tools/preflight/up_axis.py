@@ -27,13 +27,13 @@ def other_ups(raw_trials: list[RawTrial]) -> dict[str, np.ndarray]:
     gravity, or whose base is upright by its very declaration, and none of several sessions, which each have an `up`."""
     if len({raw.session for raw in raw_trials}) > 1:
         return {}
-    gravities, possible = {}, possible_axes(raw_trials) if raw_trials else None
+    gravities, possible = {}, possible_axes(raw_trials)
     for raw in raw_trials:
         base = average_base(raw.base_positions, raw.base_quaternions)
         declared = not np.ptp(raw.base_quaternions, axis=0).any() and np.allclose(base.rotation.apply(Z), raw.up)
         if raw.up.any() and not declared:
             gravities[raw.name] = np.array([gravity_from_up(base, axis) for axis in AXES])
-            gravities[raw.name][np.logical_not(possible)] = np.nan
+            gravities[raw.name][~possible] = np.nan
     return gravities
 
 
