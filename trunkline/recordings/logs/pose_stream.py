@@ -40,8 +40,9 @@ class PoseStream:
     (T, B, 4) wxyz or None; NaN where absent. undecodable: messages that do not fit their schema, or that hold
     another number of poses than there are names. unnamed: poses in a message that nobody names, else None.
     parents: names of the frames that the poses are in, where messages say it for each; several, where nothing
-    connects them. twice: a name that several poses of one message have, else None; such messages do not fit either.
-    notes: what reading them took, a sentence each.
+    connects them. header_frames: those that headers name, by topic, in which all poses of a message are. twice: a name
+    that several poses of one message have, else None; such messages do not fit either. notes: what reading them took,
+    a sentence each.
     """
 
     stamps: np.ndarray
@@ -56,6 +57,7 @@ class PoseStream:
     parents: tuple[str, ...] = ()
     twice: str | None = None
     notes: list[str] = field(default_factory=list)
+    header_frames: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     def take(self, rows: np.ndarray) -> "PoseStream":
         """Some of its frames, (T,) flags or indices."""
@@ -88,12 +90,13 @@ def pose_stream(
     Raises:
         ValueError: the messages cannot be read at all, or frames are no tree, or `frame` is none of them.
     """
-    unnamed, twice, read = None, None, []
+    unnamed, twice, read, header_frames = None, None, [], {}
     notes: list[str] = []
     for name, topic in topics.items():
         topic, some = readable_topic(topic)
         notes += some
-        batches = list(_read_poses(topic))
+        header_frames[topic.name] = frames = {}
+        batches = list(_read_poses(topic, frames))
         declared = bodies if name is None else [name]
         if declared is None and any(poses.names is None for _, poses in batches):
             unnamed = max(poses.positions.shape[-2] for _, poses in batches)
@@ -116,6 +119,7 @@ def pose_stream(
         stream = _gather(samples)
     stream.undecodable = sum(len(topic.messages) for topic in topics.values()) - readable
     stream.unnamed, stream.parents, stream.twice, stream.notes = unnamed, tuple(parents), twice, notes
+    stream.header_frames = {name: tuple(frames) for name, frames in header_frames.items() if frames}
     return without_repeats(stream)
 
 
@@ -127,7 +131,8 @@ def _repeated(names: list[str] | np.ndarray | None) -> str | None:
     return None
 
 
-def _read_poses(topic: Topic) -> Iterator[tuple[np.ndarray, DecodedPoses]]:
+def _read_poses(topic: Topic, frames: dict[str, None] | None = None) -> Iterator[tuple[np.ndarray, DecodedPoses]]:
+    """Batches, or single messages, as `decode` gives them; the frames that their headers name are added to `frames`."""
     reader = POSES[short_name(topic.schema)]
     for rows, message in decode(topic):
         try:
@@ -136,7 +141,14 @@ def _read_poses(topic: Topic) -> Iterator[tuple[np.ndarray, DecodedPoses]]:
             named = names if names is None or isinstance(names, np.ndarray) else [str(name) for name in names]
         except READING:
             continue
+        if frames is not None and poses.parents is None and (frame := _header_frame(message)):
+            frames[frame] = None
         yield rows, poses._replace(names=named)
+
+
+def _header_frame(message) -> str:
+    """The frame that the header of a message names, or the message itself as Foxglove's do; empty where none does."""
+    return str(getattr(getattr(message, "header", message), "frame_id", "")).strip("/")
 
 
 def _batches(rows: np.ndarray, poses: DecodedPoses, topic: Topic, declared: Sequence[str] | None) -> Iterator[Batch]:

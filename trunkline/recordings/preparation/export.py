@@ -68,7 +68,8 @@ def read_export(path: Path, unit: str | None = None) -> Export:
         torn = bool(frames) and text[-1] not in "\r\n"  # the last number may lack digits
         rows = rows[:-1] if torn else rows
         lost = ", the last of them cut off and left out" if torn else ""
-        remarks.append(f"found {frames} frames{lost}, Total Exported Frames says {total}: is it all there?")
+        expected = f"the header says {total} (Total Exported Frames): is it all there?"
+        remarks.append(f"found {frames} frames{lost}, {expected}")
     numbers = _numbers(path, rows, first + 1)
     if not len(numbers):
         raise InputError(f"{path}: found no frame below the header")

@@ -19,7 +19,6 @@ BASE_NAMES = ("base", "mount", "root", "origin")
 GUESSED = "  # up as if the arm hangs: no log tells it of a mount that is turned"
 UNUSUAL = "  # not {}: the arm hangs along another axis"
 RESTING = 5e-3  # m; a trial whose every body stays within this, but for its worst hundredth, is at rest
-TO_FILL_IN = "???"  # read_session refuses it
 
 
 def propose(surveys: list[LogSurvey], ups: tuple[Axis, ...] = (), folder: Path | None = None) -> str:
@@ -82,8 +81,8 @@ def propose(surveys: list[LogSurvey], ups: tuple[Axis, ...] = (), folder: Path |
         lines.append(
             f"  - {{file: {_quoted(file.as_posix())}{name_text}, experiment: {experiment}{level_text}, split: {split}}}"
         )
-    if any(level == TO_FILL_IN for _, level in trials):
-        lines.append("# Write the degrees of tilt that you set: the logs do not tell them apart from `up`.")
+    if any(level is None and EXPERIMENTS[experiment].level is TILT for experiment, level in trials):
+        lines.append("# Add the `level` that you set of each static_tilt, in degrees: no log tells it without `up`.")
     return "\n".join(lines) + "\n"
 
 
@@ -157,7 +156,7 @@ def _experiment(
         return experiment, f"{round(1e3 * _drawn_in(survey.commands, survey.tendon_positions)):g}"
     if level is not TILT:
         return experiment, None
-    return experiment, TO_FILL_IN if up is None else f"{_tilt(poses, base, np.array(up)):g}"
+    return experiment, None if up is None else f"{_tilt(poses, base, np.array(up)):g}"
 
 
 def _drawn_in(commands: JointStream | None, measured: JointStream | None) -> float:

@@ -18,6 +18,7 @@ from trunkline.recordings.session.source import (
     TWIN,
     motor_stream,
     pose_topics,
+    several_frames,
     static_topics,
 )
 
@@ -53,6 +54,8 @@ def survey(path: Path) -> LogSurvey:
         if result.pose_topics:
             result.poses = pose_stream(result.pose_topics, statics=static_topics(result.log))
             result.notes += result.poses.notes
+            if clash := several_frames(result.poses, result.pose_topics):
+                result.notes.append(f"poses: {clash}")
     except (InputError, ValueError) as error:
         result.notes.append(f"poses: {error}")
     names = None

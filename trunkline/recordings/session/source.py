@@ -68,6 +68,8 @@ def open_log(path: Path, session: Session) -> LogSource:
     if len(poses.parents) > 1 and session.frame.name is None:
         problem = f"found poses in the frames {', '.join(poses.parents)}, which nothing connects"
         raise InputError(f"{where}: {problem}, expected one, or its name in session.yaml: frame.name")
+    if clash := several_frames(poses, topics, session):
+        raise InputError(f"{path}: {clash}")
     declared = session.tendons or session.motors
     names = None if declared is None else {*declared, *(session.tendons or {}).values()}
     topics_of = session.topics
@@ -81,6 +83,26 @@ def open_log(path: Path, session: Session) -> LogSource:
     joint_topics = tuple(name for name, t in log.topics.items() if short_name(t.schema) in JOINTS)
     log.topics = {}  # decoded: the raw messages can go
     return LogSource(log, name, poses, commands, tendon_positions, joint_topics)
+
+
+def several_frames(poses: PoseStream, topics: dict[str | None, Topic], session: Session | None = None) -> str:
+    """That poses of the session, or any, are in several frames by their headers, with topics and frames; else empty.
+
+    A frame that is called as the topic's own body is none that it could be in: some drivers write that name.
+    """
+    used = None
+    if session is not None and session.markers is not None:
+        used = {*session.markers, session.base if isinstance(session.base, str) else ""}
+    in_frame: dict[str, list[str]] = {}
+    for body, topic in topics.items():
+        if used is None or body is None or body in used:
+            for frame in poses.header_frames.get(topic.name, ()):
+                if frame != body:
+                    in_frame.setdefault(frame, []).append(topic.name)
+    if len(in_frame) < 2:
+        return ""
+    frames = ", ".join(f"{frame!r} ({', '.join(names)})" for frame, names in in_frame.items())
+    return f"header.frame_id: found poses in the frames {frames}, expected all of them in one"
 
 
 def _joints(

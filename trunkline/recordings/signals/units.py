@@ -33,9 +33,9 @@ def likely_unit(positions: list[np.ndarray]) -> str | None:
 
 
 def other_units(positions: list[np.ndarray], unit: str) -> str:
-    """How long the arm is in every unit that could be as well, as words; empty where metres are likely."""
+    """How long the arm is in every unit that could be, as words; empty where metres are taken, and likely."""
     size = _usual_extent(positions)
-    if unit == "m":
+    if unit == "m" and SMALLEST_ARM <= size <= LARGEST_ARM:
         return ""
     lengths = {other: metres * size for other, metres in METRES_PER.items()}
     likely = {other: length for other, length in lengths.items() if SMALLEST_ARM <= length <= LARGEST_ARM}

@@ -25,6 +25,7 @@ from trunkline.identification.parameters.per_session import (
 from trunkline.identification.simulate.checks import check_trials
 from trunkline.identification.stages import STAGES
 from trunkline.model.arm.kinds import described_arm
+from trunkline.model_files import marker_places
 from trunkline.pipeline.config import own_or_project, settings_of
 from trunkline.program import program_name
 from trunkline.recordings.trials.inventory import missing_lines, recorded_of_each
@@ -56,7 +57,7 @@ def main(arguments: list[str] | None = None) -> int:
     configs = {stage: settings_of(stage, args.settings) for stage in STAGES if stage in params}
     if arm := (params.get("build_mjcf") or {}).get("arm"):
         print(f"arm: {arm}, as {args.settings / 'params.yaml'} has it", flush=True)
-    trials, raw_trials = read_trials_of(args.session, args.settings, "check")
+    trials, raw_trials = read_trials_of(args.session, args.settings, "check", marker_places(model))
     check_trials([trial for trial in trials if trial.split in DECIDING], model)
     print("\n".join(["recorded:", *(f"  {line}" for line in recorded_of_each(trials))]))
     if missing := missing_lines(trials):
