@@ -10,7 +10,7 @@ from mcap_ros2.decoder import DecoderFactory
 from mcap_ros2.writer import Writer as RosWriter
 
 from tests.recordings.cleaning.test_loading import edit_session, one_trial, taken
-from tests.support.sessions import curl_truth
+from tests.support.sessions import curl_truth, pull_truth
 from trunkline.errors import InputError
 from trunkline.recordings.logs.definitions import JOINT_STATE, RIGID_BODIES
 
@@ -258,3 +258,18 @@ def test_commands_that_are_sent_on_change_hold(tmp_path):
     _, after, _ = changed(tmp_path, split)
     sent = np.interp(after.command_time[-1] * np.linspace(0, 1, 500), after.command_time, after.commands[:, 0])
     assert np.mean(np.abs(sent / 0.01 - np.round(sent / 0.01)) > 1e-3) < 0.02, "steps, no ramps between them"
+
+
+def test_a_command_that_was_sent_before_the_poses_holds_an_arm_at_rest(tmp_path):
+    def latched(m):
+        first = {"command_stamps": m.command_stamps[:1] - 7_500_000_000, "command_logged": m.command_logged[:1]}
+        none = {key: getattr(m, key)[:0] for key in ("tendon_stamps", "tendon_logged", "tendon_positions")}
+        return replace(m, **first, **none, commands=m.commands[:1])
+
+    before, _ = one_trial(tmp_path, lambda m: None, pull_truth())
+    one_trial(tmp_path, latched, pull_truth())
+    edit_session(tmp_path, ", tendon_positions: /tendon_states", "")
+    ((after, findings),) = taken(tmp_path)
+    assert not isinstance(after, InputError), str(after)
+    np.testing.assert_array_equal(after.commands, before.commands[:1])
+    assert any("s before the poses: the last holds" in line for line in findings.repairs)

@@ -107,9 +107,8 @@ def test_the_second_version_of_named_poses_is_read(tmp_path):
         return [(topic, message | {"timestamp": 7})]
 
     schema, definition, _ = ROS["named"]
-    definition = definition.replace(
-        "motion_capture_tracking_interfaces/NamedPose[]", "uint64 timestamp\nmotion_capture_tracking_interfaces/NamedPose[]"
-    )
+    array = "motion_capture_tracking_interfaces/NamedPose[]"
+    definition = definition.replace(array, f"uint64 timestamp\n{array}")
     same_poses(
         written(tmp_path / "second.mcap", schema + "V2", definition, content), named(tmp_path / "log.mcap")
     )
