@@ -79,8 +79,8 @@ def _agreed(
     lag = float(np.median([lags[name] for name in deciding(lags, splits.__getitem__)[0]])) if lags else None
     possible = lag is None or -AHEAD <= lag <= longest_lag
     uncertain = [record.by_log_times.uncertainty for record in findings if record.by_log_times]
-    agreed = len(chosen) > 1 and logged and spread <= max(float(np.median(uncertain)), LEAST)
-    if logged and (possible or agreed):
+    steady = len(chosen) > 1 and logged and spread <= max(float(np.median(uncertain)), LEAST)
+    if logged and (possible or steady):
         if not possible:
             moves = f"by its motion the arm would move {lag:+.3f} s after its tendons, expected {-AHEAD:g} to"
             stays = f"the log times of {len(chosen)} trials agree on {offset:.3f} s, which is used"
