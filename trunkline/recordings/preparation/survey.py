@@ -19,6 +19,7 @@ from trunkline.recordings.session.source import (
     motor_stream,
     pose_topics,
     static_topics,
+    without_unset,
 )
 
 LIVE = "/core/input"  # a topic of a live session alone
@@ -51,7 +52,7 @@ def survey(path: Path) -> LogSurvey:
     try:
         result.pose_topics = pose_topics(arms, None)
         if result.pose_topics:
-            result.poses = pose_stream(result.pose_topics, statics=static_topics(result.log))
+            result.poses = without_unset(pose_stream(result.pose_topics, statics=static_topics(result.log)))
             result.notes += result.poses.notes
     except (InputError, ValueError) as error:
         result.notes.append(f"poses: {error}")

@@ -77,8 +77,8 @@ def open_log(path: Path, session: Session) -> LogSource:
     tendon_positions, notes = _joints(log, chosen.tendon_positions, "tendon position", POSITION_WORDS, names, session)
     poses.notes += notes
     if session.clock != "log":
-        poses = _dated(poses)
-        commands, tendon_positions = (some and _dated(some) for some in (commands, tendon_positions))
+        poses = without_unset(poses)
+        commands, tendon_positions = (some and without_unset(some) for some in (commands, tendon_positions))
     joint_topics = tuple(name for name, t in log.topics.items() if short_name(t.schema) in JOINTS)
     log.topics = {}  # decoded: the raw messages can go
     return LogSource(log, name, poses, commands, tendon_positions, joint_topics)
@@ -135,7 +135,7 @@ def motor_stream(
     return (joined(streams) if streams else None), notes
 
 
-def _dated(stream: Dated) -> Dated:
+def without_unset(stream: Dated) -> Dated:
     """A stream of messages with stamps, without those whose sender's clock was not set yet."""
     if not stream.stamps.any():
         return stream
@@ -144,8 +144,8 @@ def _dated(stream: Dated) -> Dated:
         return stream
     number, stamp = int(np.argmin(good)) + 1, 1e-9 * stream.stamps[np.argmin(good)]
     count = int(np.sum(~good))
-    of = "a message is" if count == 1 else f"{count} messages are"
-    problem = f"stamps of {of} a day or more from the others, such as {stamp:.9g} s of number"
+    of = "the stamp of a message is" if count == 1 else f"stamps of {count} messages are"
+    problem = f"{of} a day or more from the others, such as {stamp:.9g} s of number"
     stream = stream.take(good)
     stream.notes = [*stream.notes, f"{problem} {number}, as if a clock was not set yet: left out"]
     return stream
