@@ -23,7 +23,7 @@ def cad_arm(config: Config) -> CadArm:
 def main(config: Config) -> None:
     arm = cad_arm(config)
     model = arm.spec.compile()
-    if model.nu or len(ArmModel(model).cables):  # refused here rather than hours later, by the first stage that needs the statics
+    if model.nu or len(ArmModel(model).cables):  # refused here, and not hours later by what first needs the statics
         read_chain(model)
     with output_folder(ARTIFACTS) as folder:
         (folder / "arm.xml").write_text(arm.spec.to_xml())

@@ -88,7 +88,8 @@ def _unlike(model: mujoco.MjModel) -> str | None:
             return f"body {name!r}: found {joints} joints, expected two hinges, or none to be part of its parent"
     weak = np.flatnonzero((model.jnt_stiffness[:count] <= 0) | (model.dof_damping[:count] <= 0))
     if len(weak):
-        return f"joint {model.joint(int(weak[0])).name!r}: found no stiffness or no damping, expected a guess to begin with"
+        name = model.joint(int(weak[0])).name
+        return f"joint {name!r}: found no stiffness or no damping, expected a guess to begin with"
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     mount = data.site("base_center")

@@ -37,7 +37,8 @@ def _require_plain_options(model: mujoco.MjModel) -> None:
             raise InputError(f"model: found {count} {what}, expected none")
     for bit in _FORCES_OFF:
         if model.opt.disableflags & bit:
-            raise InputError(f"model: option flag: found {bit.name.removeprefix('mjDSBL_').lower()} disabled, expected enabled")
+            name = bit.name.removeprefix("mjDSBL_").lower()
+            raise InputError(f"model: option flag: found {name} disabled, expected enabled")
     if model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_DIAGEXACT:
         raise InputError("model: option flag: found diagexact enabled, expected disabled")
     if np.any(model.body_gravcomp):

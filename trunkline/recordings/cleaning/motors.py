@@ -72,7 +72,8 @@ def read_motors(
             if EXPERIMENTS[experiment].needs_motors:
                 for (seconds, numbers), scale in zip(whole, scales, strict=True):
                     _one_publisher(seconds, numbers * scale, f"{where}: {stream.topic}")
-                if is_held(experiment) and (last := max((some[0][-1] for some in whole if len(some[0])), default=0.0)) < -NO_WORD:
+                last = max((some[0][-1] for some in whole if len(some[0])), default=0.0)
+                if is_held(experiment) and last < -NO_WORD:
                     findings.repairs.append(f"commands end {-last:.1f} s before the poses: the last holds")
             whole = [with_corners(*some, session.commands) for some in whole]
         seconds, pulls = _side_by_side(whole)
@@ -232,8 +233,8 @@ def _one_publisher(seconds: np.ndarray, pulls: np.ndarray, where: str) -> None:
     begin = seconds[places[0][0] + 1]
     far = 1e3 * max(size for *_, size in places)
     raise InputError(
-        f"{where}: commands jump to and fro {len(places)} times, by up to {far:.3g} mm, first at {begin:.2f} s, and are "
-        "back with the next message or two: do two publishers write to the topic? expected one"
+        f"{where}: commands jump to and fro {len(places)} times, by up to {far:.3g} mm, first at {begin:.2f} s, and "
+        "are back with the next message or two: do two publishers write to the topic? expected one"
     )
 
 

@@ -86,15 +86,15 @@ def _evened(stamps: np.ndarray, rows: np.ndarray, poses: PoseStream, clock: str,
     even = even_times(time, numbers)
     if even is None:
         shortest = 1e3 * float(np.diff(time).min())
-        problem = f"{what} are uneven, the nearest two {shortest:.2g} ms apart, and do not tell which frames are missing"
-        findings.warnings.append(f"{problem}: expected even ones, or frame numbers and `clock: frame`")
+        problem = f"{what} are uneven, the nearest two {shortest:.2g} ms apart, and do not tell which frames"
+        findings.warnings.append(f"{problem} are missing: expected even ones, or frame numbers and `clock: frame`")
         return stamps
     late = even.late - np.quantile(even.late, 0.05)
     by = "their count" if numbers is None else "frame numbers"
     missing = f", {even.missing} of them missing in between" if even.missing else ""
     findings.repairs.append(
-        f"{what} are up to {1e3 * late.max():.0f} ms late, though frames come at {even.rate:.3g} Hz{missing}: their times "
-        f"evened out by {by}"
+        f"{what} are up to {1e3 * late.max():.0f} ms late, though frames come at {even.rate:.3g} Hz{missing}: their "
+        f"times evened out by {by}"
     )
     evened = stamps.copy()
     evened[rows] = stamps[rows[0]] + np.round(even.time * 1e9).astype(np.int64)

@@ -260,13 +260,17 @@ def without_repeats(stream: PoseStream) -> PoseStream:
     moving = ~alike.all(axis=(0, 2))  # a body that stands for a constant tells nothing
     if not moving.any():
         return stream
-    whole = alike[:, moving].all(axis=(1, 2)) & equal[:, moving].any(axis=(1, 2))
-    lengths = np.diff(np.flatnonzero(np.r_[True, ~whole, True]))  # of each stretch of equal frames
-    longest = 2 * int(np.ceil(np.median(lengths))) + 1
-    repeats = np.concatenate([[False], whole & (np.repeat(lengths, lengths)[1:] <= longest)])
-    if not repeats.any() or len(lengths) < FEWEST:
+    numbers = np.where(np.isnan(values), np.inf, values)[:, moving].reshape(len(order), -1) + 0.0  # no -0
+    whole = np.ascontiguousarray(numbers).view(np.dtype((np.void, numbers.itemsize * numbers.shape[1]))).ravel()
+    _, first, which, sizes = np.unique(whole, return_index=True, return_inverse=True, return_counts=True)
+    last = len(order) - 1 - np.unique(which[::-1], return_index=True)[1]
+    near = last - first <= 2 * sizes  # the next pose may come before the last repeat
+    usual = sizes <= 2 * int(np.ceil(np.median(sizes))) + 1
+    repeats = (near & usual & np.isfinite(numbers[first]).any(axis=1))[which]
+    repeats[first] = False
+    if not repeats.any() or len(sizes) < FEWEST:
         return stream
-    by_chance = np.prod(alike[~whole].mean(axis=0)[moving])  # that all of a frame's rounded numbers stay by themselves
+    by_chance = np.prod(alike[~repeats[1:]].mean(axis=0)[moving])  # that a frame's rounded numbers stay by themselves
     if CLEAR * by_chance > repeats.mean():
         return stream
     keep = np.ones(len(order), bool)

@@ -20,6 +20,7 @@ from trunkline.recordings.session.source import (
     pose_topics,
     several_frames,
     static_topics,
+    without_unset,
 )
 
 LIVE = "/core/input"  # a topic of a live session alone
@@ -52,7 +53,7 @@ def survey(path: Path) -> LogSurvey:
     try:
         result.pose_topics = pose_topics(arms, None)
         if result.pose_topics:
-            result.poses = pose_stream(result.pose_topics, statics=static_topics(result.log))
+            result.poses = without_unset(pose_stream(result.pose_topics, statics=static_topics(result.log)))
             result.notes += result.poses.notes
             if clash := several_frames(result.poses, result.pose_topics):
                 result.notes.append(f"poses: {clash}")

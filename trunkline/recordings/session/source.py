@@ -16,7 +16,7 @@ from trunkline.recordings.logs.pose_stream import PoseStream, pose_stream
 from trunkline.recordings.session.session import NONE, Session
 
 Stream = TypeVar("Stream")
-Dated = TypeVar("Dated", PoseStream, JointStream | None)
+Dated = TypeVar("Dated", PoseStream, JointStream)
 UNSET = 86_400_000_000_000  # ns, a day from the others, by which a clock is another than theirs
 STATIC = "tf_static"  # how the topic's name ends
 TWIN = "tf_twin"  # the same, of poses that a model drew and nobody measured (docs/live-sessions.md)
@@ -72,14 +72,15 @@ def open_log(path: Path, session: Session) -> LogSource:
         raise InputError(f"{path}: {clash}")
     declared = session.tendons or session.motors
     names = None if declared is None else {*declared, *(session.tendons or {}).values()}
-    topics_of = session.topics
-    commands, _ = _joints(log, topics_of.commands, "command", COMMAND_WORDS, names, session)
+    chosen = session.topics
+    commands, _ = _joints(log, chosen.commands, "command", COMMAND_WORDS, names, session)
     if names is None and commands is not None and commands.unnamed is None:
         names = set(commands.names)
-    tendon_positions, notes = _joints(log, topics_of.tendon_positions, "tendon position", POSITION_WORDS, names, session)
+    tendon_positions, notes = _joints(log, chosen.tendon_positions, "tendon position", POSITION_WORDS, names, session)
     poses.notes += notes
     if session.clock != "log":
-        poses, commands, tendon_positions = (_dated(stream) for stream in (poses, commands, tendon_positions))
+        poses = without_unset(poses)
+        commands, tendon_positions = (some and without_unset(some) for some in (commands, tendon_positions))
     joint_topics = tuple(name for name, t in log.topics.items() if short_name(t.schema) in JOINTS)
     log.topics = {}  # decoded: the raw messages can go
     return LogSource(log, name, poses, commands, tendon_positions, joint_topics)
@@ -156,17 +157,17 @@ def motor_stream(
     return (joined(streams) if streams else None), notes
 
 
-def _dated(stream: Dated) -> Dated:
+def without_unset(stream: Dated) -> Dated:
     """A stream of messages with stamps, without those whose sender's clock was not set yet."""
-    if stream is None or not len(stream.stamps) or not stream.stamps.any():
+    if not stream.stamps.any():
         return stream
     good = np.abs(stream.stamps - np.median(stream.stamps)) < UNSET
     if good.all() or good.mean() < 0.5:
         return stream
     number, stamp = int(np.argmin(good)) + 1, 1e-9 * stream.stamps[np.argmin(good)]
     count = int(np.sum(~good))
-    of = "a message is" if count == 1 else f"{count} messages are"
-    problem = f"stamps of {of} a day or more from the others, such as {stamp:.9g} s of number"
+    of = "the stamp of a message is" if count == 1 else f"stamps of {count} messages are"
+    problem = f"{of} a day or more from the others, such as {stamp:.9g} s of number"
     stream = stream.take(good)
     stream.notes = [*stream.notes, f"{problem} {number}, as if a clock was not set yet: left out"]
     return stream

@@ -13,10 +13,13 @@ CORNER = 1e-6  # s, of the jump from what was held to what is sent
 AWAY = 3  # messages of the other publisher in a row, at most,
 SOON = 0.15  # s, in which the first one is back
 FAR, BACK = 1e-3, 0.2  # m, and share of the way, by which commands go, and are off the way back
+SMOOTH = 0.2  # share of a jump by which commands go the same way just before: then it is no jump
 OFTEN = 5  # times, from which on it is no chance
 
 
-def with_corners(time: np.ndarray, commands: np.ndarray, between: Between | None = None) -> tuple[np.ndarray, np.ndarray]:
+def with_corners(
+    time: np.ndarray, commands: np.ndarray, between: Between | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Times (T',) s and commands (T', K), straight lines through which are what was sent at times (T,) s.
 
     Args: between: None: held, but for ramps that are sampled evenly, as their samples show.
@@ -51,6 +54,9 @@ def to_and_fro(time: np.ndarray, commands: np.ndarray) -> list[tuple[int, int, f
     """
     places, back = [], 0
     for at in np.flatnonzero(np.abs(np.diff(commands, axis=0)).max(axis=1, initial=0) > FAR):
+        out, before = commands[at + 1] - commands[at], commands[at] - commands[max(at - 1, 0)]
+        if before @ out > SMOOTH * (out @ out):  # on its way there before
+            continue
         for ahead in range(2, min(AWAY + 2, len(time) - at)):
             if at < back or time[at + ahead] - time[at] > SOON:
                 break
