@@ -7,7 +7,8 @@ from pathlib import Path
 
 from trunkline.compute.progress import progress
 from trunkline.errors import InputError
-from trunkline.model_files import marker_places, read_spec
+from trunkline.model.places import marker_places
+from trunkline.model_files import read_spec
 from trunkline.pipeline.stage import output_folder, run_stage, write_json, write_metrics
 from trunkline.recordings.cleaning.checks import TrialLimits
 from trunkline.recordings.cleaning.described_arm import Places

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import mujoco
-import numpy as np
 
 from trunkline.errors import InputError, existing
 
@@ -32,16 +31,3 @@ def read_model(path: str | Path) -> mujoco.MjModel:
     if not model.nu:
         raise InputError(f"{path}: found no tendons, expected at least one: an arm without ends with identify_damping")
     return model
-
-
-def marker_places(model: mujoco.MjModel) -> dict[str, np.ndarray]:
-    """Where markers are on the straight arm, m in the base frame, each of shape (3,), by name; none without a base."""
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    ends = "_center"  # as `trunkline.model.arm_model.CENTER`
-    sites = {model.site(i).name.removesuffix(ends): i for i in range(model.nsite) if model.site(i).name.endswith(ends)}
-    base = sites.pop("base", None)
-    if base is None:
-        return {}
-    turn = data.site_xmat[base].reshape(3, 3)
-    return {name: (data.site_xpos[site] - data.site_xpos[base]) @ turn for name, site in sites.items()}

@@ -7,7 +7,8 @@ from tests.recordings.cleaning.test_loading import LIMITS
 from tests.recordings.cleaning.test_sanity_checks import PLAUSIBLE
 from tests.support.folders import CASES, with_cases
 from trunkline.errors import InputError
-from trunkline.model_files import marker_places, read_spec
+from trunkline.model.places import marker_places
+from trunkline.model_files import read_spec
 from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.cleaning.session_checks import CheckedSession, check_session
 from trunkline.recordings.preparation.inspect import main as inspect

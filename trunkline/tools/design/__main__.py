@@ -20,7 +20,7 @@ from trunkline.identification.fit.setup import check_parameters
 from trunkline.identification.parameters.per_session import make_room, per_session_names
 from trunkline.identification.stages import STAGES, final_model
 from trunkline.model.arm.kinds import described_arm
-from trunkline.model_files import marker_places
+from trunkline.model.places import marker_places
 from trunkline.pipeline.config import load_folder, own_or_project, settings_of
 from trunkline.program import program_name
 from trunkline.recordings.trials.experiments import EXPERIMENTS

@@ -16,7 +16,7 @@ from trunkline.errors import InputError, in_one_line
 from trunkline.identification.evaluation.error_tables import marker_table, trial_table
 from trunkline.identification.results.scoring import evaluate
 from trunkline.identification.simulate.checks import check_trials
-from trunkline.model_files import marker_places
+from trunkline.model.places import marker_places
 from trunkline.pipeline.stage import output_folder, write_metrics
 from trunkline.program import program_name
 from trunkline.recordings.trials.trial import sessions_of

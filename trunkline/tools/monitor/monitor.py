@@ -9,7 +9,7 @@ from pathlib import Path
 from trunkline.compute.progress import progress
 from trunkline.errors import InputError
 from trunkline.identification.simulate.checks import check_trials
-from trunkline.model_files import marker_places
+from trunkline.model.places import marker_places
 from trunkline.pipeline.config import settings_of
 from trunkline.pipeline.stage import output_folder
 from trunkline.recordings.trials.splits import DECIDING

@@ -25,7 +25,7 @@ from trunkline.identification.parameters.per_session import (
 from trunkline.identification.simulate.checks import check_trials
 from trunkline.identification.stages import STAGES
 from trunkline.model.arm.kinds import described_arm
-from trunkline.model_files import marker_places
+from trunkline.model.places import marker_places
 from trunkline.pipeline.config import own_or_project, settings_of
 from trunkline.program import program_name
 from trunkline.recordings.trials.inventory import missing_lines, recorded_of_each
