@@ -64,7 +64,7 @@ def readable_topic(topic: Topic) -> tuple[Topic, list[str]]:
         name = ENCAPSULATIONS.get(kind, f"0x{kind:04x}")
         raise ValueError(f"found messages in the encapsulation {name}, expected plain CDR, which ROS 2 writes unless a "
                          "QoS profile of the middleware sets another data representation: set XCDR1 there")  # fmt: skip
-    if not topic.definition.strip():
+    if topic.schema_encoding in ("", "ros2msg") and not topic.definition.strip():
         usual = KNOWN.get(cdr.short_name(topic.schema))
         if usual is None:
             raise ValueError(f"found no text in the schema {topic.schema}, expected its definition")
