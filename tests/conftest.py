@@ -5,7 +5,6 @@ every file over all workers, so that each of them makes every fixture and compil
 """
 
 import os
-import sys
 from pathlib import Path, PurePosixPath
 
 import pytest
@@ -38,8 +37,9 @@ def pytest_configure(config):
     config.pluginmanager.register(Workers())
 
 
-def pytest_collection_finish():
-    """Figures are drawn whole, but where their parts lie is not sought: most of the time, and nobody looks. The demo in
-    little draws them laid out."""
-    if "trunkline.report.figures.style" in sys.modules:
-        sys.modules["matplotlib"].rcParams["figure.constrained_layout.use"] = False
+@pytest.fixture
+def figures_not_laid_out(monkeypatch):
+    """Figures are drawn whole, but where their parts lie is not sought: most of the time, and nobody looks."""
+    import matplotlib
+
+    monkeypatch.setitem(matplotlib.rcParams, "figure.constrained_layout.use", False)

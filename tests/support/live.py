@@ -230,8 +230,7 @@ async def laid(page=Path("nowhere"), log_writer=None, anchors=None, settings=Non
             if hello:
                 await guest.say(**{"type": "hello", "version": 1, "token": TOKEN} | says)
                 if reads:
-                    welcome = await guest.hears("welcome")
-                    guest.id, guest.key = welcome["id"], welcome["key"]
+                    guest.id = (await guest.hears("welcome"))["id"]
             return guest
 
         here.come, here.session = come, session

@@ -56,19 +56,7 @@ def read_log(path: Path, wanted: Collection[str] | None = None) -> Log:
     Raises:
         InputError: the file is missing, is no MCAP file, or nothing in it can be trusted.
     """
-    contents = Contents(wanted)
-    damage = read_contents(path, contents)
-    topics = _by_topic(contents, damage)
-    return Log(Path(path), topics, damage, len(contents.messages), contents.unchecked)
-
-
-def read_contents(path: Path, contents: Contents) -> list[str]:
-    """Fill `contents` with what a log has that can be trusted; a sentence for each thing that was lost.
-
-    Raises:
-        InputError: as for `read_log`.
-    """
-    damage: list[str] = []
+    contents, damage = Contents(wanted), []
     try:
         with open(path, "rb") as file:
             size = file.seek(0, SEEK_END)
@@ -91,7 +79,8 @@ def read_contents(path: Path, contents: Contents) -> list[str]:
     nameless = sum(channel not in contents.channels for channel, *_ in contents.messages)
     if nameless:
         damage.append(f"{nameless} messages on channels that nothing describes lost")
-    return damage
+    topics = _by_topic(contents, damage)
+    return Log(Path(path), topics, damage, len(contents.messages), contents.unchecked)
 
 
 def _by_topic(contents: Contents, damage: list[str]) -> dict[str, Topic]:

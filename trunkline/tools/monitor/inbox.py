@@ -58,10 +58,9 @@ def sessions_of(folder: Path) -> list[Path]:
 
 
 def without_session(folder: Path) -> list[Path]:
-    """Folders with logs and no session.yaml, the watched one among them; not those of a session, a folder a log."""
+    """Folders with logs and no session.yaml, the watched one among them."""
     logs = [*folder.glob("*.mcap"), *folder.glob("[!.]*/*.mcap")]
-    bags = {log.parent for log in logs if (log.parent.parent / "session.yaml").is_file()}
-    return sorted({log.parent for log in logs if not (log.parent / "session.yaml").is_file()} - bags)
+    return sorted({log.parent for log in logs if not (log.parent / "session.yaml").is_file()})
 
 
 def planned(session: Path) -> list[dict]:
