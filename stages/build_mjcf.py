@@ -4,6 +4,7 @@ from pathlib import Path
 
 from trunkline.model.arm.cad import CadArm
 from trunkline.model.arm.kinds import Description, described_arm
+from trunkline.model.arm_model import ArmModel
 from trunkline.model.statics.chain import read_chain
 from trunkline.pipeline.config import own_or_project
 from trunkline.pipeline.stage import output_folder, run_stage, write_metrics
@@ -22,7 +23,7 @@ def cad_arm(config: Config) -> CadArm:
 def main(config: Config) -> None:
     arm = cad_arm(config)
     model = arm.spec.compile()
-    if model.nu:  # refused here rather than hours later, by the first stage that needs the statics
+    if model.nu or len(ArmModel(model).cables):  # refused here, and not hours later by what first needs the statics
         read_chain(model)
     with output_folder(ARTIFACTS) as folder:
         (folder / "arm.xml").write_text(arm.spec.to_xml())

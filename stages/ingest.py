@@ -7,8 +7,11 @@ from pathlib import Path
 
 from trunkline.compute.progress import progress
 from trunkline.errors import InputError
+from trunkline.model.places import marker_places
+from trunkline.model_files import read_spec
 from trunkline.pipeline.stage import output_folder, run_stage, write_json, write_metrics
 from trunkline.recordings.cleaning.checks import TrialLimits
+from trunkline.recordings.cleaning.described_arm import Places
 from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.cleaning.quality import by_sentence, clock_facts, judge, remarks, report, summary
 from trunkline.recordings.cleaning.same_arm import check_each_session
@@ -26,6 +29,7 @@ from trunkline.report.figures.data import quality_figure
 from trunkline.report.figures.style import save_figure
 from trunkline.settings import settings
 
+ARM = Path("artifacts/build_mjcf/arm.xml")
 RAW, PROCESSED, ARTIFACTS = Path("data/raw"), Path("data/processed/ingest"), Path("artifacts/ingest")
 
 
@@ -42,7 +46,8 @@ class Config:
 
 def main(config: Config) -> None:
     folders = session_folders(RAW / config.session, config.only)
-    sessions = check_each_session(folders, partial(gathered_of, config=config), config.plausible.distance)
+    arm = marker_places(read_spec(ARM).compile()) if ARM.is_file() else None
+    sessions = check_each_session(folders, partial(gathered_of, config=config, arm=arm), config.plausible.distance)
     gathered = together(list(sessions.values()))
     qualities = [judge(raw, sessions) for raw, sessions in zip(gathered.raw_trials, gathered.findings, strict=True)]
     for raw, finding in zip(gathered.raw_trials, gathered.findings, strict=True):
@@ -63,16 +68,16 @@ def main(config: Config) -> None:
         print(f"ingest: warning: {line}", file=sys.stderr)
 
 
-def gathered_of(folder: Path, session: Session, config: Config) -> CheckedSession:
-    """The raw trials of one session, whose clock and vertical are its own."""
+def gathered_of(folder: Path, session: Session, config: Config, arm: Places | None = None) -> CheckedSession:
+    """The raw trials of one session, whose clock and vertical are its own. arm: the described one, if there is one."""
     with progress(len(session.trials), "ingest", "trials") as bar:
         taken = []
-        for trial, raw, findings in load_raw_trials(folder, session, config.limits):
+        for trial, raw, findings in load_raw_trials(folder, session, config.limits, arm):
             if isinstance(raw, InputError) and config.refused_trials == "stop":
                 raise raw
             taken.append((trial, raw, findings))
             bar.update(1, trial=trial.name)
-    gathered = check_session(taken, session, config.plausible, config.refused_trials, f"{folder}")
+    gathered = check_session(taken, session, config.plausible, config.refused_trials, f"{folder}", arm)
     require_enough(gathered, session.trials)
     return gathered
 

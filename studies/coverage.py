@@ -24,6 +24,7 @@ from tests.support.noisy_trials import WEIGHTS, Stage, measured, releases, with_
 from trunkline.compute.progress import progress
 from trunkline.errors import in_one_line
 from trunkline.identification.fit.intervals import certainty
+from trunkline.identification.fit.linearisation import linearise
 from trunkline.identification.fit.optimizers import LeastSquares
 from trunkline.identification.fit.problem import Bounds, Problem
 from trunkline.identification.fit.search import descend, search
@@ -154,10 +155,10 @@ def cover(name: str, is_matched: bool, repetitions: int) -> IntervalCoverage:
             problem = Problem(begin, experiments, markers_of(begin), bounds, "positions", WEIGHTS)
             rough = search(problem, ROUGH, repetition, lambda best: None)
             end = descend(problem, rough.vector, *POLISH, lambda best: None)
-            assert end.linear is not None, "least squares ends on its own linearisation"
-            around = surrogate(problem, end.vector, end.linear.residuals)
+            around = surrogate(problem, end.vector, end.residuals)
+            linear = linearise(problem, end.vector, end.residuals)
             found.errors.append((end.vector - exact) / unit)
-            found.widths.append(certainty(end.linear, around=around).half_width / unit)
+            found.widths.append(certainty(linear, around=around).half_width / unit)
             found.lost += not end.converged
             bar.update(1)
     return found

@@ -5,6 +5,7 @@ every file over all workers, so that each of them makes every fixture and compil
 """
 
 import os
+import sys
 from pathlib import Path, PurePosixPath
 
 import pytest
@@ -37,9 +38,8 @@ def pytest_configure(config):
     config.pluginmanager.register(Workers())
 
 
-@pytest.fixture
-def figures_not_laid_out(monkeypatch):
-    """Figures are drawn whole, but where their parts lie is not sought: most of the time, and nobody looks."""
-    import matplotlib
-
-    monkeypatch.setitem(matplotlib.rcParams, "figure.constrained_layout.use", False)
+def pytest_collection_finish():
+    """Figures are drawn whole, but where their parts lie is not sought: most of the time, and nobody looks. The demo in
+    little draws them laid out."""
+    if "trunkline.report.figures.style" in sys.modules:
+        sys.modules["matplotlib"].rcParams["figure.constrained_layout.use"] = False

@@ -23,6 +23,7 @@ class Verb(NamedTuple):
 VERBS = {
     "inspect": Verb("trunkline.recordings.preparation.inspect", "topics, bodies and gaps of logs, and a session.yaml"),
     "import-motive": Verb("trunkline.recordings.preparation.motive", "logs from OptiTrack Motive's CSV exports"),
+    "salvage": Verb("trunkline.tools.salvage.__main__", "a whole log of what a damaged one still has"),
     "describe": Verb("trunkline.tools.describe.__main__", "units, tendons and markers of an arm, with a drawing"),
     "check": Verb("trunkline.tools.preflight.__main__", "what a session can identify, before hours of fits"),
     "suggest": Verb("trunkline.tools.design.__main__", "which experiments to record next"),

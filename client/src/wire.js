@@ -76,7 +76,7 @@ export class Wire {
   constructor(heard, { token = "", code = "", name = "browser", space = "base" } = {}) {
     this.heard = heard;
     this.hello = { token, code, name, space };
-    this.id = "";
+    this.id = this.key = "";
     this.received = 0;
     this.offset = null; // s, server = page + offset
     this.controls = false; // then its input acknowledges, else it does so message by message
@@ -92,7 +92,7 @@ export class Wire {
     socket.onopen = () => {
       this.received = 0;
       const { token, code, name, space } = this.hello;
-      this.say("hello", { version: VERSION, token, code: token ? "" : code, id: this.id, name, space });
+      this.say("hello", { version: VERSION, token, code: token ? "" : code, key: this.key, name, space });
       this.heard.opened?.();
     };
     socket.onmessage = ({ data }) => socket === this.socket && this.hear(data);
@@ -132,7 +132,7 @@ export class Wire {
     if (message.type === "clock") this.offset = message.offset;
     if (message.type === "error" && message.closing) this.refused = message.reason;
     if (message.type === "welcome") {
-      this.id = message.id;
+      [this.id, this.key] = [message.id, message.key];
       this.hello.token = message.token;
       this.wait = FIRST_WAIT;
     }

@@ -128,7 +128,7 @@ export const SAID = {
     "version": "required",
     "token": "",
     "code": "",
-    "id": "",
+    "key": "",
     "name": "",
     "space": "base",
     "type": "hello"
@@ -163,6 +163,7 @@ export const SAID = {
 export const ANSWERS = {
   "welcome": {
     "id": "required",
+    "key": "required",
     "token": "required",
     "package": "required",
     "rate": "required",

@@ -15,6 +15,7 @@ const here = dirname(fileURLToPath(import.meta.url));
 export const root = join(here, "..", "..");
 export const PYTHON = process.env.TRUNKLINE_PYTHON ?? join(root, ".venv", "bin", "python");
 const BROWSER = process.env.TRUNKLINE_BROWSER ?? "/usr/bin/chromium";
+const LISTENS = process.env.TRUNKLINE_BROWSER_AT ?? "";
 const PICTURES = process.env.TRUNKLINE_PICTURES ?? "";
 const LONGEST = 120_000; // ms that anything may take; drawing by software on a shared core is slow
 const DRAWN = 10; // Hz at most at which tests draw, so that they also pass beside other work
@@ -42,7 +43,11 @@ export async function serve() {
   };
 }
 
-export const launch = () => chromium.launch({ executablePath: BROWSER, args: FLAGS, timeout: LONGEST });
+/** How a browser is started. */
+export const LAUNCHED = { executablePath: BROWSER, args: FLAGS, timeout: LONGEST };
+
+/** The browser that listens already (`client/browser.mjs`), or one of a file's own. */
+export const launch = () => (LISTENS ? chromium.connect(LISTENS, { timeout: LONGEST }) : chromium.launch(LAUNCHED));
 
 /** A page at `url` of `server`, closed with the test; `wrongs` collects console errors, exceptions and requests elsewhere. Unless it is `drawn`, it does all but fill pixels. */
 export async function open(t, browser, server, { url = server.url, headset = false, drawn = true, width = PICTURES ? 1280 : 720, height = PICTURES ? 720 : 480 } = {}) {

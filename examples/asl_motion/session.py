@@ -24,16 +24,19 @@ COMMANDS = ("ID", *MOTORS)
 OBSERVED = ("ID", *(f"{axis}{body}" for body in BODIES for axis in "xyz"), *(f"phi{n}" for n in range(1, 7)))
 LOADS = {"unloaded": ("observations_controlled_1.csv", 0.0), "loaded": ("observations_controlled_1_200g.csv", 0.2)}
 PIECE = 25.0  # s of a trial
-SPLITS = (IDENTIFY, IDENTIFY, IDENTIFY, IDENTIFY, VALIDATE, TEST)  # of the unloaded pieces; the loaded are all of test
+SPLITS = {  # of the pieces of each log; one with a load tells what the arm weighs
+    "unloaded": (IDENTIFY, IDENTIFY, IDENTIFY, IDENTIFY, VALIDATE, TEST),
+    "loaded": (IDENTIFY, TEST, TEST, TEST, TEST, TEST),
+}
 
 
 def trials_of(name: str, load: float) -> list[dict]:
     """An entry of session.yaml for each piece of a log."""
     entries = []
-    for number, split in enumerate(SPLITS):
+    for number, split in enumerate(SPLITS[name]):
         window = [PIECE * number, PIECE * (number + 1) - 1 / RATE]
         entry = {"name": f"{name}_{number}", "file": f"{name}.mcap", "window": window, "experiment": "motion"}
-        entries.append(entry | {"load": load, "split": TEST if load else split})
+        entries.append(entry | {"load": load, "split": split})
     return entries
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from trunkline.identification.parameters.parameters import DERIVED_FROM
 from trunkline.model.simulation.motion import batch_of, hold, move
 from trunkline.tools.randomize.fields import drawn_fields
 from trunkline.tools.randomize.file import read_randomization
@@ -26,6 +27,8 @@ fields = drawn_fields(model, posterior.sample(count - 1, 0))
 batch = batch_of(model, count)  # MuJoCo's own Batch: expand gives every simulation its own fields
 for name, values in fields.items():
     batch.expand(name)[1:] = values  # the first arm stays the calibrated one
+if DERIVED_FROM & fields.keys():
+    batch.set_const()  # masses and places of hinges set what softens joint limits
 straight = np.tile(model.tendon_length0[model.actuator_trnid[:, 0]], (count, 1))
 hold(batch, model, straight)
 steps = round(seconds / model.opt.timestep)

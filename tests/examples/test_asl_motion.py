@@ -33,7 +33,8 @@ def source(tmp_path_factory):
 def test_each_recording_becomes_trials_of_25_s(source, tmp_path):
     assert make_session(source, tmp_path / "session") == 12
     session = read_session(tmp_path / "session")
-    assert [trial.split for trial in session.trials] == [*["identify"] * 4, "validate", *["test"] * 7]
+    splits = [*["identify"] * 4, "validate", "test", "identify", *["test"] * 5]
+    assert [trial.split for trial in session.trials] == splits
     assert {trial.load for trial in session.trials if trial.file == "loaded.mcap"} == {0.2}
     assert session.trials[4].window == (100.0, 124.99)
     names, coupling = session.coupling()

@@ -13,6 +13,7 @@ from scipy.stats import t as student
 from tests.support.matched_plant import FRAME, markers_of, small_model
 from tests.support.noisy_trials import STAGES, TRIALS, WEIGHTS, measured, with_values
 from trunkline.identification.fit.intervals import bootstrap, certainty
+from trunkline.identification.fit.linearisation import linearise
 from trunkline.identification.fit.problem import Bounds, Problem
 from trunkline.identification.fit.search import descend
 from trunkline.identification.fit.surrogate import surrogate
@@ -49,12 +50,13 @@ def repetitions(request) -> Repetitions:
         problem = Problem(model, experiments, markers_of(model), bounds, "positions", WEIGHTS)
         result = descend(problem, exact + rng.normal(0, 0.02, len(exact)), 24, 1e-6, lambda best: None)
         assert result.converged
-        around = surrogate(problem, result.vector)
+        around = surrogate(problem, result.vector, result.residuals)
+        linear = linearise(problem, result.vector, result.residuals)
         errors.append(result.vector - exact)
-        widths.append(certainty(result.linear, around=around).half_width)
+        widths.append(certainty(linear, around=around).half_width)
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr("trunkline.identification.fit.intervals.RESAMPLINGS", RESAMPLINGS)
-            resampled.append(bootstrap(result.linear, 1, around) - exact)
+            resampled.append(bootstrap(linear, 1, around) - exact)
     return Repetitions(list(stage.true), np.array(errors), np.array(widths), np.array(resampled))
 
 

@@ -35,7 +35,7 @@ VALUES = {
     "rest_bend_x": 0.01, "rest_bend_y": -0.02, "rest_gradient_x": -0.01, "rest_gradient_y": 0.03,
     "dead_time": 0.04, "rate_limit": 0.3, "backlash": 0.002,
     "mount_tilt_x": 0.03, "mount_tilt_y": -0.02, "mount_twist": 0.05,
-    "winding": 1.2, "tendon_distance": 0.03, "section_stiffness_2": 0.7,
+    "winding": 1.2, "tendon_distance": 0.03, "section_stiffness_2": 0.7, "mass": 0.9,
     "preload_1": 0.003, "preload_2": -0.002, "preload_3": 0.001,
     "tendon_angle_1": 0.1, "tendon_angle_2": 2.0, "tendon_angle_3": -2.2,
 }  # fmt: skip
@@ -254,6 +254,37 @@ def test_a_section_s_stiffness_leaves_the_others():
     np.testing.assert_allclose(changed[:6], 1.0)
     np.testing.assert_allclose(changed[6:], changed[6])
     assert model.jnt_stiffness[6] / model.jnt_stiffness[0] == pytest.approx(0.5)
+
+
+# Two units and a load, as a lab may draw them: masses by geoms, and of all together 0.3 kg
+WEIGHED = """<mujoco><compiler settotalmass="0.3" inertiafromgeom="true"/><worldbody><body name="base">
+  <body name="upper" pos="0 0 -0.01"><joint name="upper_x" axis="1 0 0"/><joint name="upper_y" axis="0 1 0"/>
+    <geom size="0.01" pos="0.002 0 -0.03"/>
+    <body name="collar" pos="0 0 -0.04"><geom type="box" size="0.01 0.02 0.005" euler="10 20 30"/></body>
+    <body name="lower" pos="0 0 -0.05"><joint name="lower_x" axis="1 0 0"/><joint name="lower_y" axis="0 1 0"/>
+      <geom size="0.01"/><site name="tip" pos="0 0 -0.04"/>
+      <body name="tip_load" pos="0 0 -0.04"><geom size="0.008"/></body>
+    </body>
+  </body>
+</body></worldbody></mujoco>"""
+
+
+@pytest.mark.filterwarnings("ignore:compiler attribute 'settotalmass'")
+def test_an_arm_s_mass_scales_what_is_its_own_and_no_load():
+    spec = mujoco.MjSpec.from_string(WEIGHED)
+    start = spec.compile()
+    load = start.body("tip_load").mass[0]
+    assert PARAMETERS["mass"].read(start) == pytest.approx(0.3 - load)
+    model = model_with({"mass": 2 * (0.3 - load)}, model=spec.compile())
+    expected = np.array([0, 0, 2, 2, 2, 1.0])  # world, base, upper, collar, lower, load
+    again = mujoco.MjModel.from_xml_string(save_model(spec, model))
+    for made in (model, again):
+        np.testing.assert_allclose(made.body_mass, expected * start.body_mass, rtol=1e-5)
+        np.testing.assert_allclose(made.body_inertia, expected[:, None] * start.body_inertia, rtol=1e-5)
+        for name in ("body_ipos", "body_iquat"):
+            np.testing.assert_allclose(getattr(made, name), getattr(start, name), atol=1e-6)
+        for name in ("dof_invweight0", "body_subtreemass"):  # what MuJoCo makes of masses as it compiles
+            np.testing.assert_allclose(getattr(made, name), getattr(again, name), rtol=1e-4, err_msg=name)
 
 
 def test_candidates_do_not_mix():

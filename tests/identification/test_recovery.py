@@ -1,13 +1,18 @@
 """Known parameters come back, from a plant that is the model."""
 
+from dataclasses import replace
+
+import mujoco
 import numpy as np
 import pytest
 
-from tests.support.matched_plant import curl, markers_of, motion, release, small_model, tilt
+from tests.support.matched_plant import curl, markers_of, motion, release, small_model, tilt, with_load
+from trunkline.identification.fit import identify as identifying
 from trunkline.identification.fit.fit import CoarseSearch, Fit, Method, Refinement
 from trunkline.identification.fit.identify import identify
 from trunkline.identification.fit.optimizers import LeastSquares
 from trunkline.identification.fit.problem import DIVERGED_LOSS, Bounds, Problem
+from trunkline.identification.fit.search import search
 from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields, parameter_named, set_fields
 from trunkline.identification.simulate.experiment import prepare
 from trunkline.identification.simulate.loss import LossWeights
@@ -16,11 +21,11 @@ from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 
 
-def identified(trials, model, parameters, per_joint=(), optimizer=LeastSquares(5, 2, 6, 1e-3)):  # noqa: B008
+def identified(trials, model, parameters, per_joint=(), optimizer=LeastSquares(5, 2, 6, 1e-3), rough=99):  # noqa: B008
     experiments = [prepare(trial, model, 437) for trial in trials]
     bounds = {name: Bounds(*span) for name, span in parameters.items()}
     fine = LeastSquares(0, 1, 30, 1e-9)
-    method = Method(optimizer, CoarseSearch(1.0, 437, 99), Refinement(8, 1e-9), fine, 0.1, np.inf, seed=3)
+    method = Method(optimizer, CoarseSearch(1.0, 437, rough), Refinement(8, 1e-9), fine, 0.1, np.inf, seed=3)
     fit = Fit(markers_of(model), bounds, per_joint, "positions", WEIGHTS, method)
     return identify("test", model, experiments, fit)
 
@@ -97,6 +102,59 @@ def test_the_winches_rate_limit_and_backlash_come_back():
     result = identified(trials, model, {"rate_limit": (0.02, 2.0), "backlash": (2e-4, 0.02)})
     for name, value in true.items():
         assert result.values[name] == pytest.approx(value, rel=0.02), name
+
+
+def weighing(model, mass, load=0.0, **values):
+    """A plant whose units weigh `mass` times the model's, and that was compiled with `load` kg at its tip."""
+    plant = with_load(changed(model, **values), load) if load else changed(model, **values)
+    units = [body for body in range(plant.nbody) if plant.body(body).name.startswith("unit_")]
+    plant.body_mass[units] *= mass
+    plant.body_inertia[units] *= mass
+    mujoco.mj_setConst(plant, mujoco.MjData(plant))
+    return plant
+
+
+def with_loads(make, model, mass, arguments, loads=(0.0, 0.08), **values):
+    """Trials that `make` makes of each plant, a row of `arguments` at a time."""
+    return [
+        replace(make(weighing(model, mass, load, **values), *row), load=load, name=f"{row}, {load} kg")
+        for load in loads
+        for row in arguments
+    ]
+
+
+def test_the_arm_s_mass_comes_back_from_shapes_with_a_load_and_without():
+    model = small_model()
+    true = {"stiffness": 1.4 * PARAMETERS["stiffness"].read(model), "mass": 1.7 * PARAMETERS["mass"].read(model)}
+    trials = with_loads(tilt, model, 1.7, [(30,), (60,), (90,)], stiffness=true["stiffness"])
+    result = identified(trials, model, {"stiffness": (0.2, 50.0), "mass": (0.05, 20.0)})
+    for name, value in true.items():
+        assert result.values[name] == pytest.approx(value, rel=0.02), name
+    assert not result.at_bound
+
+
+def test_the_arm_s_mass_comes_back_from_releases_and_the_coarse_search_has_one_with_a_load(monkeypatch):
+    model, searched = small_model(), []
+
+    def watched(problem, *rest):
+        searched.append(problem)
+        return search(problem, *rest)
+
+    monkeypatch.setattr(identifying, "search", watched)
+    plain, factor = changed(model, tendon_friction=1e-9), 0.6
+    true = {name: factor * PARAMETERS[name].read(model) * scale for name, scale in
+            (("stiffness", 1.3), ("damping", 0.8), ("mass", 1.0))}  # fmt: skip
+    forces = {"stiffness": true["stiffness"], "damping": true["damping"]}
+    trials = [
+        *with_loads(release, plain, factor, [(0.3,), (-0.1,)], (0.0,), **forces),
+        *with_loads(release, plain, factor, [(0.2,)], (0.08,), **forces),
+    ]
+    ranges = {"stiffness": (0.2, 50.0), "damping": (0.002, 2.0), "mass": (0.02, 20.0)}
+    result = identified(trials, plain, ranges, rough=2)
+    for name, value in true.items():
+        assert result.values[name] == pytest.approx(value, rel=0.03), name
+    assert not result.at_bound
+    assert [experiment.load for experiment in searched[0].experiments] == [0.0, 0.0, 0.08]
 
 
 def test_validate_trials_are_never_fitted():

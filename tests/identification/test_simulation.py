@@ -10,7 +10,8 @@ from tests.support.matched_plant import curl, markers_of, motion, release, small
 from tests.support.small_arm import small_spec
 from trunkline.errors import InputError
 from trunkline.identification.evaluation.evaluation import replay
-from trunkline.identification.parameters.parameters import candidate_fields
+from trunkline.identification.parameters.parameters import candidate_fields, set_fields
+from trunkline.identification.parameters.saving import save_model
 from trunkline.identification.simulate.experiment import prepare
 from trunkline.identification.simulate.in_motion import InMotion
 from trunkline.identification.simulate.loss import position_error
@@ -66,6 +67,24 @@ def test_an_arm_that_moves_already_starts_with_its_velocity(in_motion):
     error = position_error(simulated.positions[0][0], experiment.positions, experiment.measured)
     assert len(experiment.positions) == 69
     assert (error < 1e-3) if in_motion else (error > 4e-3)
+
+
+def test_an_arm_of_another_mass_moves_as_one_that_was_compiled_with_it():
+    """Also where cables rub: friction is softened by what MuJoCo makes of masses as it compiles."""
+    spec, model = small_spec(4), small_model(4)
+    spec.option.timestep = model.opt.timestep
+    spec.compile()
+    fields = candidate_fields(model, {"mass": np.array([0.4, 1.5])})
+    heavy = model.__copy__()
+    set_fields(heavy, fields, 1)
+    compiled = mujoco.MjModel.from_xml_string(save_model(spec, heavy))
+    markers = markers_of(model)
+    experiments = [prepare(trial, model, 40) for trial in (tilt(model, 60), release(model, 0.25), curl(model, 40))]
+    ours = Population(model, experiments, markers).simulate(fields).positions
+    theirs = Population(compiled, experiments, markers).simulate({"jnt_stiffness": compiled.jnt_stiffness[None]})
+    for our, their in zip(ours, theirs.positions, strict=True):
+        np.testing.assert_allclose(our[1], their[0], atol=2e-6)  # an MJCF keeps six digits
+        assert np.abs(our[1] - our[0]).max() > 1e-3
 
 
 def test_a_population_of_the_truth_replays_the_truth():

@@ -95,7 +95,7 @@ def test_control_stage_finds_the_actuators_and_scores_the_cad_model(project):
     ranges = {name: (0.2 * value, 5 * value) for name, value in
               {n: PARAMETERS[n].read(truth) for n in ("kp", "kv", "force_range", "time_constant")}.items()}  # fmt: skip
     evolution = DifferentialEvolution(
-        method="differential_evolution", population=6, population_per_parameter=2, generations=12, tolerance=1e-2
+        method="differential_evolution", population=6, population_per_parameter=1, generations=6, tolerance=1e-2
     )
     config = settings(["curl"], ["release", "curl"], ranges, iterations=25, optimizer=evolution)
     (root / "artifacts/identify_damping").mkdir()
@@ -142,6 +142,21 @@ def test_a_missing_model_is_named(project):
     config = settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.3, 12.0)})
     with pytest.raises(InputError, match="nowhere.xml: no such file"):
         run("identify_stiffness", config, root / "nowhere.xml")
+
+
+def test_a_mass_that_no_load_tells_is_refused(project):
+    _, model, write = project
+    write([tilt(model, 30), tilt(model, 60), replace(tilt(model, 75, "validate"), load=0.05)])
+    config = settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.3, 12.0), "mass": (0.05, 5.0)})
+    expected = "found no static_tilt with split identify that carries a load, expected one with its `load`"
+    with pytest.raises(InputError, match=f"^identify_stiffness.parameters.mass: {expected}"):
+        run("identify_stiffness", config, CAD_MODEL)
+
+
+def test_a_mass_beside_a_measured_rest_shape_is_refused():
+    """What springs bear in it follows from the masses that are described."""
+    with pytest.raises(ValueError, match="parameters.mass: found it beside rest_shape: measured, expected one"):
+        settings(["release"], ["release"], {"mass": (0.05, 5.0)}, rest_shape="measured")
 
 
 def test_more_folds_than_trials_are_refused(project):

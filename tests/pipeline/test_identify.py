@@ -16,8 +16,9 @@ from tests.identification.test_stage import metrics_of, settings, truth_of
 from tests.report.certificate.sample import ASKED, INGESTED
 from tests.support.matched_plant import begin_project, curl, release, static_pull, tilt
 from tests.support.workbench import ROOT
+from trunkline.errors import InputError
 from trunkline.identification.parameters.parameters import parameter_named
-from trunkline.pipeline.identify import CAD_MODEL, run
+from trunkline.pipeline.identify import CAD_MODEL, misfit, run
 from trunkline.pipeline.stage import write_json
 from trunkline.recordings.trials.splits import SPLITS
 from trunkline.recordings.trials.trial import read_trials, write_trials
@@ -149,3 +150,13 @@ def test_another_session_of_the_same_name_is_doubted(later, capsys):
     assert evaluate(["artifacts/identify_stiffness/arm.xml", f"{FILTERED}"]) == 0
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert line.startswith("evaluate: warning: session friday: the model has numbers for a session of that name")
+
+
+def test_a_fit_far_from_what_it_was_fitted_to_is_said_or_refused():
+    errors = {"release": {"e_position_mm": 9.6, "e_position_pct": 4.0}, "curl": {"e_position_mm": 99.0,
+              "e_position_pct": 41.0}}  # fmt: skip
+    assert misfit(errors, ["release"]) == ""
+    errors["release"] = {"e_position_mm": 24.0, "e_position_pct": 10.0}
+    assert misfit(errors, ["release"]).startswith("after the fit, bodies are 24 mm off in the mean of releases, 10 %")
+    with pytest.raises(InputError, match="99 mm off in the mean of curls, 41 % of the arm's length, expected at most"):
+        misfit(errors, ["release", "curl"])

@@ -43,7 +43,7 @@ def test_a_hand_without_faults_points_where_it_aims():
 def test_tremor_accelerates_a_hand_by_its_share_of_gravity():
     aiming = hand(disparity_deg=0.0)
     aiming.aim(PLACE, 0.0, 0.0)
-    times = np.arange(2.0, 12.0, 1e-3)
+    times = np.arange(2.0, 12.0, 2.5e-3)
     ends = np.array([end(aiming, float(now), distance()) for now in times])
     person = aiming.person
     # Of the ray's end the acceleration is larger than of the hand, as the one's distance from the wrist over the other.

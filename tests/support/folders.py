@@ -6,6 +6,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 SHARED = ROOT.parent / "shared/data"
+CASES = ROOT.parent / "shared/cases"
 SMALL_DEMO = ROOT / "build/small_demo"
 
 # parameters.json of a stage that has identified nothing: what `read_table` asks for
@@ -14,6 +15,7 @@ TABLE_OF_NOTHING = {
 }  # fmt: skip
 
 with_recordings = pytest.mark.skipif(not SHARED.is_dir(), reason="no ../shared/data, the recordings of others' arms")
+with_cases = pytest.mark.skipif(not CASES.is_dir(), reason="no ../shared/cases, sessions as others record them")
 
 
 def demo_with(pattern: str) -> Path:

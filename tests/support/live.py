@@ -230,7 +230,8 @@ async def laid(page=Path("nowhere"), log_writer=None, anchors=None, settings=Non
             if hello:
                 await guest.say(**{"type": "hello", "version": 1, "token": TOKEN} | says)
                 if reads:
-                    guest.id = (await guest.hears("welcome"))["id"]
+                    welcome = await guest.hears("welcome")
+                    guest.id, guest.key = welcome["id"], welcome["key"]
             return guest
 
         here.come, here.session = come, session

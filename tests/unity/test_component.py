@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import mujoco
@@ -15,7 +16,6 @@ import pytest
 from tests.unity.mono import compiled
 from tests.unity.test_csharp import CORE, SHARED
 from tests.unity.test_start import STEP
-from tests.unity.test_start import files as arm_files
 from trunkline.twin.package import MANIFEST
 from trunkline.unity.assemble import CSHARP
 from trunkline.unity.plugin import Scene
@@ -28,7 +28,11 @@ TURN = turns([1.0])[0]  # by which an arm's root is turned, so that it hangs to 
 RATE = 90.0  # Hz, at which the step is that of the tests
 FIELDS = ["qpos0", "jnt_stiffness", "jnt_stiffnesspoly", "dof_frictionloss", "dof_damping", "dof_dampingpoly"]
 FIELDS += ["tendon_stiffness", "tendon_stiffnesspoly", "tendon_frictionloss", "actuator_actadr"]
-files = arm_files
+
+
+@pytest.fixture(scope="module")
+def files(arm_files):
+    return arm_files
 
 
 @pytest.fixture(scope="module")
@@ -52,8 +56,10 @@ def place(struct: int, value: bytes) -> int:
     raise AssertionError("a field that is nowhere")
 
 
-def fields(model: mujoco.MjModel) -> dict[str, dict[str, int]]:
+@pytest.fixture(scope="module")
+def fields(files) -> dict[str, dict[str, int]]:
     """Where libmujoco's structs have what the component reads, found by the values that they have."""
+    model = without_component(files, [PREFIX])
     data = mujoco.MjData(model)
     model.opt.timestep = 0.00123456789
     in_model = {name: place(model._address, np.uintp(getattr(model, name).ctypes.data).tobytes()) for name in FIELDS}
@@ -77,7 +83,14 @@ def without_component(files, prefixes) -> mujoco.MjModel:
     return scene.model
 
 
-def run(program: Path, files, folder: Path, happens, manifest: bytes | None = None, **more_fields) -> list[list]:
+@pytest.fixture
+def run(program, files, fields, tmp_path):
+    return partial(run_component, program, files, fields, tmp_path)
+
+
+def run_component(
+    program: Path, files, fields, folder: Path, happens, manifest: bytes | None = None, **more_fields
+) -> list[list]:
     """What the component does where it is told: angles, activations, times (s), and what the console says."""
     models = {}
     for count, prefixes in ((1, [PREFIX]), (2, [PREFIX, "other_"])):
@@ -89,7 +102,7 @@ def run(program: Path, files, folder: Path, happens, manifest: bytes | None = No
     lines = [[{"one": first, "two": second}.get(word, word) if isinstance(word, str) else word for word in line]
             for line in happens]  # fmt: skip
     scene = {"manifest": str(folder / "manifest.json"), "models": models, "display_rate": RATE, "happens": lines}
-    scene |= more_fields | fields(without_component(files, [PREFIX]))
+    scene |= more_fields | fields
     (folder / "scene.json").write_text(json.dumps(scene))
     environment = os.environ | {"LD_LIBRARY_PATH": str(program.parent)}
     command = ["mono", str(program), str(folder / "scene.json")]
@@ -104,10 +117,10 @@ def name(files) -> str:
     return PREFIX + manifest_of(files).actuators[0].name
 
 
-def test_it_settles_the_arm_and_keeps_it_as_python_does(program, files, tmp_path, name):
+def test_it_settles_the_arm_and_keeps_it_as_python_does(run, files, name):
     begin = [["arm", PREFIX, "one"], ["compile", "one"], ["tell"]]
     then = [["control", name, 0.02], ["step", 30], ["recreate", "one"], ["tell"], ["step", 30], ["tell"]]
-    results = run(program, files, tmp_path, begin + then)
+    results = run(begin + then)
     scene = scene_of(files, TURN, STEP)
     expected = []
     scene.start()
@@ -127,10 +140,10 @@ def test_it_settles_the_arm_and_keeps_it_as_python_does(program, files, tmp_path
     assert np.abs(expected[2][0] - expected[0][0]).max() > 1e-2
 
 
-def test_another_arm_that_comes_disturbs_none(program, files, tmp_path, name):
+def test_another_arm_that_comes_disturbs_none(run, files, name):
     begin = [["arm", PREFIX, "one"], ["compile", "one"], ["control", name, 0.02], ["step", 30]]
     then = [["arm", "other_", "two"], ["recreate", "two"], ["step", 30], ["tell"]]
-    ((angles, activations, _, lines),) = run(program, files, tmp_path, begin + then)
+    ((angles, activations, _, lines),) = run(begin + then)
     scene = scene_of(files, TURN, STEP)
     scene.start()
     scene.controls[name] = 0.02
@@ -144,14 +157,14 @@ def test_another_arm_that_comes_disturbs_none(program, files, tmp_path, name):
     assert lines == []
 
 
-def test_commands_are_sent_as_pulls_and_bad_ones_are_one_line(program, files, tmp_path, name):
+def test_commands_are_sent_as_pulls_and_bad_ones_are_one_line(run, files, name):
     rest = [actuator.rest_length for actuator in manifest_of(files).actuators]
     commands = (np.array(rest) - [0.02, 0.0, -0.01]).tolist()
     begin = [["arm", PREFIX, "one"], ["compile", "one"], ["send", PREFIX, commands], ["step", 100], ["tell"]]
     bad = [["send", PREFIX, [None, *commands[1:]]], ["step", 1], ["send", PREFIX, [None, *commands[1:]]], ["tell"]]
     not_finite = [["control", name, None], ["step", 3], ["control", name, None], ["step", 3], ["tell"]]
     short = [["send", PREFIX, commands[:2]], ["tell"]]
-    good, refused, stays, few = run(program, files, tmp_path, begin + bad + not_finite + short)
+    good, refused, stays, few = run(begin + bad + not_finite + short)
     np.testing.assert_allclose(good[1], [0.02, 0.0, -0.01], atol=1e-4)  # the motors' lag is over
     assert good[3] == []
     assert refused[3] == [
@@ -164,12 +177,12 @@ def test_commands_are_sent_as_pulls_and_bad_ones_are_one_line(program, files, tm
     assert few[3] == ["error: Trunkline Twin: found 2 commands, expected 3"]
 
 
-def test_a_manifest_of_another_arm_is_one_line_and_the_arm_stands_still(program, files, tmp_path):
+def test_a_manifest_of_another_arm_is_one_line_and_the_arm_stands_still(run, files):
     other = json.loads(files[MANIFEST])
     other["model"]["names"]["joints"][0] = "elbow"
     other["model"]["names"]["joints"][1] = "wrist"
     happens = [["arm", PREFIX, "one"], ["compile", "one"], ["step", 100], ["recreate", "one"], ["tell"]]
-    ((angles, _, _, lines),) = run(program, files, tmp_path, happens, json.dumps(other).encode())
+    ((angles, _, _, lines),) = run(happens, json.dumps(other).encode())
     assert lines == [
         f"error: Trunkline Twin: found no joint elbow below {PREFIX}, and 1 more are missing, expected the arm of "
         "; it is held where it is"
@@ -178,18 +191,18 @@ def test_a_manifest_of_another_arm_is_one_line_and_the_arm_stands_still(program,
 
 
 @pytest.mark.parametrize("bad", [b"{}", b'{"model": {"longest_step": 0.004}}', b"not JSON"])
-def test_a_file_that_is_no_manifest_is_one_line(program, files, tmp_path, bad):
-    ((*_, lines),) = run(program, files, tmp_path, [["arm", PREFIX, "one"], ["compile", "one"], ["tell"]], bad)
+def test_a_file_that_is_no_manifest_is_one_line(run, bad):
+    ((*_, lines),) = run([["arm", PREFIX, "one"], ["compile", "one"], ["tell"]], bad)
     assert lines == [
         "error: Trunkline Twin: found no Manifest File that says all of an arm, expected Runtime/manifest.json of this "
         "package"
     ]
 
 
-def test_a_scene_that_is_only_written_is_left_alone(program, files, tmp_path):
+def test_a_scene_that_is_only_written_is_left_alone(run):
     """`CreateScene(skipCompile: true)` raises the event without a model."""
     happens = [["arm", PREFIX, "one"], ["write"], ["compile", "one"], ["tell"]]
-    ((angles, _, _, lines),) = run(program, files, tmp_path, happens)
+    ((angles, _, _, lines),) = run(happens)
     assert np.abs(angles).max() > 1e-4
     assert lines == []
 
@@ -197,28 +210,26 @@ def test_a_scene_that_is_only_written_is_left_alone(program, files, tmp_path):
 SLOW, FAST, STEPS = 1 / 50, 1 / RATE, steps_per_frame(RATE)  # s, of a frame that simulates one of the display
 
 
-def test_a_device_that_falls_behind_is_told_before_the_camera_until_it_keeps_up(program, files, tmp_path):
+def test_a_device_that_falls_behind_is_told_before_the_camera_until_it_keeps_up(run):
     begin = [["arm", PREFIX, "one"], ["compile", "one"], ["camera"]]
     first = [["frames", 60, SLOW, STEPS], ["look"], ["tell"]]  # a second and more: it may be a hitch
     then = [["frames", 60, SLOW, STEPS], ["look"], ["frames", 60, SLOW, STEPS], ["look"], ["tell"]]
     again = [["frames", 140, FAST, STEPS], ["look"], ["tell"]]  # a whole second at the display's rate, too
-    results = run(program, files, tmp_path, begin + first + then + again)
+    results = run(begin + first + then + again)
     rate = "found 56 % of real time simulated in steps of 3.7 ms, expected 100 %"
     shown = f"shown: Trunkline: / {rate}: / this device does not keep up, the arm moves too slowly at 1 m"
     warned = f"warning: Trunkline: {rate}: this device does not keep up, the arm moves too slowly"
     assert [lines for *_, lines in results] == [["shown: "], [warned, shown, shown], ["shown: "]]
 
 
-def test_a_component_that_is_switched_off_takes_its_warning_along(program, files, tmp_path):
+def test_a_component_that_is_switched_off_takes_its_warning_along(run):
     begin = [["arm", PREFIX, "one"], ["compile", "one"], ["camera"], ["frames", 120, SLOW, STEPS], ["look"]]
-    ((*_, lines),) = run(program, files, tmp_path, [*begin, ["disable", PREFIX], ["look"], ["tell"]])
+    ((*_, lines),) = run([*begin, ["disable", PREFIX], ["look"], ["tell"]])
     assert [len(line) > len("shown: ") for line in lines] == [True, True, False]
 
 
-def test_another_libmujoco_than_the_plug_in_s_is_one_line(program, files, tmp_path):
-    ((angles, _, _, lines),) = run(
-        program, files, tmp_path, [["arm", PREFIX, "one"], ["compile", "one"], ["tell"]], header=3012000
-    )
+def test_another_libmujoco_than_the_plug_in_s_is_one_line(run):
+    ((angles, _, _, lines),) = run([["arm", PREFIX, "one"], ["compile", "one"], ["tell"]], header=3012000)
     problem = f"found libmujoco {mujoco.__version__}, expected 3.12.0, which org.mujoco is made for"
     assert lines == [f"error: Trunkline Twin: {problem}"]
     assert not angles.any()  # a model of other structures is not touched

@@ -17,7 +17,6 @@ from tests.unity.mono import compiled
 from tests.unity.test_assemble import network
 from tests.unity.test_shared_vectors import CASES
 from trunkline.ar.conformance.answers import TARGETS, answers_of
-from trunkline.ar.conformance.vectors import with_shared_vectors
 from trunkline.ar.hybrid.basket import Basket
 from trunkline.ar.preview.contents import network_of
 from trunkline.ar.preview.package import read_package
@@ -82,10 +81,10 @@ def test_the_core_answers_the_shared_vectors_and_what_they_leave_out(program, fi
 
 
 @pytest.mark.parametrize("name", [*CASES, "steps"])
-def test_a_vector_that_says_otherwise_is_named(program, plain, tmp_path, name):
+def test_a_vector_that_says_otherwise_is_named(program, plain_answered, tmp_path, name):
     """A test that cannot fail is none: the last number of each file that is not small, moved by a part in 10 000. The
     network's own answers are given to the core, which adds whether they are doubtful."""
-    files = with_shared_vectors(plain, config().core)
+    files = plain_answered
     path = f"Tests/Vectors/{name}.json"
     document = json.loads(files[path])
     steps = document["sequences"][-1]["steps"] if name == "steps" else document["cases"]
@@ -153,10 +152,12 @@ BAD = ["another byte", "no grid", "no manifest", "a short grid", "origin [0.1,0.
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_a_package_that_is_not_sound_is_refused_in_the_same_words(program, of_one_tilt, tmp_path, name):
+def test_a_package_that_is_not_sound_is_refused_in_the_same_words(
+    program, of_one_tilt, of_one_tilt_answered, tmp_path, name
+):
     files = damaged(of_one_tilt, name)
     refused = said_by(lambda: (package_digest(files), maps_of(files)))
-    steps = with_shared_vectors(of_one_tilt, config().core)["Tests/Vectors/steps.json"]
+    steps = of_one_tilt_answered["Tests/Vectors/steps.json"]
     done = run(program, files | {"Tests/Vectors/steps.json": steps}, tmp_path)
     assert (done.returncode, done.stdout) == (1, f"error: {refused}\n")
 
@@ -166,13 +167,13 @@ BAD_SHEETS = {"no sheets": None, "short sheets": -2, "long sheets": 6}  # bytes 
 
 
 @pytest.mark.parametrize("name", BAD_SHEETS)
-def test_sheets_that_are_not_sound_are_refused_in_the_same_words(program, plain, tmp_path, name):
+def test_sheets_that_are_not_sound_are_refused_in_the_same_words(program, plain, plain_answered, tmp_path, name):
     cut = BAD_SHEETS[name]
     files = {path: data for path, data in plain.items() if path != SHEETS}
     if cut is not None:
         files[SHEETS] = (plain[SHEETS] + bytes(6))[: len(plain[SHEETS]) + cut]
     refused = said_by(lambda: maps_of(files))
-    steps = with_shared_vectors(plain, config().core)["Tests/Vectors/steps.json"]
+    steps = plain_answered["Tests/Vectors/steps.json"]
     done = run(program, rehashed(files | {"Tests/Vectors/steps.json": steps}), tmp_path)
     assert (done.returncode, done.stdout) == (1, f"error: {refused}\n")
 

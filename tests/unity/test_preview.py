@@ -10,7 +10,7 @@ import pytest
 
 from tests.ar.hybrid.conftest import rubbing_arm
 from tests.support.folders import package
-from tests.unity.test_assemble import LABEL, PARAMETERS, ROBOT, sources  # noqa: F401
+from tests.unity.test_assemble import LABEL, PARAMETERS, ROBOT, sources_in
 from trunkline.ar.hybrid.compose import Placed, compose
 from trunkline.ar.hybrid.objects import GraspObject
 from trunkline.ar.hybrid.outcomes import Holding
@@ -32,7 +32,7 @@ from trunkline.unity.upm_package import CALIBRATED, MODEL, write_tarball
 SECONDS, LET_GO, PULL, CURL = 0.6, 0.25, 0.02, Trajectory(0.2, 0.02, [0.0])
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def mjcf() -> str:
     """Of a short arm with all that Unity's importer has no component for but backlash."""
     spec = rubbing_arm(spiral_chain(0.2, 0.05, 0.02, 6), 3)
@@ -40,12 +40,13 @@ def mjcf() -> str:
     return spec.to_xml()
 
 
-@pytest.fixture
-def files(sources, mjcf, tmp_path) -> dict[str, bytes]:  # noqa: F811
+@pytest.fixture(scope="module")
+def files(mjcf, tmp_path_factory) -> dict[str, bytes]:
     """As a client reads them."""
-    made, _ = assemble(LABEL, replace(sources, mjcf=mjcf), CURL, ROBOT)
-    write_tarball(tmp_path / "twin.tgz", made)
-    return read_package(tmp_path / "twin.tgz")
+    folder = tmp_path_factory.mktemp("preview")
+    made, _ = assemble(LABEL, replace(sources_in(folder), mjcf=mjcf), CURL, ROBOT)
+    write_tarball(folder / "twin.tgz", made)
+    return read_package(folder / "twin.tgz")
 
 
 def way_of(arm: mujoco.MjModel, joints=(), seconds: float = SECONDS) -> CommandTrajectory:

@@ -8,13 +8,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.support.small_arm import small_spec
-from tests.unity.test_assemble import LABEL, ROBOT, TRAJECTORY, sources_in
 from trunkline.frames import gravity_in_base
-from trunkline.model.arm.joints import Joints, MaxwellElement, add_elements
 from trunkline.model.simulation.rest import settle
 from trunkline.unity import start
-from trunkline.unity.assemble import CSHARP, assemble
+from trunkline.unity.assemble import CSHARP
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import Laws, write_laws
 from trunkline.unity.plugin import Imported, Scene
@@ -30,18 +27,8 @@ UPRIGHT = Rotation.identity()
 
 
 @pytest.fixture(scope="module")
-def files(tmp_path_factory):
-    """An arm of joints that creep, are round and harden, with friction on its tendons."""
-    spec = small_spec(max_force=20)
-    for joint in spec.joints:
-        joint.stiffness = [2 * joint.stiffness[0], 0, 2 * joint.stiffness[0]]
-    branches = [MaxwellElement(0.2, 0.5), MaxwellElement(0.1, 0.05), MaxwellElement(0.05, 5.0)]
-    add_elements(spec, Joints(branches, round=True), 1e-5)
-    spec.compile()
-    sources = replace(sources_in(tmp_path_factory.mktemp("start")), mjcf=spec.to_xml())
-    files, violations = assemble(LABEL, sources, TRAJECTORY, ROBOT)
-    assert violations == []
-    return files
+def files(arm_files):
+    return arm_files
 
 
 def rest_of(files) -> np.ndarray:

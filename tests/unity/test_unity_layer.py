@@ -8,7 +8,9 @@ source file; set TRUNKLINE_MUJOCO to a checkout of google-deepmind/mujoco to com
 import json
 import os
 import re
+import shutil
 import subprocess
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,7 +24,6 @@ from tests.support.operator import config
 from tests.unity.mono import compiled
 from tests.unity.test_csharp import SHARED, bends, case, moved_a_little, said_by
 from trunkline.ar.conformance.answers import PACKAGE
-from trunkline.ar.conformance.vectors import with_shared_vectors
 from trunkline.ar.session.registration import inverse
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.messages import Controller, Input, Pose, to_json
@@ -59,15 +60,18 @@ RAY = about((1.0, 0.0, 0.0), np.pi / 2)  # from a hand of Unity's, ray ahead, to
 
 
 class Project:
-    """A Unity project with some packages, as far as a compiler goes: its assemblies, in a folder."""
+    """A Unity project with some packages, as far as a compiler goes: its assemblies, in a folder. Of `stubs` that are
+    compiled already, those that it has are copied."""
 
-    def __init__(self, folder: Path, packages: list[str]) -> None:
+    def __init__(self, folder: Path, packages: list[str], stubs: dict[str, Path] | None = None) -> None:
         self.folder, self.packages = folder, packages
-        self.assemblies: dict[str, Path] = {}
         hidden = [] if "org.mujoco" in packages else ["Mujoco.Runtime", "Mujoco.Editor"]
         hidden += [] if "com.unity.ai.inference" in packages else ["Unity.InferenceEngine"]
+        self.assemblies = {
+            name: Path(shutil.copy(path, folder)) for name, path in (stubs or {}).items() if name not in hidden
+        }
         for name, (stub, references) in STUBBED.items():
-            if name not in hidden:
+            if name not in hidden and name not in self.assemblies:
                 uses = [self.assemblies[reference] for reference in references]
                 out, options = folder / f"{name}.dll", ["-unsafe", "-r:System.Xml.dll"]
                 self.assemblies[name] = compiled(out, [STUBS / f"{stub}.cs"], uses, *options)
@@ -123,8 +127,9 @@ def test_every_script_is_of_one_assembly():
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_without_a_package_all_compiles_that_does_not_need_it(tmp_path, package):
-    left = Project(tmp_path, [name for name in PACKAGES if name != package]).assemblies
+def test_without_a_package_all_compiles_that_does_not_need_it(project, tmp_path, package):
+    stubs = {name: project.assemblies[name] for name in STUBBED}
+    left = Project(tmp_path, [name for name in PACKAGES if name != package], stubs).assemblies
     missing = {"org.mujoco": {"Trunkline"}, "com.unity.ai.inference": {"Trunkline.Inference"}}[package]
     samples = {name for name in DEFINITIONS if ".Samples." in name}
     assert set(DEFINITIONS) - set(left) == missing | samples
@@ -181,10 +186,14 @@ def test_components_menu_and_sample_do_as_python(layer, files, tmp_path):
     assert counts["touches"] == len(asked["touches"])
 
 
+@pytest.fixture(scope="module")
+def asked_of_plain(plain_answered) -> dict:
+    return cases_of(plain_answered)
+
+
 @pytest.mark.parametrize("part", ["reach", "sequences", "bend", "touches", "refusals"])
-def test_an_answer_that_is_another_is_named(layer, plain, tmp_path, part):
-    files = with_shared_vectors(plain, config().core)
-    asked = cases_of(files)
+def test_an_answer_that_is_another_is_named(layer, plain_answered, asked_of_plain, tmp_path, part):
+    asked = deepcopy(asked_of_plain)
     if part == "refusals":
         asked[part]["no maps"] += "."
     else:
@@ -192,7 +201,7 @@ def test_an_answer_that_is_another_is_named(layer, plain, tmp_path, part):
             item["answer"] for item in asked[part]
         ]  # fmt: skip
         assert any(moved_a_little(item) for item in answers)
-    done = run(layer, files, asked, tmp_path)
+    done = run(layer, plain_answered, asked, tmp_path)
     assert done.returncode == 1
     assert done.stdout.splitlines()[-1].startswith("error: ")
 

@@ -372,7 +372,7 @@ def test_which_intervals_of_the_demo_session_hold_the_truth():
         "kp": True,
         "kv": True,
         "time_constant": True,
-        "dead_time": False,
+        "dead_time": True,
         "force_range": True,
         "capstan_friction": False,
     }

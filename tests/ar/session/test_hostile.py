@@ -6,12 +6,15 @@ import struct
 from contextlib import suppress
 
 import pytest
-from aiohttp import WSServerHandshakeError
+from aiohttp import ClientSession, WSServerHandshakeError
+from aiohttp.test_utils import unused_port
 
 from tests.ar.session.test_serving import asked, executing, grips
 from tests.ar.teleop.test_plan import MOUNT, TIP
-from tests.support.live import TOKEN, Hands, controlling, hand, laid
+from tests.support.live import TOKEN, Hands, Laid, controlling, hand, laid
+from trunkline.ar.session import connections
 from trunkline.ar.session.auth import CODE_SECONDS, HEADERS, Origins, PairingCode
+from trunkline.ar.session.serving import Address, listening
 
 
 @pytest.mark.realtime
@@ -315,3 +318,128 @@ def test_names_of_a_server_are_exact():
         ("localhost:8443", "http://localhost:8443"), ("localhost:8443", "https://localhost:8443.evil.example"),
     ]:  # fmt: skip
         assert origins.fault(host, origin, True)
+
+
+@pytest.mark.realtime
+def test_an_id_that_all_know_takes_nobody_s_place():
+    """Spectators see every id; only the key, which the welcome alone has, makes one the same client again."""
+
+    async def session():
+        async with laid() as here:
+            guest = await controlling(here)
+            lease = await guest.hears("lease")
+            assert guest.key not in str(lease)
+            for key in (guest.id, guest.key[:-1], "x"):
+                other = await here.come(key=key)
+                assert other.id != guest.id
+                assert other.key != guest.key
+            assert not guest.closed.is_set()
+            assert here.server.lease.holder == guest.id
+
+    asyncio.run(session())
+
+
+@pytest.mark.realtime
+def test_one_place_is_left_for_a_stop_however_many_there_are(monkeypatch):
+    monkeypatch.setattr("trunkline.ar.session.server.MOST_CLIENTS", 2)
+
+    async def session():
+        async with laid() as here:
+            guests = [await here.come(), await here.come()]
+            first = await here.come()
+            await first.refused("server")
+            await first.say(type="lease", action="ask")
+            last = await here.come()
+            await asyncio.wait_for(first.closed.wait(), 2.0)
+            assert here.server.lease.holder == ""
+            assert not any(guest.closed.is_set() for guest in guests)
+            await last.stop()
+            for _ in range(200):
+                if here.robot.stops:
+                    break
+                await asyncio.sleep(0.01)
+            assert here.robot.stops
+
+    asyncio.run(session())
+
+
+@pytest.mark.realtime
+def test_those_that_say_nothing_keep_nobody_out(monkeypatch):
+    monkeypatch.setattr("trunkline.ar.session.server.MOST_WAITING", 3)
+
+    async def session():
+        async with laid() as here:
+            silent = [await here.come(hello=False) for _ in range(5)]
+            await asyncio.gather(*(asyncio.wait_for(guest.closed.wait(), 2.0) for guest in silent[:2]))
+            assert "say nothing" in await silent[0].refused("server")
+            assert not any(guest.closed.is_set() for guest in silent[2:])
+            assert (await here.come()).id in here.server.clients
+
+    asyncio.run(session())
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("value", ["Bearer é", "Bearer \udce9", "Bearer", "Basic x", "é" * 100])
+def test_an_odd_token_is_refused_without_a_traceback(value, capfd):
+    async def session():
+        async with laid() as here:
+            reader, writer = await asyncio.open_connection("127.0.0.1", int(here.url.rpartition(":")[2]))
+            lines = f"GET /scene.json HTTP/1.1\r\nHost: {here.url[7:]}\r\nAuthorization: {value}\r\n\r\n"
+            writer.write(lines.encode(errors="surrogateescape"))
+            assert (await reader.readline()).startswith(b"HTTP/1.1 401")
+            writer.close()
+
+    asyncio.run(session())
+    assert "Traceback" not in capfd.readouterr().err
+
+
+@pytest.mark.realtime
+def test_half_a_request_is_closed_and_nothing_says_versions(monkeypatch):
+    """Half a request, none, a damaged one: each a connection that is closed; a client that is here stays."""
+    monkeypatch.setattr(connections, "LONGEST", 0.6)
+    monkeypatch.setattr(connections, "EVERY", 0.1)
+
+    async def session():
+        here = Laid(unused_port())
+        address = Address(int(here.url.rpartition(":")[2]))
+        async with listening(here.server, address), ClientSession() as web:
+            socket = await web.ws_connect(f"{here.url}/ws", headers={"Origin": here.origin})
+            await socket.send_json({"type": "hello", "version": 1, "token": TOKEN})
+            for half in (b"", b"GET / HTTP/1.1\r\nHos", b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 99\r\n\r\nx"):
+                reader, writer = await asyncio.open_connection("127.0.0.1", address.port)
+                writer.write(half)
+                answer = await asyncio.wait_for(reader.read(), 3.0)
+                assert b"ython" not in answer
+                writer.close()
+            reader, writer = await asyncio.open_connection("127.0.0.1", address.port)
+            writer.write(b"GET / HTTP/1.1\r\nno header\r\n\r\n")
+            answer = await asyncio.wait_for(reader.read(), 3.0)
+            assert b"400" in answer.partition(b"\r\n")[0]
+            assert b"ython" not in answer
+            assert any(line.startswith("refused: Error handling request") for line in here.log)
+            assert not socket.closed
+            answer = await web.get(here.url)
+            assert answer.headers["Server"] == "trunkline"
+
+    asyncio.run(session())
+
+
+def test_of_too_many_idle_connections_the_oldest_go(monkeypatch):
+    monkeypatch.setattr(connections, "MOST", 2)
+
+    class Transport:
+        closed, left = False, 0
+
+        def abort(self):
+            self.closed = True
+
+        def get_write_buffer_size(self):
+            return self.left
+
+    idle, each = connections.IdleConnections(), [Transport() for _ in range(5)]
+    idle.busy.add(each[0])
+    each[1].left = 3  # still being answered
+    assert idle.close(each[:3], 0.0) == 0
+    assert idle.close(each, 1.0) == 1
+    assert [transport.closed for transport in each] == [False, False, True, False, False]
+    assert idle.close([each[0], each[1], each[3], each[4]], 1.0 + connections.LONGEST) == 2

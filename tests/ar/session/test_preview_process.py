@@ -11,6 +11,7 @@ import pytest
 
 from tests.ar.session.test_robot_process import simulation
 from tests.ar.teleop.test_plan import LIMITS, MOUNT, NETWORK, OFFSET, TIP, request
+from tests.support.answering import answering
 from tests.support.operator import config
 from tests.support.small_arm import small_spec
 from trunkline.ar.hybrid.grasp_poses import SideGrip
@@ -175,14 +176,6 @@ def test_the_assistants_offer_comes_after_what_the_batch_tells():
     ]  # nothing is lifted by so much, wherever
     assert predictions[0].prediction.offer is None
     assert answers[-2:] == predictions
-
-
-def answering(answers, orders, newest):
-    """A process that plans: it ends at an order of 0, and answers any other by its number."""
-    answers.send(preview_process.Ready())
-    while number := orders.get()[1]:
-        answers.send(number)
-    os._exit(1)
 
 
 def answers_of(process, seconds=60.0) -> list:

@@ -320,8 +320,8 @@ def test_the_same_client_again_ends_the_older_connection_and_the_lease():
     async def session():
         async with laid() as here:
             guest = await controlling(here)
-            again = await here.come(id=guest.id)
-            assert again.id == guest.id
+            again = await here.come(key=guest.key)
+            assert (again.id, again.key) == (guest.id, guest.key)
             await asyncio.wait_for(guest.closed.wait(), 2.0)
             assert here.server.lease.holder == ""
             assert list(here.server.clients) == [guest.id]

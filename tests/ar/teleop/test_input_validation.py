@@ -1,131 +1,160 @@
-"""What is taken for sound, from both sides of each border: controllers, clocks, silence, settings, hands that swap."""
+"""What is trusted, by number: each reason alone, each border and its sides, and which comes first."""
 
+import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
-from tests.support.operator import PACKAGE, REFERENCE, config
 from trunkline.ar.teleop.headset_silence import silence_fault
 from trunkline.ar.teleop.input_validation import UNIT, clock_fault, fault_of, setting_fault, swapped
-from trunkline.ar.teleop.messages import Controller, Input, Pose, World
+from trunkline.ar.teleop.messages import Controller, Pose
 from trunkline.ar.teleop.tracked_controller import Hand
 
-NAN, INFINITY, NEAR = float("nan"), float("inf"), 1e-6
-SAFETY, FORWARD = config().core.safety, (1.0, 0.0, 0.0, 0.0)
-HAND = Controller((0.1, 0.2, 0.3), FORWARD)
-MESSAGE = Input(100.0, HAND, HAND, REFERENCE, (0.0,) * 7, World("world"), PACKAGE)
+NAN, INF, NEAR = math.nan, math.inf, 1e-6
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+GOOD = Controller(position=(1.0, 2.0, 3.0), quaternion=LEVEL, tracked=True)
+BASE = Pose((0.0, 0.0, 0.0), LEVEL)
+PACKAGE = "a" * 64
 
 
-def of_length(length):
+def of_length(length: float) -> tuple[float, ...]:
     return (0.6 * length, 0.0, 0.8 * length, 0.0)
 
 
-CONTROLLERS = [
-    (HAND, ""),
-    (replace(HAND, tracked=False), "not tracked"),
-    (replace(HAND, tracked=False, position=(NAN, 0.0, 0.0)), "not tracked"),
-    *((replace(HAND, position=tuple(bad if i == n else 0.0 for i in range(3))), "pose is not a number")
-      for n in range(3) for bad in (NAN, INFINITY, -INFINITY)),
-    *((replace(HAND, quaternion=tuple(NAN if i == n else 0.5 for i in range(4))), "pose is not a number")
-      for n in range(4)),
-    *((replace(HAND, stick=tuple(NAN if i == n else 0.0 for i in range(2))), "pose is not a number") for n in range(2)),
-    (replace(HAND, quaternion=of_length(1 + UNIT - NEAR)), ""),
-    (replace(HAND, quaternion=of_length(1 + UNIT + NEAR)), "quaternion is not of unit length"),
-    (replace(HAND, quaternion=of_length(1 - UNIT + NEAR)), ""),
-    (replace(HAND, quaternion=of_length(1 - UNIT - NEAR)), "quaternion is not of unit length"),
-    (replace(HAND, quaternion=(0.0,) * 4), "quaternion is not of unit length"),
-]  # fmt: skip
+def with_one(value: float, place: int, count: int) -> tuple[float, ...]:
+    """Numbers of which one is `value`."""
+    return tuple(value if i == place else 0.5 for i in range(count))
 
 
-@pytest.mark.parametrize(("controller", "fault"), CONTROLLERS)
-def test_a_controller(controller, fault):
-    assert fault_of(controller) == fault
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        ({}, ""),
+        ({"tracked": False}, "not tracked"),
+        ({"tracked": False, "position": (NAN, 0.0, 0.0), "quaternion": (2.0, 0.0, 0.0, 0.0)}, "not tracked"),
+        *(({"position": with_one(bad, n, 3)}, "pose is not a number") for n in range(3) for bad in (NAN, INF, -INF)),
+        *(({"quaternion": with_one(NAN, n, 4)}, "pose is not a number") for n in range(4)),
+        *(({"stick": with_one(NAN, n, 2)}, "pose is not a number") for n in range(2)),
+        ({"quaternion": of_length(1 + UNIT - NEAR)}, ""),
+        ({"quaternion": of_length(1 + UNIT + NEAR)}, "quaternion is not of unit length"),
+        ({"quaternion": of_length(1 - UNIT + NEAR)}, ""),
+        ({"quaternion": of_length(1 - UNIT - NEAR)}, "quaternion is not of unit length"),
+        ({"quaternion": (1.0099, 0.0, 0.0, 0.0)}, ""),
+        ({"quaternion": (0.0, 0.9901, 0.0, 0.0)}, ""),
+        ({"quaternion": (1.0101, 0.0, 0.0, 0.0)}, "quaternion is not of unit length"),
+        ({"quaternion": (0.0, 0.0, 0.9899, 0.0)}, "quaternion is not of unit length"),
+        ({"quaternion": (0.5, -0.5, 0.5, -0.5)}, ""),
+        ({"quaternion": (0.0, 0.0, 0.0, 0.0)}, "quaternion is not of unit length"),
+    ],
+)
+def test_a_controller_is_tracked_its_numbers_finite_and_its_quaternion_of_unit_length_to_a_hundredth(change, fault):
+    assert fault_of(replace(GOOD, **change)) == fault
 
 
 @pytest.mark.parametrize(
     ("last", "stamp", "dt", "fault"),
     [
-        (None, 100.0, 0.01, ""),
-        (99.0, 100.0, 0.01, ""),
-        (100.0, 100.0, 0.01, ""),
+        (None, 5.0, 0.01, ""),
+        (None, -5.0, 0.01, ""),
+        (5.0, 5.0, 0.01, ""),
+        (5.0, 5.1, 1e-9, ""),
+        (5.0, 4.75, 0.01, "clock went back by 0.25 s; holding"),
         (100.0 + NEAR, 100.0, 0.01, "clock went back by 1e-06 s; holding"),
-        (99.0, 100.0, 0.0, "step of 0 s: expected a positive time; holding"),
-        (99.0, 100.0, -0.01, "step of -0.01 s: expected a positive time; holding"),
-        (99.0, 100.0, NAN, "step of nan s: expected a positive time; holding"),
-        (99.0, 100.0, INFINITY, "step of inf s: expected a positive time; holding"),
-        (99.0, NAN, 0.01, "stamp is not a number; holding"),
-        (99.0, INFINITY, 0.01, "stamp is not a number; holding"),
-        (None, -INFINITY, 0.01, "stamp is not a number; holding"),
-        (101.0, NAN, 0.0, "step of 0 s: expected a positive time; holding"),
+        (None, -INF, 0.01, "stamp is not a number; holding"),
+        (5.0, NAN, 0.01, "stamp is not a number; holding"),
+        (5.0, INF, 0.01, "stamp is not a number; holding"),
+        (5.0, 5.1, 0.0, "step of 0 s: expected a positive time; holding"),
+        (5.0, 5.1, -0.01, "step of -0.01 s: expected a positive time; holding"),
+        (5.0, 5.1, NAN, "step of nan s: expected a positive time; holding"),
+        (5.0, 5.1, INF, "step of inf s: expected a positive time; holding"),
+        (5.0, NAN, 0.0, "step of 0 s: expected a positive time; holding"),
     ],
 )
-def test_a_clock(last, stamp, dt, fault):
-    assert clock_fault(last, replace(MESSAGE, stamp=stamp), dt) == fault
+def test_time_goes_on_in_finite_steps(last, stamp, dt, fault):
+    assert clock_fault(last, SimpleNamespace(stamp=stamp), dt) == fault
 
 
 @pytest.mark.parametrize(
-    ("last", "stamp", "silent", "faulty"),
+    ("last", "stamp", "silent", "fault"),
     [
-        (None, 100.0, 0.0, False),
-        (None, 100.0, SAFETY.silence - NEAR, False),
-        (None, 100.0, SAFETY.silence + NEAR, True),
-        (100.0, 100.0 + SAFETY.silence - NEAR, 0.0, False),
-        (100.0, 100.0 + SAFETY.silence + NEAR, 0.0, True),  # by its own clock
-        (100.0, 100.0, SAFETY.silence + NEAR, True),  # by ours
-        (100.0, 100.0 + SAFETY.silence - NEAR, SAFETY.silence - NEAR, False),
+        (None, 9.0, 0.25, ""),
+        (None, 9.0, 0.26, "client silent for 0.26 s; holding"),
+        (1.0, 1.25, 0.0, ""),
+        (1.0, 1.5, 0.0, "client silent for 0.50 s; holding"),
+        (1.0, 1.0, 0.5, "client silent for 0.50 s; holding"),
+        (1.0, 1.75, 0.5, "client silent for 0.75 s; holding"),
+        (None, 9.0, 0.25 + NEAR, "client silent for 0.25 s; holding"),
+        (1.0, 1.25 - NEAR, 0.25 - NEAR, ""),
+        (1.0, 1.25 + NEAR, 0.0, "client silent for 0.25 s; holding"),  # by its own clock
+        (1.0, 1.0, 0.25 + NEAR, "client silent for 0.25 s; holding"),  # by ours
     ],
 )
-def test_silence(last, stamp, silent, faulty):
-    assert bool(silence_fault(last, stamp, silent, SAFETY)) == faulty
+def test_a_client_is_silent_by_its_stamps_or_by_what_does_not_come(last, stamp, silent, fault):
+    assert silence_fault(last, stamp, silent, SimpleNamespace(silence=0.25)) == fault
 
 
 @pytest.mark.parametrize(
-    ("changes", "fault"),
+    ("change", "fault"),
     [
         ({}, ""),
         ({"package": "b" * 64}, "package: found digest bbbbbbbbbbbb, expected aaaaaaaaaaaa; holding"),
         ({"package": ""}, "package: found digest none, expected aaaaaaaaaaaa; holding"),
+        (
+            {"package": "", "alignment": None, "joints": (NAN,)},
+            "package: found digest none, expected aaaaaaaaaaaa; holding",
+        ),
         ({"alignment": None}, "base is not aligned; holding"),
-        ({"alignment": Pose((NAN, 0.0, 0.0), FORWARD)}, "base alignment is not a pose; holding"),
-        ({"alignment": Pose((0.0, 0.0, 0.0), (NAN, 0.0, 0.0, 0.0))}, "base alignment is not a pose; holding"),
-        ({"alignment": Pose((0.0, 0.0, 0.0), of_length(1 + UNIT + NEAR))}, "base alignment is not a pose; holding"),
-        ({"alignment": Pose((0.0, 0.0, 0.0), of_length(1 - UNIT - NEAR))}, "base alignment is not a pose; holding"),
-        ({"alignment": Pose((0.0, 0.0, 0.0), of_length(1 + UNIT - NEAR))}, ""),
-        *(({"joints": tuple(NAN if i == n else 0.0 for i in range(7))}, "robot's joints are not numbers; holding")
-          for n in range(7)),
-        ({"package": "", "alignment": None, "joints": (NAN,) * 7},
-         "package: found digest none, expected aaaaaaaaaaaa; holding"),
-        ({"alignment": None, "joints": (NAN,) * 7}, "base is not aligned; holding"),
+        ({"alignment": replace(BASE, position=(NAN, 0.0, 0.0))}, "base alignment is not a pose; holding"),
+        ({"alignment": replace(BASE, quaternion=(NAN, 0.0, 0.0, 0.0))}, "base alignment is not a pose; holding"),
+        ({"alignment": replace(BASE, quaternion=(1.0099, 0.0, 0.0, 0.0))}, ""),
+        ({"alignment": replace(BASE, quaternion=(0.9901, 0.0, 0.0, 0.0))}, ""),
+        ({"alignment": replace(BASE, quaternion=(1.0101, 0.0, 0.0, 0.0))}, "base alignment is not a pose; holding"),
+        ({"alignment": replace(BASE, quaternion=(0.9899, 0.0, 0.0, 0.0))}, "base alignment is not a pose; holding"),
+        ({"alignment": replace(BASE, quaternion=of_length(1 + UNIT - NEAR))}, ""),
+        ({"alignment": replace(BASE, quaternion=of_length(1 + UNIT + NEAR))}, "base alignment is not a pose; holding"),
+        ({"alignment": replace(BASE, quaternion=of_length(1 - UNIT - NEAR))}, "base alignment is not a pose; holding"),
+        ({"alignment": None, "joints": (NAN,)}, "base is not aligned; holding"),
+        *(({"joints": with_one(NAN, n, 7)}, "robot's joints are not numbers; holding") for n in range(7)),
+        ({"joints": (INF, 0.0)}, "robot's joints are not numbers; holding"),
     ],
-)  # fmt: skip
-def test_settings(changes, fault):
-    assert setting_fault(replace(MESSAGE, **changes), PACKAGE) == fault
+)
+def test_package_base_and_joints_are_those_that_are_known(change, fault):
+    message = SimpleNamespace(**({"package": PACKAGE, "alignment": BASE, "joints": (0.0,) * 7} | change))
+    assert setting_fault(message, PACKAGE) == fault
 
 
-def swap(apart, left, right, visible=(True, True)):
-    """Hands that were `apart` m, and are now `left` and `right` m from where the left one was."""
-    before = [Hand(0.6, controller=replace(HAND, position=(at, 0.0, 0.0)) if there else None)
-              for at, there in zip((0.0, apart), visible, strict=True)]  # fmt: skip
-    message = replace(
-        MESSAGE, left=replace(HAND, position=(left, 0.0, 0.0)), right=replace(HAND, position=(right, 0.0, 0.0))
-    )
-    return swapped(*before, message, SAFETY.swap)
+def at(*position: float) -> Controller:
+    return replace(GOOD, position=position)
+
+
+LEFT, RIGHT = at(0.0, 0.0, 0.0), at(1.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(
-    ("apart", "left", "right", "visible", "expected"),
+    ("before", "left", "right", "changed_places"),
     [
-        (0.4, 0.4, 0.0, (True, True), True),
-        (0.4, 0.0, 0.4, (True, True), False),
-        (0.4, 0.4 - SAFETY.swap + NEAR, 0.0, (True, True), True),
-        (0.4, 0.4 - SAFETY.swap - NEAR, 0.0, (True, True), False),
-        (0.4, 0.4, SAFETY.swap - NEAR, (True, True), True),
-        (0.4, 0.4, SAFETY.swap + NEAR, (True, True), False),
-        (2 * SAFETY.swap + NEAR, 2 * SAFETY.swap + NEAR, 0.0, (True, True), True),
-        (2 * SAFETY.swap - NEAR, 2 * SAFETY.swap - NEAR, 0.0, (True, True), False),  # as near: nobody can tell
-        (0.4, 0.4, 0.0, (False, True), False),
-        (0.4, 0.4, 0.0, (True, False), False),
+        ((LEFT, RIGHT), RIGHT, LEFT, True),
+        ((LEFT, RIGHT), LEFT, RIGHT, False),
+        ((LEFT, RIGHT), at(1.0, 0.25, 0.0), at(0.0, 0.0, 0.25), True),  # as far from the other's place as may be
+        ((LEFT, RIGHT), at(0.75 + NEAR, 0.0, 0.0), LEFT, True),
+        ((LEFT, RIGHT), at(0.75 - NEAR, 0.0, 0.0), LEFT, False),
+        ((LEFT, RIGHT), RIGHT, at(0.25 - NEAR, 0.0, 0.0), True),
+        ((LEFT, RIGHT), RIGHT, at(0.25 + NEAR, 0.0, 0.0), False),
+        ((LEFT, at(0.5 + NEAR, 0.0, 0.0)), at(0.5 + NEAR, 0.0, 0.0), LEFT, True),
+        ((LEFT, at(0.5 - NEAR, 0.0, 0.0)), at(0.5 - NEAR, 0.0, 0.0), LEFT, False),
+        ((LEFT, RIGHT), at(1.0, 0.26, 0.0), LEFT, False),  # one of both is further
+        ((LEFT, RIGHT), RIGHT, at(0.0, 0.26, 0.0), False),
+        ((LEFT, at(0.5, 0.0, 0.0)), at(0.5, 0.0, 0.0), LEFT, False),  # near to its own place too
+        ((LEFT, at(0.51, 0.0, 0.0)), at(0.51, 0.0, 0.0), LEFT, True),
+        ((LEFT, at(0.6, 0.0, 0.0)), at(0.6, 0.0, 0.0), at(0.1, 0.0, 0.0), False),  # one of both near to its own
+        ((LEFT, at(0.6, 0.0, 0.0)), at(0.5, 0.0, 0.0), LEFT, False),
+        ((None, RIGHT), RIGHT, LEFT, False),
+        ((LEFT, None), RIGHT, LEFT, False),
     ],
 )
-def test_hands_that_have_changed_places(apart, left, right, visible, expected):
-    assert swap(apart, left, right, visible) == expected
+def test_controllers_have_changed_places_where_both_are_near_to_the_others_and_far_from_their_own(
+    before, left, right, changed_places
+):
+    hands = [Hand(1.0, controller=controller) for controller in before]
+    assert swapped(*hands, SimpleNamespace(left=left, right=right), 0.25) is changed_places

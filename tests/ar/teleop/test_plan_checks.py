@@ -7,14 +7,17 @@ import pytest
 
 from tests.support.bent_chain import hardening_stump
 from tests.support.operator import READY_JOINTS, config
+from trunkline.ar.preview.package import Package
 from trunkline.ar.teleop import plan_checks
 from trunkline.ar.teleop.alignment import base_quaternion
+from trunkline.ar.teleop.config import TeleoperationConfig
 from trunkline.ar.teleop.following import sought
 from trunkline.ar.teleop.messages import Obstacle, Request, Target, Targets, World
 from trunkline.ar.teleop.plan import Plan
 from trunkline.ar.teleop.plan_checks import LINK_RADIUS, check_plan
 from trunkline.ar.teleop.planner import Planner
 from trunkline.ar.teleop.rigid_ik import RigidIK
+from trunkline.ar.teleop.shaping import Shaper
 from trunkline.ar.teleop.tendons import Network
 from trunkline.ar.teleop.trajectory import limits_of
 from trunkline.ar.teleop.vectors import DOWN, add, rotate
@@ -25,6 +28,7 @@ from trunkline.kinematics.panda.kinematics import Q_MAX, Q_MIN, joint_frames, mo
 from trunkline.model.statics.chain import read_chain
 from trunkline.model.statics.equilibria import actuated
 from trunkline.model.statics.placement import joint_positions
+from trunkline.pipeline.config import PROJECT, compose_settings, validated
 
 OFFSET, STEP, ROWS, CURL = 0.05, 0.01, 200, 100
 CHAIN = read_chain(hardening_stump())
@@ -291,12 +295,33 @@ def stand_off_tip(planner: Planner, asked: Targets) -> np.ndarray:
     return mount + joint_positions(CHAIN, rest.qpos)[0][-1] @ (flange * [1, -1, -1]).T
 
 
-@pytest.mark.parametrize(("refused", "phases"), [
-    (1, ["approach", "curl", "advance"]), (2, ["approach", "curl"]), (3, None),
+class Counted(RigidIK):
+    """`solved`: how often it was."""
+
+    solved = 0
+
+    def solve(self, joints, mount, pointing, heading):
+        self.solved += 1
+        return super().solve(joints, mount, pointing, heading)
+
+
+@pytest.mark.parametrize(("refused", "solved", "phases"), [
+    (0, 2, ["approach", "curl", "advance"]), (1, 4, ["approach", "curl", "advance"]), (2, 5, ["approach", "curl"]),
+    (3, 5, None),
 ])  # fmt: skip
-def test_a_way_that_a_solid_forbids_gives_place_to_the_next(aimed, monkeypatch, refused, phases):
-    """The whole advance to half of it, and that to none, whose reason is the plan's."""
-    tried = []
+def test_a_way_that_a_solid_forbids_gives_place_to_the_next_which_is_solved_then(
+    aimed, monkeypatch, refused, solved, phases
+):
+    """The whole advance to half of it, and that to none, whose reason is the plan's. Each end of an advance is solved
+    for, and each leg shaped for, once its way is tried."""
+    planner, asked = aimed
+    rigid, shaped_for, tried = Counted(OFFSET), [], []
+
+    def shaper(*leg):
+        shaped_for.append(leg)
+        return Shaper(np.zeros(1), np.ones(1))
+
+    counting = replace(planner, rigid=rigid, shaper=shaper)
 
     def checked(plan, *_):
         tried.append(len(plan.joints) - dict(plan.phases).get("advance", len(plan.joints)))
@@ -306,10 +331,11 @@ def test_a_way_that_a_solid_forbids_gives_place_to_the_next(aimed, monkeypatch, 
     monkeypatch.setattr("trunkline.ar.teleop.planner.check_plan", checked)
     if phases is None:
         with pytest.raises(InputError, match="world: way 3"):
-            advancing(*aimed)
+            advancing(counting, asked)
         assert tried[0] > tried[1] > tried[2] == 0
     else:
-        assert [name for name, _ in advancing(*aimed).phases] == phases
+        assert [name for name, _ in advancing(counting, asked).phases] == phases
+    assert (rigid.solved, len(shaped_for)) == (solved, min(3 * (refused + 1), 8))
 
 
 def test_a_solid_beside_the_stand_off_is_gone_round(aimed):
@@ -318,6 +344,28 @@ def test_a_solid_beside_the_stand_off_is_gone_round(aimed):
     solid = about(stand_off_tip(planner, asked), 0.002)
     plan = replace(planner, advance=0.06).plan(Request(1, asked, "world", "package"), solid, READY, STRAIGHT)
     check_plan(plan, solid, OFFSET, CHAIN)
+
+
+@pytest.mark.parametrize("shaper", [None, lambda *leg: Shaper(np.array([0.0, 0.3]), np.array([0.6, 0.4]))])
+@pytest.mark.parametrize(("speed", "pull"), [(0.1, PULL), (0.03, PULL), (0.03, PULL[[1, 0, 2]] / 3)])
+def test_the_mount_advances_no_faster_than_it_may(speed, pull, shaper):
+    """As fast without shaping, and slower with it."""
+    planner, asked = aim(pull)
+    plan = advancing(replace(planner, advance_speed=speed, shaper=shaper), asked)
+    mounts, _ = mount_pose(plan.joints[dict(plan.phases)["advance"] :], OFFSET)
+    fastest = np.linalg.norm(np.diff(mounts, axis=0), axis=1).max() / plan.step
+    assert (0.95 if shaper is None else 0.5) * speed < fastest <= speed
+
+
+def test_the_speed_of_the_advance_is_that_of_the_settings():
+    """And no more than 0.25 m/s."""
+    folder, arm = PROJECT / "conf/teleop", hardening_stump()
+    values = compose_settings(folder, {}, str(folder))
+    made = validated(TeleoperationConfig, values | {"advance_speed": 0.25}, folder)
+    package = Package("", None, bending(PULL), arm, CHAIN, None, STRAIGHT, 0.0, {})
+    assert (config().advance_speed, package.planner(made).advance_speed) == (0.1, 0.25)
+    with pytest.raises(InputError, match=r"advance_speed.*found 0\.251, expected"):
+        validated(TeleoperationConfig, values | {"advance_speed": 0.251}, folder)
 
 
 def test_the_mount_advances_nearly_straight_and_hardly_turns(aimed):

@@ -37,9 +37,10 @@ def press(rng: np.random.Generator, moving: bool) -> tuple[float, float]:
     operator.dt = 1 / HZ
     times = np.arange(-round(HELD * HZ), 1) / HZ
     turns = _hand(rng, times, moving)
-    operator.wait(0.5, left={"quaternion": _wxyz(turns[0])})
-    for time, turn in zip(times, turns, strict=True):
-        pose = {"quaternion": _wxyz(turn), "grip": True, "trigger": bool(time == 0)}
+    quaternions = list(map(tuple, wxyz_from_rotation(turns).tolist()))
+    operator.wait(0.5, left={"quaternion": quaternions[0]})
+    for time, quaternion in zip(times, quaternions, strict=True):
+        pose = {"quaternion": quaternion, "grip": True, "trigger": bool(time == 0)}
         intent = operator.step(left=pose, right={"grip": True})
     assert intent.request is not None
     reference = operator.message.alignment
@@ -55,19 +56,12 @@ def _meant(moving: bool) -> Rotation:
     return Rotation.from_euler("y", TURN if moving else 0.0, degrees=True)
 
 
-def _hand(rng: np.random.Generator, times: np.ndarray, moving: bool) -> list[Rotation]:
+def _hand(rng: np.random.Generator, times: np.ndarray, moving: bool) -> Rotation:
     """How the ray is turned at `times`, s, of which the last is the press."""
     rates, phases = rng.uniform(*TREMBLES, 2), rng.uniform(0, 2 * np.pi, 2)
     off = TREMOR * np.sin(2 * np.pi * rates * times[:, None] + phases) + rng.normal(scale=NOISE, size=(len(times), 2))
     off[:, 0] += rng.normal(*KICK) * np.clip(1 + times / rng.uniform(*KICKS), 0, 1)
     share = np.clip((times + rng.uniform(*RESTS) + TAKES) / TAKES, 0, 1)
     along = minimum_jerk(share, TURN) if moving else np.zeros(len(times))
-    return [
-        Rotation.from_euler("y", angle, degrees=True) * Rotation.from_rotvec([*degrees, 0.0], degrees=True)
-        for angle, degrees in zip(along, off, strict=True)
-    ]
-
-
-def _wxyz(turn: Rotation) -> tuple[float, float, float, float]:
-    w, x, y, z = (float(value) for value in wxyz_from_rotation(turn))
-    return w, x, y, z
+    away = Rotation.from_rotvec(np.column_stack([off, np.zeros(len(times))]), degrees=True)
+    return Rotation.from_euler("y", along[:, None], degrees=True) * away

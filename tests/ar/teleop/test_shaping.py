@@ -6,13 +6,24 @@ import numpy as np
 import pytest
 
 from tests.support.bent_chain import stump
-from trunkline.ar.teleop.shaping import mode_shaper, residual, shaped, shaper_of
-from trunkline.ar.teleop.vibration import VibrationModes, slowest, vibration_modes
+from trunkline.ar.teleop import vibration
+from trunkline.ar.teleop.shaping import Shaper, Shaping, mode_shaper, shaped, shaper_of
+from trunkline.ar.teleop.vibration import VibrationModes, shaper_for, slowest, vibration_modes
 from trunkline.frames import gravity_in_base
 from trunkline.model.simulation.rest import settle
 from trunkline.model.statics.chain import read_chain
 
 PERIOD, DAMPING = 0.6, 0.03
+
+
+def residual(shaper: Shaper, period: float, damping: float) -> float:
+    """Amplitude of the swing of a mode after the last impulse, as a share of that after one impulse of 1 (there is less
+    than 1 % left where a shaper suits the mode)."""
+    decay = 2 * np.pi / period * damping / np.sqrt(1 - damping**2)
+    phase = 2 * np.pi / period * shaper.times
+    grown = shaper.shares * np.exp(decay * shaper.times)
+    left = np.exp(-decay * shaper.delay) * np.hypot((grown * np.cos(phase)).sum(), (grown * np.sin(phase)).sum())
+    return float(left)
 
 
 def swing_left(rows: np.ndarray, step: float, period: float, damping: float, at: int) -> float:
@@ -114,6 +125,27 @@ def test_swings_are_those_of_the_model_as_it_moves():
     up = np.flatnonzero((late[:-1] < 0) & (late[1:] >= 0))
     assert len(up) >= 2
     assert np.diff(up).mean() * model.opt.timestep == pytest.approx(slow.periods[0], rel=0.02)
+
+
+def test_swings_of_the_same_leg_are_computed_once(monkeypatch):
+    """Legs differ by gravity, command and change."""
+    computed, modes = [], VibrationModes(np.array([PERIOD]), np.array([DAMPING]), np.ones(1), np.zeros(3))
+
+    def counted(model, *leg):
+        computed.append(leg)
+        return modes
+
+    monkeypatch.setattr(vibration, "vibration_modes", counted)
+    shaper, legs = shaper_for(stump(), Shaping("zvd", 1)), np.eye(9)
+    for row in (*legs, *legs):
+        made = shaper(row[:3], row[3:6], row[6:])
+        np.testing.assert_array_equal(made.times, mode_shaper(PERIOD, DAMPING, "zvd").times)
+    assert len(computed) == 9
+    for (command, step, gravity), row in zip(computed, legs, strict=True):
+        np.testing.assert_allclose(gravity, 9.80665 * row[:3])
+        np.testing.assert_array_equal(command, row[3:6])
+        assert (step is None) == (not row[6:].any())
+        assert step is None or step.tolist() == row[6:].tolist()
 
 
 def test_the_slowest_are_chosen_among_those_that_matter():

@@ -229,7 +229,8 @@ def test_a_population_is_where_mujoco_has_it(library, trials, load, friction):
     model = model.__copy__()
     model.tendon_frictionloss[ArmModel(model).cables] = friction
     experiments = [replace(experiment, load=load * (i > 0)) for i, experiment in enumerate(experiments)]
-    fields = candidate_fields(model, {"damping": np.linspace(0.02, 0.05, 3), "joint_place": np.linspace(0, 0.2, 3)})
+    spans = {"damping": (0.02, 0.05), "joint_place": (0, 0.2), "mass": (0.9, 1.4)}
+    fields = candidate_fields(model, {name: np.linspace(*span, 3) for name, span in spans.items()})
     ours, theirs = (Population(model, experiments, markers_of(model)).simulate(fields, rough=r) for r in (False, True))
     for their, our in zip(theirs.positions, ours.positions, strict=True):
         assert not np.array_equal(their, our)

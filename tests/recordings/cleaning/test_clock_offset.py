@@ -134,6 +134,12 @@ def test_clocks_that_drift_are_followed_and_trials_that_disagree_are_named(tmp_p
     assert "the motors' offset by log times is 0.500 s, in which the arm would lag by -0.388 s" in remarks[4][0]
 
 
+def test_log_times_that_agree_are_not_overruled_by_the_motion(tmp_path):
+    clock, used, remarks = session(tmp_path, *[("identify", 0.1, 0.6)] * 3)
+    assert (clock.by, clock.offset, used) == ("log times", 0.1, [0.1] * 3)
+    assert all("the log times of 3 trials agree on 0.100 s, which is used" in some[0] for some in remarks)
+
+
 def test_an_uncertain_fit_of_the_motion_has_no_say(tmp_path):
     raw, findings = one_trial(tmp_path, copied, curl_truth(split="identify"))
     findings.by_motion = OffsetFit(-0.7, 0.9)

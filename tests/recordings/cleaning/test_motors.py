@@ -5,10 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from mcap_ros2.writer import Writer as RosWriter
 
 from tests.recordings.cleaning.test_loading import edit_session, one_trial, taken
-from tests.support.sessions import curl_truth
+from tests.support.sessions import curl_truth, pull_truth
 from trunkline.errors import InputError
+from trunkline.recordings.logs.definitions import JOINT_STATE, RIGID_BODIES
 
 
 def curl(folder, change=lambda m: None):
@@ -121,3 +125,151 @@ def test_commands_an_hour_off_are_refused_though_positions_are_there(tmp_path):
         r"found \d+ messages on /tendon_commands, 3597.\d+ s after the poses and \d+ messages on /tendon_states, "
         "expected commands and tendon positions within 1 s of the poses",
     )
+
+
+def messages_of(folder, split):
+    """The log of the curl with its commands and measured positions as `split` makes them of each message: a list of
+    (topic, names, positions)."""
+    original = (folder / "curl_40.mcap").rename(folder / "original.log")
+    with open(original, "rb") as file, open(folder / "curl_40.mcap", "wb") as out, RosWriter(out) as writer:
+        joints = writer.register_msgdef("sensor_msgs/msg/JointState", JOINT_STATE)
+        bodies = writer.register_msgdef("mocap4r2_msgs/msg/RigidBodies", RIGID_BODIES)
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        for schema, channel, message, content in reader.iter_decoded_messages():
+            if not schema.name.endswith("JointState"):
+                writer.write_message(channel.topic, bodies, content, message.log_time)
+                continue
+            for topic, names, positions in split(channel.topic, list(content.name), list(content.position)):
+                plain = {"header": content.header, "name": names, "position": positions, "velocity": [], "effort": []}
+                writer.write_message(topic, joints, plain, message.log_time)
+
+
+def changed(tmp_path, split, old="", new=""):
+    """(as recorded, as `split` made it) of a curl."""
+    before, _ = curl(tmp_path)
+    messages_of(tmp_path, split)
+    if old:
+        edit_session(tmp_path, old, new)
+    ((after, findings),) = taken(tmp_path)
+    assert not isinstance(after, InputError), str(after)
+    return before, after, findings
+
+
+def same_pulls(before, after, atol=1e-9):
+    assert after.tendons == before.tendons
+    for key in ("command", "tendon"):
+        time = getattr(before, f"{key}_time")
+        values = "commands" if key == "command" else "tendon_positions"
+        mine = [np.interp(time, getattr(after, f"{key}_time"), column) for column in getattr(after, values).T]
+        np.testing.assert_allclose(np.stack(mine, axis=1), getattr(before, values), atol=atol)
+
+
+def test_a_message_for_each_motor_is_put_together(tmp_path):
+    before, after, findings = changed(
+        tmp_path, lambda topic, names, at: [(topic, [name], [pull]) for name, pull in zip(names, at, strict=True)]
+    )
+    same_pulls(before, after)
+    assert any("hold some of 3 motors each" in line for line in findings.repairs)
+
+
+def test_a_topic_for_each_motor_is_put_together(tmp_path):
+    def split(topic, names, at):
+        return [(f"/{name}{topic}", [name], [pull]) for name, pull in zip(names, at, strict=True)]
+
+    topics = ", commands: /tendon_commands, tendon_positions: /tendon_states"
+    same_pulls(*changed(tmp_path, split, topics)[:2])
+    named = [f"/tendon_{number}/tendon_commands" for number in (1, 2, 3)]
+    edit_session(tmp_path, "topics: {", f"topics: {{commands: [{', '.join(named)}], ")
+    assert taken(tmp_path)[0][0].tendons == ("tendon_1", "tendon_2", "tendon_3")
+
+
+def test_joints_without_names_go_by_tendons(tmp_path):
+    curl(tmp_path)
+    messages_of(tmp_path, lambda topic, names, at: [(topic, [], at)])
+    refused_curl_of_source(tmp_path, "found 3 numbers without names, expected `tendons` in session.yaml")
+    with open(tmp_path / "session.yaml", "a") as file:
+        file.write("tendons: [tendon_1, tendon_2, tendon_3]\n")
+    assert taken(tmp_path)[0][0].tendons == ("tendon_1", "tendon_2", "tendon_3")
+
+
+def refused_curl_of_source(folder, message):
+    error = taken(folder)[0][0]
+    assert isinstance(error, InputError)
+    assert re.search(message, str(error)), str(error)
+
+
+def test_joints_of_another_robot_are_left_out(tmp_path):
+    def split(topic, names, at):
+        return [("/joint_states", ["panda_joint1"], at[:1])] if topic == "/tendon_states" else [(topic, names, at)]
+
+    _, after, findings = changed(tmp_path, split, ", tendon_positions: /tendon_states")
+    assert len(after.tendon_time) == 0
+    assert any("/joint_states left out as tendon position topic: found panda_joint1" in r for r in findings.repairs)
+
+
+@pytest.mark.parametrize("nothing", ["none", "", "null"])
+def test_a_role_that_no_topic_has_may_be_said(tmp_path, nothing):
+    curl(tmp_path)
+    edit_session(tmp_path, "tendon_positions: /tendon_states", f"tendon_positions: {nothing}")
+    assert len(taken(tmp_path)[0][0].tendon_time) == 0
+
+
+@pytest.mark.parametrize("every", [2, 4])
+def test_commands_of_two_publishers_are_refused(tmp_path, every):
+    curl(tmp_path)
+    count = 0
+
+    def split(topic, names, at):
+        nonlocal count
+        count += topic == "/tendon_commands"
+        mixed = topic == "/tendon_commands" and count % every == 0
+        return [(topic, names, [0.0] * 3 if mixed else at)]
+
+    messages_of(tmp_path, split)
+    refused_curl(tmp_path, r"/tendon_commands: commands jump to and fro \d+ times, .* two publishers .* expected one")
+
+
+def test_an_encoder_that_counts_one_turn_is_unwrapped(tmp_path):
+    radius = 0.005
+
+    def split(topic, names, at):
+        angles = np.array(at) / radius
+        return [(topic, names, (angles % (2 * np.pi) if topic == "/tendon_states" else angles).tolist())]
+
+    motors = "".join(
+        f"  tendon_{k}: {{unit: rad, spool_radius: {radius}, tendons: {{tendon_{k}: 1}}}}\n" for k in (1, 2, 3)
+    )
+    before, after, findings = changed(tmp_path, split, "trials:", f"motors:\n{motors}trials:")
+    same_pulls(before, after)
+    assert any("of an encoder that counts one turn" in line for line in findings.repairs)
+
+
+def test_commands_that_are_sent_on_change_hold(tmp_path):
+    last = None
+
+    def split(topic, names, at):
+        nonlocal last
+        if topic != "/tendon_commands":
+            return [(topic, names, at)]
+        steps = [0.01 * round(pull / 0.01) for pull in at]
+        changes, last = steps != last, steps
+        return [(topic, names, steps)] if changes else []
+
+    _, after, _ = changed(tmp_path, split)
+    sent = np.interp(after.command_time[-1] * np.linspace(0, 1, 500), after.command_time, after.commands[:, 0])
+    assert np.mean(np.abs(sent / 0.01 - np.round(sent / 0.01)) > 1e-3) < 0.02, "steps, no ramps between them"
+
+
+def test_a_command_that_was_sent_before_the_poses_holds_an_arm_at_rest(tmp_path):
+    def latched(m):
+        first = {"command_stamps": m.command_stamps[:1] - 7_500_000_000, "command_logged": m.command_logged[:1]}
+        none = {key: getattr(m, key)[:0] for key in ("tendon_stamps", "tendon_logged", "tendon_positions")}
+        return replace(m, **first, **none, commands=m.commands[:1])
+
+    before, _ = one_trial(tmp_path, lambda m: None, pull_truth())
+    one_trial(tmp_path, latched, pull_truth())
+    edit_session(tmp_path, ", tendon_positions: /tendon_states", "")
+    ((after, findings),) = taken(tmp_path)
+    assert not isinstance(after, InputError), str(after)
+    np.testing.assert_array_equal(after.commands, before.commands[:1])
+    assert any("s before the poses: the last holds" in line for line in findings.repairs)

@@ -26,13 +26,20 @@ def set_session(root, lines: str) -> None:
     (root / "params.yaml").write_text((ROOT / "params.yaml").read_text().replace("session: demo ", f"{lines} #"))
 
 
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("arm_7")
+    for seed, (name, clock) in enumerate(CLOCKS.items()):
+        record(folder / name, all_truths(), instruments(clock_offset_s=clock), seed)
+    return folder
+
+
 @pytest.fixture
-def two(tmp_path, monkeypatch):
+def two(recorded, tmp_path, monkeypatch):
     """A project with an arm of two sessions, which have clocks of their own."""
     workbench(tmp_path)
     shutil.rmtree(tmp_path / "data/raw/demo")
-    for seed, (name, clock) in enumerate(CLOCKS.items()):
-        record(tmp_path / "data/raw/arm_7" / name, all_truths(), instruments(clock_offset_s=clock), seed)
+    shutil.copytree(recorded, tmp_path / "data/raw/arm_7")
     set_session(tmp_path, "session: arm_7\n  only: [monday, friday]")
     monkeypatch.chdir(tmp_path)
     return tmp_path

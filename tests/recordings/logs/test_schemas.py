@@ -373,3 +373,44 @@ def test_float_arrays_count_by_log_time(tmp_path):
     np.testing.assert_allclose(raw.commands[:, 0], pulls, atol=2e-3)
     assert findings.by_log_times.offset == pytest.approx(0, abs=0.02)
     assert abs(raw.command_time[0]) < 0.02
+
+
+def in_frames(path, frames):
+    """PoseStamped of each body, in frames by body and number of its message."""
+    with open(path, "wb") as file, RosWriter(file) as writer:
+        schema = writer.register_msgdef("geometry_msgs/msg/PoseStamped", POSE_STAMPED)
+        for number in range(COUNT):
+            for body, name in enumerate(BODIES):
+                content = {"header": header(STAMPS[number], frames(body, number)), "pose": pose(number, body)}
+                writer.write_message(f"/vrpn/{name}/pose", schema, content, int(STAMPS[number]))
+    return path
+
+
+@pytest.mark.parametrize(
+    "frames",
+    [
+        lambda body, number: "camera" if body == 2 else "mocap",
+        lambda body, number: "camera" if body == 0 else "mocap",
+        lambda body, number: "camera" if number == COUNT // 2 else "mocap",
+    ],
+)
+def test_poses_in_several_frames_are_refused_with_topics_and_frames(tmp_path, frames):
+    with pytest.raises(InputError, match=r"header.frame_id: .*'mocap' \(/vrpn/\w+/pose.*expected all of them in one"):
+        open_log(in_frames(tmp_path / "log.mcap", frames), a_session())
+
+
+@pytest.mark.parametrize(
+    "frames",
+    [
+        lambda body, number: "/mocap" if body == 2 else "mocap",
+        lambda body, number: "" if body == 2 else "mocap",
+        lambda body, number: BODIES[body],  # as some drivers do
+    ],
+)
+def test_frames_that_are_one_are_left(tmp_path, frames):
+    assert open_log(in_frames(tmp_path / "log.mcap", frames), a_session()).poses.names == BODIES
+
+
+def test_a_body_that_is_left_out_may_be_in_another_frame(tmp_path):
+    path = in_frames(tmp_path / "log.mcap", lambda body, number: "camera" if body == 2 else "mocap")
+    assert open_log(path, a_session(markers={BODIES[1]: BODIES[1]})).poses.names == BODIES

@@ -6,10 +6,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mcap.writer import Writer
 
 from tests.recordings.logs.test_schemas import CASES, write_foxglove, write_ros
-from tests.support.sessions import MARKERS, all_truths, instruments, motion_truth, pull_truth, record
+from tests.support.sessions import (
+    MARKERS,
+    all_truths,
+    bent_truth,
+    curl_truth,
+    instruments,
+    motion_truth,
+    pull_truth,
+    record,
+    static_truth,
+)
 from tests.support.workbench import ROOT
+from trunkline.errors import InputError
 from trunkline.recordings.cleaning.checks import TrialLimits
 from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.preparation.inspect import main
@@ -78,12 +90,76 @@ def test_every_schema_gets_a_proposal_that_is_read(tmp_path, capsys, encoding, k
     session = read_session(tmp_path)
     if kind in ("array", "poses"):
         session.base = "1"
-    if kind == "markers":
-        assert session.base == "base"
-    else:
-        ((_, raw, _),) = load_raw_trials(tmp_path, session, LIMITS)
-        assert len(raw.markers) == 2, raw
-        assert np.isfinite(raw.positions).any()
+    ((_, raw, _),) = load_raw_trials(tmp_path, session, LIMITS)
+    assert len(raw.markers) == 2, raw
+    assert np.isfinite(raw.positions).any()
+
+
+def test_a_level_is_the_largest_pull_in(tmp_path, capsys):
+    """However far other tendons are let out, so that they stay slack."""
+    truth = curl_truth(20.0)
+    slack = truth.tendon_positions * [1, 0, 0] - [0, 0.05, 0.05] * (truth.tendon_positions[:, :1] > 0)
+    record(tmp_path, [replace(truth, tendon_positions=slack, commands=slack[::5])], instruments())
+    assert "experiment: curl, level: 20," in inspect(capsys, tmp_path)[1]
+
+
+def test_up_is_where_arms_sag_from_and_levels_are_left_open_where_none_does(tmp_path, capsys):
+    """With a guess of up, levels computed with it could not contradict it."""
+    tilts = [static_truth(tilt) for tilt in (0.0, 30.0, 60.0)]
+    for number, up in enumerate(((0, 1, 0), (0, 0, 1), (-1, 0, 0))):
+        folder = tmp_path / str(number)
+        record(folder, tilts, instruments(up=up))
+        proposed = inspect(capsys, folder)[1]
+        assert f"up: {list(up)}, unit: m}}\n" in proposed
+        assert [line.split("level: ")[1][:2].strip(",") for line in proposed.splitlines() if "level: " in line] == [
+            "0", "30", "60"]  # fmt: skip
+    stiff = [bent_truth(t.name, "static_tilt", t.level, "identify", t.level, np.zeros(480), np.zeros((480, 3)))
+             for t in tilts]  # fmt: skip
+    record(tmp_path / "stiff", stiff, instruments())
+    proposed = inspect(capsys, tmp_path / "stiff")[1]
+    assert "level: " not in proposed
+    assert "# Add the `level` that you set" in proposed
+    (tmp_path / "stiff/session.yaml").write_text(proposed)
+    with pytest.raises(InputError, match="level: missing, expected the nominal level of a static_tilt"):
+        read_session(tmp_path / "stiff")
+
+
+def test_logs_one_folder_down_are_found(tmp_path, capsys):
+    """As `ros2 bag record` makes a folder for each; two of one name get names of their own."""
+    record(tmp_path / "flat", [static_truth(0.0), static_truth(60.0)], instruments())
+    for log in sorted((tmp_path / "flat").glob("*.mcap")):
+        bag = tmp_path / "bags" / log.stem
+        bag.mkdir(parents=True)
+        log.rename(bag / "data_0.mcap")
+    proposed = inspect(capsys, tmp_path / "bags")[1]
+    assert "{file: tilt_00/data_0.mcap, name: tilt_00_data_0, experiment: static_tilt, level: 0" in proposed
+    with pytest.raises(InputError, match=r"found 2 logs \(2 of them one folder down\) and no session.yaml, `trunkline"):
+        read_session(tmp_path / "bags")
+    (tmp_path / "bags/session.yaml").write_text(proposed)
+    session = read_session(tmp_path / "bags")
+    assert all(not isinstance(raw, Exception) for _, raw, _ in load_raw_trials(tmp_path / "bags", session, LIMITS))
+
+
+def test_what_holds_nothing_is_an_error(tmp_path, capsys):
+    assert main([str(tmp_path)]) == 1
+    assert "found no MCAP log, nor one folder down" in capsys.readouterr().err
+    (tmp_path / "tilt.mcap.zstd").write_bytes(b"")
+    assert main([str(tmp_path)]) == 1
+    assert "found 1 files such as tilt.mcap.zstd: decompress them, as by `zstd -d`" in capsys.readouterr().err
+    with open(tmp_path / "empty.mcap", "wb") as file:
+        writer = Writer(file)
+        writer.start()
+        writer.finish()
+    assert main([str(tmp_path)]) == 1
+    assert "No log holds poses" in capsys.readouterr().err
+
+
+def test_a_unit_that_is_a_guess_is_said_to_be(tmp_path, capsys):
+    truth = static_truth(0.0)
+    far = {key: 100 * getattr(truth, key) for key in ("positions", "base_position")}
+    record(tmp_path, [replace(truth, **far)], instruments())
+    assert "unit: cm" in (proposed := inspect(capsys, tmp_path)[1])
+    assert "mm for an arm of 40 mm, cm for an arm of 400 mm, inch for an arm of 1.02e+03 mm" in proposed
 
 
 def test_a_damaged_log_is_described_as_such(tmp_path, capsys):

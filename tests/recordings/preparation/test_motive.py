@@ -77,7 +77,7 @@ def test_decimal_commas_between_semicolons(tmp_path, measured):
     path = write(tmp_path / "release_1.csv", measured)
     text = path.read_text(encoding="utf-8-sig")
     (tmp_path / "german.csv").write_text(text.replace(",", ";").replace(".", ","), encoding="utf-8-sig")
-    expected, result = read_export(path), read_export(tmp_path / "german.csv")
+    expected, result = read_export(path).poses, read_export(tmp_path / "german.csv").poses
     assert result.names == expected.names
     np.testing.assert_array_equal(result.positions, expected.positions)
     np.testing.assert_array_equal(result.stamps, expected.stamps)
@@ -96,7 +96,7 @@ def test_markers_alone_become_positions_alone(tmp_path, measured):
 
 
 def test_the_start_of_the_capture_dates_the_log(tmp_path, measured):
-    assert read_export(write(tmp_path / "a.csv", measured)).stamps[0] == 1_763_647_785_344_000_000
+    assert read_export(write(tmp_path / "a.csv", measured)).poses.stamps[0] == 1_763_647_785_344_000_000
 
 
 def spoil(path, old, new):
@@ -113,7 +113,6 @@ def spoil(path, old, new):
         ("Frame,Time", "Bild,Zeit", "found no row that begins with Frame"),
         ("0,0.000000,", "0,0.000000,abc", "row 9: could not convert string to float: 'abc"),
         ("\n4,0.033333,", "\n4,,", "row 13 lacks its frame number or time"),
-        ("Take Name", "Total Exported Frames,9999,Take Name", "the header says 9999 (Total Exported Frames)"),
         (f",{MARKERS[1]}", f",{MARKERS[0]}", f"found Position X of the rigid body '{MARKERS[0]}' twice"),
     ],
 )
@@ -142,8 +141,75 @@ def test_other_encodings_are_named(tmp_path, measured):
             read_export(path)
 
 
-def test_a_whole_export_says_how_many_frames_it_has(tmp_path, measured):
+def test_a_header_that_promises_more_frames_is_a_warning(tmp_path, measured, capsys):
+    """Whole rows count; one that the end of the file tears does not."""
     path = write(tmp_path / "a.csv", measured)
-    count = len(read_export(path).stamps)
+    count = len(read_export(path).poses.stamps)
     spoil(path, "Take Name", f"Total Exported Frames,{count},Take Name")
-    assert len(read_export(path).stamps) == count
+    assert read_export(path).remarks == []
+    spoil(path, f"Total Exported Frames,{count}", "Total Exported Frames,30100")
+    assert len(read_export(path).poses.stamps) == count
+    assert main(["--session", str(tmp_path / "session"), str(path)]) == 0
+    assert f"a.csv: found {count} frames, the header says 30100 (Total Exported" in capsys.readouterr().err
+    path.write_text(path.read_text()[:-3])
+    torn = read_export(path)
+    assert len(torn.poses.stamps) == count - 1
+    assert "the last of them cut off and left out" in torn.remarks[0]
+
+
+def test_a_unit_that_the_header_lacks_is_an_option(tmp_path, measured, capsys):
+    path = write(tmp_path / "a.csv", measured)
+    expected = read_export(path).poses.positions
+    spoil(path, "Length Units,Millimeters", "")
+    assert main(["--session", str(tmp_path / "session"), str(path)]) == 1
+    assert "length units: found none in the header, expected `--unit`: meters" in capsys.readouterr().err
+    assert main(["--session", str(tmp_path / "session"), "--unit", "millimeters", str(path)]) == 0
+    np.testing.assert_array_equal(read_export(path, "millimeters").poses.positions, expected)
+
+
+def test_a_unit_that_the_header_contradicts_is_refused(tmp_path, measured):
+    with pytest.raises(InputError, match="found millimeters in the header, expected `--unit millimeters`, or none"):
+        read_export(write(tmp_path / "a.csv", measured), "meters")
+
+
+def test_vicon_exports_are_said_to_be_none(tmp_path):
+    path = tmp_path / "trial.csv"
+    path.write_text("Trajectories\n50\n,,arm:base,,\nFrame,Sub Frame,X,Y,Z\n,,mm,mm,mm\n1,0,1.0,2.0,3.0\n")
+    with pytest.raises(InputError, match="begins with Frame and Time: this is no export of Motive's, expected its CSV"):
+        read_export(path)
+
+
+@pytest.mark.parametrize("name", ["Unlabeled 1000", "Unlabeled:1037", "Unlabelled_3", "arm:Unlabeled 7", "unlabeled"])
+def test_unlabelled_markers_are_left_out(tmp_path, measured, name):
+    path = write(tmp_path / "a.csv", measured, "Meters", rotation="", kind="Marker")
+    expected = [body for body in BODIES if body != MARKERS[-1]]
+    path.write_text(path.read_text(encoding="utf-8-sig").replace(f",{MARKERS[-1]}", f",{name}"), encoding="utf-8-sig")
+    poses, remarks = read_export(path)
+    assert list(poses.names) == expected
+    assert remarks == ["1 unlabelled markers left out"]
+
+
+def test_takes_of_one_name_are_refused_before_anything_is_written(tmp_path, measured, capsys):
+    takes = [tmp_path / day / "Take_001.csv" for day in ("monday", "friday")]
+    for take in takes:
+        take.parent.mkdir()
+        write(take, measured)
+    session = tmp_path / "session"
+    assert main(["--session", str(session), *map(str, takes)]) == 1
+    assert f"{takes[1]}: found {takes[0]} of the same name, and both would become" in capsys.readouterr().err
+    assert not list(session.iterdir())
+    assert main(["--session", str(session), str(takes[0])]) == 0
+    assert main(["--session", str(session), str(takes[0])]) == 0, "the same take again is the same log"
+    spoil(takes[1], "\n4,0.033333,", "\n4,0.033334,")
+    log = (session / "Take_001.mcap").read_bytes()
+    assert main(["--session", str(session), str(takes[1])]) == 1
+    assert "Take_001.mcap there already, of another take" in capsys.readouterr().err
+    assert (session / "Take_001.mcap").read_bytes() == log
+
+
+def test_takes_that_come_later_are_said_to_be_in_no_trial(tmp_path, measured, capsys):
+    session = tmp_path / "session"
+    assert main(["--session", str(session), str(write(tmp_path / "release_1.csv", measured))]) == 0
+    assert "proposed" in capsys.readouterr().out
+    assert main(["--session", str(session), str(write(tmp_path / "release_2.csv", measured))]) == 0
+    assert "session.yaml: left as it is, without release_2.mcap: add what is missing" in capsys.readouterr().out

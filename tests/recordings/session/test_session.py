@@ -118,7 +118,7 @@ def test_motors_and_tendons_exclude_each_other(tmp_path):
         (("trials",), [], r"trials: found \[\], expected"),
         (("frame", "up"), [0, 0, 0], r"frame: up: found the zero vector"),
         (("frame", "up"), [0, 1], r"frame.up.2: missing"),
-        (("frame", "unit"), "cm", r"frame.unit: found 'cm', expected 'm' or 'mm'"),
+        (("frame", "unit"), "feet", r"frame.unit: found 'feet', expected 'm', 'mm', 'cm' or 'inch'"),
         (("clock",), "utc", r"clock: found 'utc', expected 'stamp', 'log' or 'frame'"),
         (("tendons",), {"a": "t", "b": "t"}, r"tendons: found 't' twice, expected each name"),
         (("base",), {"position": [0, 0, 0], "quaternion": [0, 0, 0, 0]}, r"base.*: quaternion: found norm zero"),

@@ -90,6 +90,17 @@ def test_no_offset_by_log_times_that_never_meet():
     assert offset_by_log_times(time, time + 5, time, time + 50) is None
 
 
+@pytest.mark.parametrize(("period", "certain"), [(0.7, False), (10.0, True)])
+def test_a_motion_that_repeats_itself_is_no_clock(period, certain):
+    """An offset a period away explains it as well."""
+    time = np.arange(0, 6, 0.01)
+    wave = 0.02 * np.sin(2 * np.pi * time / period) ** 2 + (0.01 * np.exp(-(((time - 3) / 0.3) ** 2)) if certain else 0)
+    positions = np.stack([wave, wave**2, 0 * wave], axis=1)[:, None]
+    fit = estimate_offset(time, positions, time, wave[:, None], 1.0)
+    assert fit is not None
+    assert fit.certain == certain
+
+
 def test_tendons_at_rest_say_nothing():
     time = np.linspace(0, 1, 121)
     positions = np.random.default_rng(0).normal(scale=3e-4, size=(121, 4, 3))

@@ -1,14 +1,20 @@
 """`trunkline describe`: an arm in words, before anything is recorded."""
 
+import re
 import subprocess
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import yaml
 
+from stages.build_mjcf import main as build_main
 from tests.model.arm.test_sections import ACTUATION, SOLVER, TWO, arm
 from trunkline.errors import InputError
+from trunkline.model.arm.from_file import FromFile
+from trunkline.model.arm.guide_holes import GuideHoles
+from trunkline.model.arm.joints import Joints
 from trunkline.model.arm.tendons import Tendon
 from trunkline.recordings.session.session import Session
 from trunkline.tools.describe.__main__ import main
@@ -135,3 +141,43 @@ def test_keys_that_an_arm_lacks_are_told_at_once(tmp_path):
     assert "missing, expected a value; also missing: " in message
     for key in ("joint_range_deg", "damping_ratio", "tendons", "hole_ratio", "tip_load", "markers", "mass"):
         assert key in message
+
+
+LINKS = (ROOT / "conf/build_mjcf/mjcf/four_links.xml").read_text()
+FAULTS = {
+    "wind": ("<option ", '<option density="1.2" wind="8 0 0" ', "option wind: found 8 0 0, expected 0 0 0"),
+    "gravity off": ("<worldbody>", '<option><flag gravity="disable"/></option><worldbody>', "found gravity disabled"),
+    "parallel hinges": ('axis="0 1 0"', 'axis="1 0 0"', "expected axes at right angles to each other"),
+    "slanted hinges": ('axis="0 1 0"', 'axis="0.5 1 0"', "found hinges about axes 63.4° apart"),
+    "no limit of force": ("forcerange", 'forcelimited="false" forcerange', "found forcelimited off"),
+    "no tip": ('name="tip"', 'name="end"', "found no site 'tip', expected one on the last unit"),
+    "no mount": ('name="base_center"', 'name="mount_center"', "found no site 'base_center', expected one in the mount"),
+    "no damping": ('damping="0.01"', 'damping="0"', "found no stiffness or no damping"),
+    "base lifted": ('<body name="base"', '<body name="base" pos="0 0 1"', "'base_center': found it moved or turned"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_model_is_refused_as_by_build_mjcf_in_one_line(tmp_path, monkeypatch, capsys, fault):
+    old, new, message = FAULTS[fault]
+    assert old in LINKS
+    text = LINKS.replace(old, new)
+    path = tmp_path / "conf/build_mjcf/mjcf/links.xml"
+    path.parent.mkdir(parents=True)
+    path.write_text(text)
+    monkeypatch.chdir(tmp_path)
+    assert main([str(path)]) == 1
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert message in line
+    with pytest.raises(InputError, match=re.escape(message)):
+        build_main(SimpleNamespace(arm=FromFile("mjcf", "links.xml"), joints=Joints(), holes=GuideHoles(),
+                                   actuation=ACTUATION, solver=SOLVER))  # fmt: skip
+
+
+def test_cables_without_motors_and_a_file_that_is_not_there_are_one_line(tmp_path, capsys):
+    path = tmp_path / "links.xml"
+    path.write_text(re.sub(r"<actuator>.*</actuator>", "", LINKS, flags=re.DOTALL))
+    assert main([str(path)]) == 1
+    assert "found 0 actuators, expected 1" in capsys.readouterr().err
+    assert main([str(tmp_path / "nope.xml")]) == 1
+    assert capsys.readouterr().err.endswith("nope.xml: no such file, expected a model in MJCF\n")

@@ -104,7 +104,6 @@ def test_it_prints_and_writes_every_trial_beside_what_its_errors_stand_beside(la
     assert "the model was fitted to" not in printed  # nothing lies beside it that knows
 
 
-@pytest.mark.usefixtures("figures_not_laid_out")
 def test_an_arm_that_aged_shows_against_a_reference(lab, capsys):
     root, right, folder = lab
     evaluate(right, folder, "--out", root / "july")
@@ -131,7 +130,6 @@ def test_an_arm_that_aged_shows_against_a_reference(lab, capsys):
     assert "the reference is of another model" in capsys.readouterr().out
 
 
-@pytest.mark.usefixtures("figures_not_laid_out")
 def test_trials_that_the_model_was_fitted_to_are_marked_and_another_session_s_are_not(lab, capsys):
     root, _, folder = lab
     config = settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.5, 8.0)})
@@ -228,7 +226,6 @@ def test_a_mount_may_be_tilted_as_it_is_identified_but_not_be_another_frame(lab,
                 Twin.load(tmp_path / "arm.xml")
 
 
-@pytest.mark.usefixtures("figures_not_laid_out")
 def test_a_reference_is_not_written_over(lab, capsys):
     _, right, folder = lab
     evaluate(right, folder)

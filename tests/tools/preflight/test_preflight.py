@@ -20,8 +20,10 @@ from trunkline.identification.diagnostics.identifiability import (
     to_identify_from,
     unidentifiable,
 )
+from trunkline.identification.fit.identify import with_parameters
 from trunkline.identification.fit.search import search
-from trunkline.identification.fit.setup import set_up
+from trunkline.identification.fit.setup import set_up, unidentifiable_mass
+from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.recordings.trials.inventory import missing_lines, recorded_lines
 from trunkline.recordings.trials.raw_trial import RawTrial
 from trunkline.recordings.trials.trial import Trial, write_trials
@@ -148,6 +150,28 @@ def test_another_up_that_fits_better_is_named(model):
         assert line.startswith(f"`frame.up` in session.yaml: [{', '.join(f'{value:g}' for value in right)}] would fit")
 
 
+def test_an_up_that_levels_exclude_is_not_advised(model):
+    """Tilts that fit the declared vertical leave no other, however badly a described arm follows its motors."""
+    tilts = [mounted(tilt(model, angle), Rotation.from_euler("y", angle, degrees=True), (0, 0, 1), 1e-6)
+             for angle in (0, 45)]  # fmt: skip
+    excluded = np.isnan(other_ups(tilts)[tilts[0].name]).any(axis=1)
+    assert excluded.tolist() == [True, True, False, True, True, True]
+    (alone,) = other_ups(tilts[:1]).values()
+    assert np.isfinite(alone).all(), "one level tells too little"
+
+
+def test_the_gain_of_motors_is_looked_at_before_the_vertical(model):
+    """As a newcomer guesses it: five times too small."""
+    config = settings(["static_pull"], ["static_pull"], {"kp": (1.0, 1e5)})
+    trials = [static_pull(model, (level, 0, 0)) for level in (10, 20)]
+    arm, experiments, fit = to_identify_from(config, model, trials)
+    ups = {trial.name: np.array([trial.gravity] * 6) for trial in trials}
+    assert up_lines(arm, experiments, fit.markers, ups) == []
+    guessed = with_parameters(arm, {"kp": parameter_named("kp").read(arm) / 5})
+    (line,) = up_lines(guessed, experiments, fit.markers, ups)
+    assert line.startswith("`kp` of 5 times the described ")
+
+
 def test_no_other_up_is_looked_for_where_none_can_be_right(model):
     tilted = tilt(model, 90)
     weightless = mounted(tilted, Rotation.identity(), (0, 0, 0))
@@ -163,7 +187,8 @@ def mounted(trial: Trial, base: Rotation, up: tuple[float, ...], noise: float = 
     """A raw trial with the base of `trial`, turned by `base`, as cameras see it with noise, in a frame of which `up` is
     up."""
     ones = np.ones((4, 1))
-    fields = {"name": trial.name, "session": session, "up": np.array(up, float),
+    fields = {"name": trial.name, "session": session, "experiment": trial.experiment, "level": trial.level,
+              "up": np.array(up, float),
               "base_positions": 0 * ones * np.ones(3),
               "base_quaternions": ones * wxyz_from_rotation(base) + noise * np.eye(4)}  # fmt: skip
     return cast(RawTrial, SimpleNamespace(**fields))
@@ -196,6 +221,13 @@ def test_a_stage_without_its_trials_says_what_to_set(model):
     config = settings(["static_tilt", "static_pull"], ["static_tilt", "static_pull"], {"stiffness": (0.1, 10.0)})
     (line,) = unidentifiable(config, [tilt(model, 30)])
     assert line.startswith("no static_pull of the split identify: `source: tilts` under identify_stiffness")
+
+
+def test_a_mass_wants_a_trial_with_a_load(model):
+    config = settings(["static_tilt"], ["static_tilt"], {"mass": (0.1, 10.0)})
+    (line,) = unidentifiable_mass(config, [tilt(model, 30)])
+    assert line.startswith("parameters.mass: found no static_tilt with split identify that carries a load")
+    assert not unidentifiable_mass(config, [replace(tilt(model, 30), load=0.1)])
 
 
 def test_the_command_reads_logs_and_writes_nothing(tmp_path, monkeypatch, capsys):

@@ -24,7 +24,7 @@ from trunkline.ar.hybrid.torques import joint_torques, servo_commands
 from trunkline.ar.hybrid.uncertainty import PosteriorSamples
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
-from trunkline.identification.parameters.parameters import candidate_fields, parameter_named
+from trunkline.identification.parameters.parameters import DERIVED_FROM, candidate_fields
 from trunkline.identification.parameters.saving import ELEMENTS
 from trunkline.kinematics.panda.maker_model import JOINTS
 from trunkline.model.arm_model import ArmModel
@@ -199,21 +199,25 @@ def _set_parameters(batch: Batch, twin: ComposedTwin, samples: PosteriorSamples)
     """Give each future its own parameters."""
     if not samples.values:
         return
-    for name, values in candidate_fields(twin.arm, samples.values).items():
+    fields = candidate_fields(twin.arm, samples.values)
+    for name, values in fields.items():
         batch.expand(name)[:, rows_of(name, twin.model, twin.arm)] = values[:, rows_of(name, twin.arm, twin.arm)]
-    if any("jnt_pos" in parameter_named(name).fields for name in samples.values):
+    if DERIVED_FROM & fields.keys():
         batch.set_const()
 
 
 def rows_of(field: str, model: mujoco.MjModel, arm: mujoco.MjModel) -> np.ndarray:
     """Where in `field` of `model` the elements of `arm` have their values, in the arm's order.
 
-    Of numbers, of joints with one angle, and of elements with names; nameless ones are left out.
+    Of numbers, of joints with one angle, and of elements with names; nameless ones are left out, and where masses are
+    concerned the mount, which is the robot's.
     """
     kind, row_of = ELEMENTS[field.partition("_")[0]]
     counts = {"joint": arm.njnt, "body": arm.nbody, "geom": arm.ngeom, "site": arm.nsite, "tendon": arm.ntendon,
               "actuator": arm.nu, "numeric": arm.nnumeric}  # fmt: skip
     names = [getattr(arm, kind)(number).name for number in range(counts[kind])]
+    if field in ("body_mass", "body_inertia"):
+        names = [name for name in names if name != "base"]
     rows = [np.atleast_1d(row_of(model, getattr(model, kind)(name).id)) for name in names if name]
     return np.concatenate(rows) if rows else np.zeros(0, dtype=int)
 

@@ -41,12 +41,12 @@ class Hanging:
 
 @dataclass(frozen=True)
 class TipUncertainty:
-    """Of a tip at rest.
+    """Of a tip at rest, where futures alone do not say it.
 
     Attributes:
         discrepancy: what the model lacks.
         ways: how far gravity and cables move the tip, m. Shape (2,).
-        friction: half the band in which friction can hold the tip, world, m. Shape (3,).
+        friction: half the band in which friction can hold the tip, world, m; 0 where futures rub. Shape (3,).
         alignment: of the frame in which it is shown.
         rotation: of the arm's base frame in the world. Shape (3, 3).
         hanging: None where nobody has seen that.

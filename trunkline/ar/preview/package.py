@@ -55,7 +55,7 @@ class Package:
         grasping = Grasping(rigid, config.mount_offset, self.straight, self.grips(config), config.handling)
         return Planner(
             rigid, self.network, self.straight, limits, config.mount_offset, shaper=shaper, chain=self.chain,
-            grasping=grasping, advance=config.advance,
+            grasping=grasping, advance=config.advance, advance_speed=config.advance_speed,
         )  # fmt: skip
 
     def grips(self, config: TeleoperationConfig) -> dict[str, Grip]:
@@ -106,7 +106,7 @@ def read_package(path: Path) -> Package:
         contents.network_of(files),
         compiled,
         read_chain(compiled).smooth,
-        read_geometry(mujoco.MjSpec.from_string(files[MODEL].decode())),
+        read_geometry(package.spec_of(files, MODEL)),
         np.array([compiled.tendon_length0[compiled.tendon(name).id] for name in network["output_order"]]),
         float(model["rate_limit"]),
         files,

@@ -57,6 +57,7 @@ class RobotModel:
 
     def tip_uncertainty(self, trajectory: CommandTrajectory, hangs: np.ndarray | None) -> TipUncertainty | str:
         """By how far its tip may be elsewhere, at rest without a load where a trajectory ends; or why that is unknown.
+        Cables that rub hold a future's tip where its way leaves it, within the friction band: it counts only without.
         hangs: where the straight arm's tip was seen where the trajectory begins, in the base frame, (3,), m."""
         if self.lacking is None:
             return "no trial at rest was held out, or the package is of an earlier release"
@@ -64,13 +65,14 @@ class RobotModel:
         base, commands = bases[-1], trajectory.commands[-1]
         gravity = base.T @ GRAVITY[0]
         arm = arm_of(self.arm.copy().compile())
-        order = ArmModel(arm.model).actuators
+        model = ArmModel(arm.model)
+        order = model.actuators
         pulls = np.maximum(arm.chain.straight_lengths - commands[order], 0)
         beyond = self.lacking.beyond(pulls, float(np.degrees(tilt_of_gravity(gravity))))
         if beyond:
             return beyond
         pose = StaticPoses(gravity[None], commands[None][:, order])
-        ways, friction = arm.ways(pose)[0], base @ arm.friction(pose)[0]
+        ways, friction = arm.ways(pose)[0], np.zeros(3) if model.rubs else base @ arm.friction(pose)[0]
         if not np.isfinite(ways).all():
             return "the twin does not come to rest there"
         hanging = None if hangs is None else Hanging(hangs, places[0], bases[0])

@@ -21,9 +21,12 @@ PING_GAP = 0.03  # s
 
 @dataclass
 class Client:
-    """`left`: of its rate, below 0 beyond it. `stopping`: its stop button is held. `buttons`: those that it holds."""
+    """`id`: by which all know it; `key`: by which it comes again. `left`: of its rate, below 0 beyond it. `stopping`:
+    its stop button is held. `buttons`: those that it holds. `reserve`: it came where no place was left but for a
+    stop."""
 
     id: str
+    key: str
     name: str
     space: str
     socket: web.WebSocketResponse
@@ -35,6 +38,7 @@ class Client:
     refused: dict[str, float] = field(default_factory=dict)
     stopping: bool = False
     buttons: bytes = b""
+    reserve: bool = False
 
     @property
     def alignment(self) -> Pose | None:

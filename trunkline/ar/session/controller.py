@@ -4,6 +4,7 @@ It has no sockets and no clock: whoever drives it, a live server or a rehearsal,
 that can move the robot is here or in the core. It holds wherever it does not know.
 """
 
+import math
 import re
 from collections import deque
 from dataclasses import dataclass, replace
@@ -47,6 +48,7 @@ from trunkline.ar.teleop.messages import (
 )
 from trunkline.ar.teleop.plan import Plan
 
+JUST_AFTER = 1e-3  # s of the core's clock between the last input of whom controlled and the first of who does now
 HERE = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))  # of poses that are in the base frame already
 NUMBER = re.compile(r"[\d.]+")
 DIGITS = 4  # after the decimal point, of targets that are told
@@ -100,6 +102,7 @@ class SessionController:
         self.intent: Intent | None = None
         self._inputs: deque[HandInput] = deque(maxlen=MOST_INPUTS)
         self._last, self._fresh = self._nobody, True
+        self._shift = 0.0  # s from a client's stamps to the core's
         self._stop, self._fault, self._shown_digest, self._since, self._believed = False, "", "", 0.0, ""
         self._requested, self._ordered, self._started, self._ran = 0, False, "", False
         self._logged: tuple = ()
@@ -120,9 +123,13 @@ class SessionController:
     def hear(self, stamp: float, left: Controller, right: Controller) -> str:
         """An input of whom controls, `stamp` s by its own clock; why it does not count, "" where it does."""
         last = self._inputs[-1] if self._inputs else self._last
-        if stamp <= last.stamp and not self._fresh:
-            return f"input: stamp {stamp:.6g} s is not after {last.stamp:.6g} s: heard before"
-        self._fresh = False
+        if self._fresh and math.isfinite(stamp):  # another's clock: the core's goes on from where it was
+            self._shift = last.stamp + JUST_AFTER - stamp if self.state.stamp is not None else 0.0
+            self._fresh = False
+        elif stamp + self._shift <= last.stamp:
+            heard = last.stamp - self._shift
+            return f"input: stamp {stamp:.6g} s is not after {heard:.6g} s: heard before"
+        stamp += self._shift
         self._inputs.append(HandInput(stamp, left, right))
         return ""
 

@@ -32,8 +32,8 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 class Hello:
     """First of all, within 3 s: the `version` of this protocol, and `token` or `code`, one of them.
 
-    id: of a connection before, to be the same client again; "" for a new one. space: "base" for poses in the rigid base
-    frame, "room" for poses in a frame that stands still, y up, as WebXR's `local-floor`, which has to be aligned
+    key: of the `welcome` before, to be the same client again; "" for a new one. space: "base" for poses in the rigid
+    base frame, "room" for poses in a frame that stands still, y up, as WebXR's `local-floor`, which has to be aligned
     (`aligning`).
     """
 
@@ -41,7 +41,7 @@ class Hello:
     version: int
     token: Name = ""
     code: Name = ""
-    id: Name = ""
+    key: Name = ""
     name: Name = ""
     space: Literal["base", "room"] = "base"
     type: Literal["hello"] = "hello"
@@ -114,10 +114,12 @@ ClientMessage = Hello | Pong | LeaseRequest | AlignmentByEye | TouchRequest | An
 
 @dataclass(frozen=True)
 class Welcome:
-    """Answers `hello`. token: for `GET /scene.json` (`Authorization: Bearer …`), and to come again. package: digest.
-    rate: Hz, of frames of the robot."""
+    """Answers `hello`. id: by which all know the client. key: its secret, to be the same client again. token: for
+    `GET /scene.json` (`Authorization: Bearer …`), and to come again. package: digest. rate: Hz, of frames of the
+    robot."""
 
     id: str
+    key: str
     token: str
     package: str
     rate: float

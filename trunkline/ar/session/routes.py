@@ -9,6 +9,7 @@ from pathlib import Path
 from aiohttp import web
 
 from trunkline.ar.session.auth import HEADERS, Origins, same
+from trunkline.ar.session.connections import IdleConnections
 
 TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 ABSENT = b"<!doctype html><title>Trunkline</title><p>error: the page is not built: `client/` makes it</p>\n"
@@ -22,6 +23,7 @@ class Routes:
         self._scene = json.dumps(scene, separators=(",", ":")).encode()
         self._zipped = gzip.compress(self._scene)
         self._page = read_page(folder)
+        self.idle = IdleConnections()
 
     def add_routes(self, app: web.Application) -> None:
         """After all others: the page's takes every name."""
@@ -35,10 +37,17 @@ class Routes:
         if reason:
             self._log(f"refused {request.remote}: {reason}")
             return web.Response(status=403, text=f"error: {reason}\n", headers=HEADERS)
+        transport = request.transport
         try:
+            self.idle.busy.add(transport)
             response = await handler(request)
         except web.HTTPException as error:
             return web.Response(status=error.status, text=f"error: {error.reason}\n", headers=HEADERS)
+        except Exception as error:
+            self._log(f"error: {request.remote} {request.path}: {type(error).__name__}: {error}")
+            return web.Response(status=500, text="error: the server failed; its terminal says how\n", headers=HEADERS)
+        finally:
+            self.idle.busy.discard(transport)
         if not response.prepared:
             response.headers.update(HEADERS)
         return response

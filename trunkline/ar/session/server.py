@@ -17,9 +17,10 @@ from aiohttp import WSCloseCode, WSMsgType, web
 from trunkline.ar.session import binary, controller_input, messages
 from trunkline.ar.session.alignment_procedure import AlignmentProcedure
 from trunkline.ar.session.anchors import Anchor, Anchors
-from trunkline.ar.session.auth import HEADERS, Origins, PairingCode, same
+from trunkline.ar.session.auth import HEADERS, Origins, PairingCode, make_token, same
 from trunkline.ar.session.broadcast import Broadcast, piece
 from trunkline.ar.session.client import PER_SECOND, Client, end
+from trunkline.ar.session.connections import IdleConnections
 from trunkline.ar.session.controller import SessionController
 from trunkline.ar.session.controller_input import controller_pose
 from trunkline.ar.session.gc_policy import GCPolicy
@@ -35,7 +36,9 @@ from trunkline.errors import InputError
 HELLO = 3.0  # s for the first message
 LARGEST = 64 * 1024  # bytes of a message
 FLOOD = 4000.0  # messages of a client beyond its rate that end it
-MOST_CLIENTS = 64
+MOST_CLIENTS = 64  # and one more, for a stop
+MOST_WAITING = 16  # connections before their hello; of more, the oldest goes
+FULL = f"server: more than {MOST_CLIENTS} clients; this one may stop the robot, and watch"
 HEARTBEAT = 20.0  # s
 PARTING = 1.0  # s that a client has to say that it goes, as the session ends
 TOUCHING = "right"  # the hand whose controller touches
@@ -67,7 +70,9 @@ class Server:
         self.composition, self.controller, self.now = composition, composition.controller, now
         self.lease, self.code = ControlLease(), PairingCode()
         self.clients: dict[str, Client] = {}
-        self._procedures: dict[str, AlignmentProcedure] = {}  # of clients that may come again
+        self._ids: dict[str, str] = {}  # by key, of clients that are here or may come again
+        self._procedures: dict[str, AlignmentProcedure] = {}  # by key, likewise
+        self._waiting: list[web.WebSocketResponse] = []
         self.broadcast = Broadcast(composition.controller, composition.shells)
         self._routes = Routes(
             composition.origins, composition.token, composition.scene, composition.page, composition.log
@@ -85,21 +90,30 @@ class Server:
         app.on_shutdown.append(self._part)
         return app
 
+    @property
+    def idle(self) -> IdleConnections:
+        return self._routes.idle
+
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         reason = self.composition.origins.fault(request.headers.get("Host"), request.headers.get("Origin"), True)
-        if reason or len(self.clients) >= MOST_CLIENTS:
-            reason = reason or "server: too many clients"
+        if reason:
             self.composition.log(f"refused {request.remote}: {reason}")
             return web.Response(status=403, text=f"error: {reason}\n")
         socket = web.WebSocketResponse(max_msg_size=LARGEST, compress=False, heartbeat=HEARTBEAT)
         socket.headers.update(HEADERS)
         await socket.prepare(request)
+        self._waiting.append(socket)
+        if len(self._waiting) > MOST_WAITING:
+            asyncio.create_task(end(self._waiting.pop(0), "server: too many connections that say nothing"))
         try:
             client = await self._welcome(socket)
         except InputError as error:
             self.composition.log(f"refused {request.remote}: {error}")
             await end(socket, str(error))
             return socket
+        finally:
+            if socket in self._waiting:
+                self._waiting.remove(socket)
         tasks = [asyncio.create_task(work) for work in (client.send(), client.ping(self.now))]
         try:
             await self._hear(client)
@@ -135,17 +149,15 @@ class Server:
             raise InputError(reason)
         if hello.version != binary.VERSION:
             raise InputError(f"version: found {hello.version}, expected {binary.VERSION}; load the page anew")
-        older = self.clients.get(hello.id)
+        older = self.clients.get(self._ids.get(hello.key, ""))
         if older is not None:
             self._leave(older)
             asyncio.create_task(end(older.socket, "connection: the same client came again"))
         if hello.space == "room" and self.composition.alignment is None:
             raise InputError("space: found room, expected base: nothing is aligned here")
-        procedure = self._procedure(hello)
-        id = hello.id if older is not None or hello.id in self._procedures else secrets.token_hex(4)
-        client = Client(id, hello.name, hello.space, socket, procedure)
-        if procedure is not None:
-            self._procedures[id] = procedure
+        id, key = self._identity(hello.key)
+        procedure = self._procedure(hello, key)
+        client = Client(id, key, hello.name, hello.space, socket, procedure, reserve=self._make_place())
         client.counted = self.now()
         self.clients[id] = client
         self.composition.log(f"{id} {hello.name!r} came, {len(self.clients)} here")
@@ -153,29 +165,52 @@ class Server:
         self._greet(client)
         return client
 
-    def _procedure(self, hello: messages.Hello) -> AlignmentProcedure | None:
+    def _identity(self, key: str) -> tuple[str, str]:
+        """The id and the key of whom comes: those of before by its key, which nobody else knows; else new ones."""
+        id = self._ids.pop(key, "")
+        if not id:
+            id, key = secrets.token_hex(4), make_token()
+        self._ids[key] = id
+        away = [key for key, id in self._ids.items() if id not in self.clients][:-MOST_CLIENTS]
+        for forgotten in away:
+            del self._ids[forgotten]
+            self._procedures.pop(forgotten, None)
+        return id, key
+
+    def _make_place(self) -> bool:
+        """Whether only the place that is kept for a stop is left; who had it goes."""
+        reserves = [client for client in self.clients.values() if client.reserve]
+        if len(self.clients) - len(reserves) < MOST_CLIENTS:
+            return False
+        for former in reserves:
+            self._leave(former)
+            asyncio.create_task(end(former.socket, "server: too many clients; another has the place for a stop"))
+        return True
+
+    def _procedure(self, hello: messages.Hello, key: str) -> AlignmentProcedure | None:
         """Its own where it comes again to the same room: whose anchor has to be seen anew."""
-        former = self._procedures.pop(hello.id, None)
+        former = self._procedures.pop(key, None)
         if hello.space == "base" or self.composition.alignment is None:
             return None
+        anchors = self.composition.anchors
         if former is not None:
             former.lose()
-            self._procedures[hello.id] = former
-            return former
-        anchors = self.composition.anchors
-        while len(self._procedures) >= MOST_CLIENTS:
-            self._procedures.pop(next(iter(self._procedures)))
-        return AlignmentProcedure(
+        self._procedures[key] = procedure = former or AlignmentProcedure(
             self.composition.alignment, anchors.find(anchors.newest) if anchors is not None else None
         )
+        return procedure
 
     def _greet(self, client: Client) -> None:
         controller, say = self.controller, client.outbox.say
         say(
             messages.tell(
-                messages.Welcome(client.id, self.composition.token, self.composition.package, self.composition.rate)
+                messages.Welcome(
+                    client.id, client.key, self.composition.token, self.composition.package, self.composition.rate
+                )
             )
         )
+        if client.reserve:
+            self._refuse(client, FULL)
         if client.procedure is not None:
             say(messages.tell(client.procedure.progress()))
         say(messages.tell(messages.WorldMessage(controller.world)))
@@ -276,6 +311,8 @@ class Server:
                 assert client.clock.offset is not None
                 client.outbox.say(messages.tell(messages.Clock(client.clock.offset, client.clock.round_trip)))
                 self.controller.log_writer.event("clock", client=client.id, offset=client.clock.offset)
+        elif client.reserve:
+            self._refuse(client, FULL)
         elif isinstance(message, messages.LeaseRequest):
             self._lease(client, message, now)
         elif isinstance(message, messages.AlignmentByEye | messages.TouchRequest | messages.AnchorPose):

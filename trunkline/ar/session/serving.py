@@ -5,6 +5,7 @@ import asyncio
 import contextlib
 import functools
 import gc
+import logging
 import signal
 import socket
 import ssl
@@ -13,12 +14,13 @@ from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from aiohttp import web
+from aiohttp import web, web_response
 
 from trunkline.ar.drivers.settings import read_execution_config
 from trunkline.ar.session.anchors import Anchors
-from trunkline.ar.session.auth import CODE_SECONDS, Origins, make_token
+from trunkline.ar.session.auth import CODE_SECONDS, HEADERS, Origins, make_token
 from trunkline.ar.session.composition import SessionParts, make
+from trunkline.ar.session.connections import LONGEST
 from trunkline.ar.session.hardware import Hardware, hardware_of
 from trunkline.ar.session.server import PARTING, Composition, Server
 from trunkline.ar.session.settings import AlignmentSettings, SessionConfig, read_session_config
@@ -27,6 +29,7 @@ from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT, load_folder
 
 PAGE = Path(__file__).parent / "page"
+web_response.SERVER_SOFTWARE = HEADERS["Server"]  # pyright: ignore[reportPrivateImportUsage] # of answers that no handler gives, for which aiohttp has no setting
 
 
 def alignment_for(hardware: Hardware | None, settings: AlignmentSettings) -> AlignmentSettings:
@@ -58,16 +61,42 @@ async def listening(server: Server, address: Address) -> AsyncIterator[None]:
     Raises:
         InputError: the address cannot be had.
     """
-    runner = web.AppRunner(server.app(), access_log=None, handle_signals=False, shutdown_timeout=PARTING)
+    runner = web.AppRunner(
+        server.app(), access_log=None, logger=_one_line(server.composition.log), handle_signals=False,
+        shutdown_timeout=PARTING,
+    )  # fmt: skip
     await runner.setup()
+    handlers = runner.server
+    assert handlers is not None, "it is set up"
+    watch = asyncio.create_task(server.idle.watch(lambda: [handler.transport for handler in handlers.connections]))
+    handshake = LONGEST if address.context is not None else None
+    listener = None
     try:
         try:
-            await web.TCPSite(runner, address.host, address.port, ssl_context=address.context).start()
+            listener = await asyncio.get_running_loop().create_server(
+                handlers, address.host, address.port, ssl=address.context, ssl_handshake_timeout=handshake
+            )
         except OSError as error:
             raise refused(address, error) from error
         yield
     finally:
+        watch.cancel()
+        if listener is not None:
+            listener.close()
         await runner.cleanup()
+
+
+def _one_line(log: Callable[[str], None]) -> logging.Logger:
+    """What aiohttp has to say of requests that no handler sees, a line each."""
+
+    class Lines(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            error = record.exc_info[1] if record.exc_info else None
+            log(" ".join(f"refused: {record.getMessage()}{f': {error}' if error else ''}".split()))
+
+    logger = logging.Logger("trunkline.live", logging.WARNING)
+    logger.addHandler(Lines())
+    return logger
 
 
 def refused(address: Address, error: OSError) -> InputError:

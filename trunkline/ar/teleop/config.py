@@ -15,7 +15,8 @@ from trunkline.settings import settings
 @settings
 class TeleoperationConfig:
     """`hanging`, `basket`: how what hangs and what has a handle is grasped. `mount_offset`: m, from the Panda's flange
-    to the soft arm's mount. `advance`: m, the last part of a reach, along the tip's axis; 0 for none."""
+    to the soft arm's mount. `advance`: m, the last part of a reach, along the tip's axis; 0 for none. `advance_speed`:
+    m/s, of the mount there, at most: no more than ISO 10218-1 lets a robot move whose operator stands beside it."""
 
     core: Teleop
     motors: MotorLimits
@@ -25,3 +26,4 @@ class TeleoperationConfig:
     basket: SideSettings
     mount_offset: Annotated[float, Field(ge=0, le=0.5)]
     advance: Annotated[float, Field(ge=0, le=0.3)]
+    advance_speed: Annotated[float, Field(gt=0, le=0.25)]

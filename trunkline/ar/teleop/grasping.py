@@ -65,7 +65,7 @@ class Handling:
 @dataclass(frozen=True)
 class Leg:
     """To `joints` (7,), rad, and `commands` (K,), m, in `seconds` at least, then at rest for `calm` s; `gentle` with
-    something in the arm.
+    something in the arm, or before the tip.
 
     `gravity`: in the arm's base frame, for legs that are shaped so that the arm does not swing on; None for the others.
     `change` (K,): m, what swings it: a command's change, or zero, the mount's way.
@@ -113,7 +113,7 @@ class Grasping:
         placement = self.placement(targets, object)
         centre = np.array(grip_of(object)) - beside * placement.rotation[:, 1]
         opened = self.straight - placement.opened
-        closed, still, gravity = self.straight - placement.closed, np.zeros(len(opened)), _gravity(targets)
+        closed, still, gravity = self.straight - placement.closed, np.zeros(len(opened)), gravity_direction(targets)
 
         def at(start: np.ndarray, place: np.ndarray) -> np.ndarray:
             return self._solve(start, centre + place, targets)
@@ -172,7 +172,8 @@ class Grasping:
         return self.rigid.solve(start, (x, y, z), targets.pointing, targets.heading)
 
 
-def _gravity(targets: Targets) -> np.ndarray:
+def gravity_direction(targets: Targets) -> np.ndarray:
+    """In the soft arm's base frame, as `targets` turn it. Shape (3,)."""
     return np.array(rotate(conjugate(base_quaternion(targets.pointing, targets.heading)), DOWN))
 
 

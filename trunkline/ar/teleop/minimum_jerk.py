@@ -4,6 +4,8 @@ from typing import Any, overload
 
 import numpy as np
 
+PEAK = 15 / 8  # its largest velocity over its mean one
+
 
 @overload
 def minimum_jerk(share: float, way: float = 1.0) -> float: ...

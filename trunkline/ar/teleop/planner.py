@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from trunkline.ar.teleop.alignment import base_quaternion
-from trunkline.ar.teleop.grasping import Grasping, Leg
+from trunkline.ar.teleop.grasping import Grasping, Leg, gravity_direction
 from trunkline.ar.teleop.messages import Request, Targets, World
+from trunkline.ar.teleop.minimum_jerk import PEAK
 from trunkline.ar.teleop.plan import Plan
 from trunkline.ar.teleop.plan_checks import check_plan
 from trunkline.ar.teleop.rigid_ik import RigidIK
@@ -18,6 +19,7 @@ from trunkline.ar.teleop.trajectory import JOINTS, MotionLimits, gentle, point_t
 from trunkline.ar.teleop.vectors import DOWN, Vector, add, conjugate, rotate, subtract
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY, rotation_from_wxyz
+from trunkline.kinematics.panda.kinematics import mount_pose
 from trunkline.model.statics.chain import Chain
 from trunkline.model.statics.equilibria import actuated
 
@@ -25,13 +27,16 @@ from trunkline.model.statics.equilibria import actuated
 # how much they change (K,), m; `trunkline.ar.teleop.vibration` has it of a MuJoCo model.
 ShaperOf = Callable[[np.ndarray, np.ndarray, np.ndarray], Shaper]
 
+PLACES = 11  # of the mount on its advance, between which its speed is taken
+
 
 @dataclass(frozen=True)
 class Planner:
     """What plans are made with. `straight`: commands that leave the arm straight, m, (K,). `tolerance`: m, how far
     from its target the tip may be foreseen. `step`: s, between a plan's rows. `chain`: the arm's statics, by which the
     network's answers are corrected, and no obstacle may be in the arm's way. `grasping`: how objects are grasped.
-    `advance`: m, the last part of a reach, along the tip's axis, of an arm with a `chain`."""
+    `advance`: m, the last part of a reach, along the tip's axis, of an arm with a `chain`; `advance_speed`: m/s, of the
+    mount there, at most."""
 
     rigid: RigidIK
     network: Network
@@ -44,6 +49,7 @@ class Planner:
     chain: Chain | None = None
     grasping: Grasping | None = None
     advance: float = 0.0
+    advance_speed: float = 0.1
 
     def plan(
         self, request: Request, world: World, joints: np.ndarray, commands: np.ndarray, beside: float = 0.0
@@ -59,11 +65,13 @@ class Planner:
             InputError: beginning with what forbids it: limit, self-collision, out of reach, gravity, world, payload,
                 grasp or release.
         """
-        *better, last = self._ways(request.targets, world, joints, commands, beside)
-        for legs in better:
-            with suppress(InputError):
+        reasons: list[InputError] = []
+        for legs in self._ways(request.targets, world, joints, commands, beside):
+            try:
                 return self._along(legs, request, world, joints, commands)
-        return self._along(last, request, world, joints, commands)
+            except InputError as error:
+                reasons.append(error)
+        raise reasons[-1]
 
     def _along(self, legs: list[Leg], request: Request, world: World, joints: np.ndarray, commands: np.ndarray) -> Plan:
         rows, phases = [np.append(joints, commands)[None]], []
@@ -85,7 +93,7 @@ class Planner:
     def _ways(
         self, targets: Targets, world: World, joints: np.ndarray, commands: np.ndarray, beside: float
     ) -> Iterator[list[Leg]]:
-        """The legs of each way there, the best first."""
+        """The legs of each way there, the best first, each solved once it is asked for."""
         if targets.object:
             object = world.object(targets.object)
             if self.grasping is None:
@@ -96,27 +104,37 @@ class Planner:
                 yield self.grasping.grasp(targets, object, joints, beside)
             return
         mount, curled = self._curled(targets)
-        there = self._solve(joints, mount, targets)
-        gravity = np.array(_soft_target(targets)[1])
-        for back in self._stand_offs(targets, curled):
+        gravity = gravity_direction(targets)
+        for back in self._stand_offs(targets, curled, gravity):
             with suppress(InputError):
                 here = self._solve(joints, add(mount, back), targets)
+                there = self._solve(here, mount, targets)
+                still, seconds = np.zeros(len(curled)), self._advance_time(here, there)
                 yield [
                     Leg("approach", here, self.straight, gravity),
                     Leg("curl", here, curled, gravity),
-                    Leg("advance", self._solve(here, mount, targets), curled, gravity, np.zeros(len(curled))),
+                    Leg("advance", there, curled, gravity, still, seconds, gentle=True),
                 ]
+        there = self._solve(joints, mount, targets)
         yield [Leg("approach", there, self.straight, gravity), Leg("curl", there, curled, gravity)]
 
-    def _stand_offs(self, targets: Targets, curled: np.ndarray) -> list[Vector]:
+    def _stand_offs(self, targets: Targets, curled: np.ndarray, gravity: np.ndarray) -> list[Vector]:
         """From where the mount advances, seen from where it goes, m: back along the axis of the tip at rest under the
-        commands `curled` (K,)."""
+        commands `curled` (K,) and `gravity` along a unit vector (3,)."""
         if self.chain is None or not self.advance:
             return []
-        rest = actuated(self.chain.smooth, curled[None], STANDARD_GRAVITY * np.array(_soft_target(targets)[1]))
+        rest = actuated(self.chain.smooth, curled[None], STANDARD_GRAVITY * gravity)
         x, y, z = (float(value) for value in -rotation_from_wxyz(rest.quaternion[0]).apply(DOWN))
         turn = base_quaternion(targets.pointing, targets.heading)
         return [rotate(turn, (part * x, part * y, part * z)) for part in (self.advance, self.advance / 2)]
+
+    def _advance_time(self, here: np.ndarray, there: np.ndarray) -> float:
+        """s, in which joints go from `here` to `there` (7,), rad, gently, the mount never faster than it may; shaping
+        only makes it slower."""
+        share = np.linspace(0, 1, PLACES)[:, None]
+        mounts = mount_pose(here + share * (there - here), self.mount_offset)[0]
+        steps = np.linalg.norm(np.diff(mounts, axis=0), axis=1)
+        return float(PEAK * (PLACES - 1) * steps.max() / self.advance_speed)
 
     def goal(self, targets: Targets, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Joints (7,), rad, the nearest to `joints`, and commands (K,), m, that bring mount and tip to their targets.
@@ -136,14 +154,9 @@ class Planner:
         An arm that only bends passes its target by some mm, within `tolerance`: the mount makes up for what is
         foreseen.
         """
-        tip, gravity = _soft_target(targets)
-        bent = bend(self.network, tip, gravity, self.tolerance, self.chain)
         turn = base_quaternion(targets.pointing, targets.heading)
+        back = conjugate(turn)
+        tip = rotate(back, subtract(targets.tip.position, targets.rigid.position))
+        bent = bend(self.network, tip, rotate(back, DOWN), self.tolerance, self.chain)
         missed = rotate(turn, subtract(tip, (float(bent.tip[0]), float(bent.tip[1]), float(bent.tip[2]))))
         return add(targets.rigid.position, missed), bent.commands
-
-
-def _soft_target(targets: Targets) -> tuple[Vector, Vector]:
-    """Tip target and gravity direction in the soft arm's base frame."""
-    back = conjugate(base_quaternion(targets.pointing, targets.heading))
-    return rotate(back, subtract(targets.tip.position, targets.rigid.position)), rotate(back, DOWN)

@@ -72,13 +72,3 @@ def shaped(rows: np.ndarray, step: float, shaper: Shaper) -> np.ndarray:
         for column in range(rows.shape[1]):
             result[:, column] += share * np.interp(time - at, row_time, rows[:, column])
     return result
-
-
-def residual(shaper: Shaper, period: float, damping: float) -> float:
-    """Amplitude of the swing of a mode after the last impulse, as a share of that after one impulse of 1 (there is less
-    than 1 % left where a shaper suits the mode)."""
-    decay = 2 * np.pi / period * damping / np.sqrt(1 - damping**2)
-    phase = 2 * np.pi / period * shaper.times
-    grown = shaper.shares * np.exp(decay * shaper.times)
-    left = np.exp(-decay * shaper.delay) * np.hypot((grown * np.cos(phase)).sum(), (grown * np.sin(phase)).sum())
-    return float(left)

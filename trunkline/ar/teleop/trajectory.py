@@ -12,7 +12,7 @@ import numpy as np
 import ruckig
 from pydantic import Field
 
-from trunkline.ar.teleop.minimum_jerk import minimum_jerk
+from trunkline.ar.teleop.minimum_jerk import PEAK, minimum_jerk
 from trunkline.errors import InputError
 from trunkline.kinematics.panda.limits import ACCELERATION, JERK, VELOCITY
 
@@ -86,7 +86,7 @@ def gentle(start: np.ndarray, end: np.ndarray, limits: MotionLimits, step: float
     whose largest velocity, acceleration and jerk are 15/8 Δ/T, 10/√3 Δ/T² and 60 Δ/T³ (as `minimum_jerk`).
     """
     away = np.abs(end - start)
-    least = [15 / 8 * away / limits.velocity, np.sqrt(10 / np.sqrt(3) * away / limits.acceleration),
+    least = [PEAK * away / limits.velocity, np.sqrt(10 / np.sqrt(3) * away / limits.acceleration),
              np.cbrt(60 * away / limits.jerk)]  # fmt: skip
     duration = max(seconds, float(np.max(least)))
     share = np.minimum(step * np.arange(int(np.ceil(duration / step)) + 1) / max(duration, step), 1.0)[:, None]

@@ -11,6 +11,7 @@ refuses models with delays.
 """
 
 import copy
+from functools import lru_cache
 from typing import NamedTuple
 
 import mujoco
@@ -26,6 +27,7 @@ STEP = 1e-5  # rad, rad/s and m, of the differences
 STILL = 0.1  # rad/s, swings slower than that are creep
 SHARE = 0.1  # of the largest swing of the tip; smaller ones are not worth a longer way
 ALIKE = 0.05  # share by which periods differ that one shaper suits: ZVD leaves 0.6 % of such a swing
+SHAPERS = 16  # of last, that are not computed again
 HEAVY = 0.2  # damping ratio from which on a swing dies within a period
 
 
@@ -104,13 +106,16 @@ def slowest(modes: VibrationModes, count: int) -> VibrationModes:
 
 
 def shaper_for(model: mujoco.MjModel, settings: Shaping) -> ShaperOf:
-    """What a `Planner` shapes with: the swings of `model` under the gravity, and where the commands end."""
+    """What a `Planner` shapes with: the swings of `model` under the gravity, and where the commands end. Those of last
+    are kept: ways to one target differ in little else than joints."""
 
-    def shaper(gravity: np.ndarray, command: np.ndarray, change: np.ndarray) -> Shaper:
+    @lru_cache(SHAPERS)
+    def shaper(*arrays: bytes) -> Shaper:
         if settings.kind == "none":
             return Shaper(np.zeros(1), np.ones(1))
+        gravity, command, change = (np.frombuffer(array) for array in arrays)
         step = change if np.abs(change).max() > 0 else None
         modes = slowest(vibration_modes(model, command, step, STANDARD_GRAVITY * gravity), settings.modes)
         return shaper_of(modes.periods, modes.dampings, settings.kind)
 
-    return shaper
+    return lambda *arrays: shaper(*(array.astype(float).tobytes() for array in arrays))

@@ -9,8 +9,9 @@ from scipy.spatial.transform import Rotation
 from trunkline.frames import tilt_of_gravity
 from trunkline.identification.evaluation.evaluation import replay
 from trunkline.identification.fit.fit import Fit
-from trunkline.identification.simulate.experiment import QUIET_FRAMES, Experiment, start_frames
+from trunkline.identification.simulate.experiment import Experiment
 from trunkline.identification.simulate.loss import LOSSES, loss_of
+from trunkline.identification.simulate.pose_fit import QUIET_FRAMES, start_frames
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_static
 from trunkline.recordings.trials.start import robust_length
 from trunkline.recordings.trials.trial import Trial

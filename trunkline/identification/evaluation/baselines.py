@@ -11,8 +11,8 @@ import numpy as np
 
 from trunkline.identification.evaluation.evaluation import Prediction, Replay, marker_positions
 from trunkline.identification.parameters.per_session import model_in
-from trunkline.identification.simulate.experiment import Experiment, measured_pose, start_frames
-from trunkline.identification.simulate.pose_fit import fit_pose
+from trunkline.identification.simulate.experiment import Experiment
+from trunkline.identification.simulate.pose_fit import fit_pose, measured_pose, start_frames
 from trunkline.recordings.trials.experiments import is_static, is_stepwise
 from trunkline.recordings.trials.splits import IDENTIFY
 from trunkline.recordings.trials.trial import Trial

@@ -17,7 +17,7 @@ from trunkline.identification.fit.robust import reweighted
 from trunkline.identification.fit.search import Convergence, SearchResult, descend, search
 from trunkline.identification.fit.surrogate import Surrogate, surrogate
 from trunkline.identification.parameters.parameter import Fields
-from trunkline.identification.parameters.parameters import candidate_fields, parameter_named, set_fields
+from trunkline.identification.parameters.parameters import MASS, candidate_fields, parameter_named, set_fields
 from trunkline.identification.simulate.experiment import Experiment
 from trunkline.identification.simulate.resting import RestShape, hang_in
 from trunkline.recordings.trials.experiments import is_static
@@ -69,7 +69,10 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
     """
     method, parameters, per_joint, rest = fit.method, fit.parameters, fit.per_joint, fit.rest
     fitted = [e for e in experiments if e.split == IDENTIFY]
-    short = [e.shortened(method.rough.frames) for e in _few(fitted, method.rough.trials)]
+    few = _few(fitted, method.rough.trials)
+    if MASS in parameters and not any(e.load for e in few):  # without one, every mass does
+        few += [e for e in fitted if e.load][:1]
+    short = [e.shortened(method.rough.frames) for e in few]
     coarse_problem, exact = fit.problem(model, short, method.rough.step_factor), fit.problem(model, fitted)
     searches = {"coarse": _search(coarse_problem, method.optimizer, method.seed, f"{label} coarse")}
     problems, result = [coarse_problem, exact], searches["coarse"]
@@ -87,8 +90,7 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
     values = values_of(parameters, result.vector)
     coarse = with_parameters(model, values, rest=rest)
     at_bound = _at_bound(parameters, result.vector, *exact.bounds())
-    linear = result.linear
-    assert linear is not None, "least squares ends on its own linearisation"
+    linear = linearise(exact, result.vector, result.residuals)
 
     factors: dict[str, np.ndarray] = {}
     factor_certainty = None
@@ -101,7 +103,7 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
             trial_weights=exact.trial_weights,
         )  # fmt: skip
         searches["per_joint"] = result = _search(joints, method.fine, method.seed, f"{label} per joint")
-        factor_certainty = certainty(result.linear or linearise(joints, result.vector), method.per_joint_deviation)
+        factor_certainty = certainty(linearise(joints, result.vector, result.residuals), method.per_joint_deviation)
         factors = dict(zip(per_joint, result.vector.reshape(len(per_joint), -1), strict=True))
         at_bound += _factors_at_bound(factors, method.per_joint_range)
         problems.append(joints)
@@ -167,7 +169,7 @@ def _reweigh(problem: Problem, result: SearchResult, fit: Fit, label: str) -> tu
     kinds, settings = [e.kind for e in problem.experiments], fit.method.polish
     straight = marker_positions(problem.model, problem.markers, problem.model.qpos0)
     bends = np.array([np.square(e.positions - straight).sum(axis=2)[e.measured].mean() for e in problem.experiments])
-    around = made = surrogate(problem, result.vector, result.linear.residuals if result.linear else None)
+    around = made = surrogate(problem, result.vector, result.residuals)
     made_at = result.vector
     for turn in range(REWEIGHINGS):
         weights, place = reweighted(around, kinds, bends, fit.weights.outlying)
@@ -181,12 +183,12 @@ def _reweigh(problem: Problem, result: SearchResult, fit: Fit, label: str) -> tu
                 problem, start, settings.iterations, settings.tolerance,
                 lambda best, bar=bar: bar.update(1, best_loss=best, **problem.effort()),
             )  # fmt: skip
-        assert result.linear is not None, "least squares ends on its own linearisation"
-        moved, losses = result.vector - made_at, _trial_losses(problem, result.linear.residuals)
+        assert result.residuals is not None, "least squares ends on residuals"
+        moved, losses = result.vector - made_at, _trial_losses(problem, result.residuals)
         if np.abs(made.losses(moved[None])[0] - losses).sum() <= SEEN * losses.sum():
             around = made.moved(moved, weights)
         else:
-            around = made = surrogate(problem, result.vector, result.linear.residuals)
+            around = made = surrogate(problem, result.vector, result.residuals)
             made_at = result.vector
     return result, around
 

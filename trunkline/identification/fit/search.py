@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.optimize import OptimizeResult, differential_evolution, least_squares
+from scipy.optimize import differential_evolution, least_squares
 
 from trunkline.identification.fit.linearisation import Linearisation, linearise
 from trunkline.identification.fit.optimizers import DifferentialEvolution, Optimizer
@@ -36,15 +36,17 @@ class SearchResult:
 
     vector: the best candidate z. loss: its. converged: stopped for that reason, not because its time was up.
     agreeing, starts: of so many distinct starts, how many ended at a loss as small; 0 of 0 if there was only one.
-    linear: the residuals around it, if least squares ended there. others: worse minima that were found on the way,
-    which whole trials may rank otherwise than the few that a search is made on.
+    residuals: per trial (R,), if least squares ended there. flat: which parameters did not matter near it, (P,),
+    likewise. others: worse minima that were on the way, which whole trials may rank otherwise than the few that a
+    search is made on.
     """
 
     vector: np.ndarray
     loss: float
     convergence: Convergence
     converged: bool
-    linear: Linearisation | None = None
+    residuals: list[np.ndarray] | None = None
+    flat: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
     others: tuple[np.ndarray, ...] = ()
     agreeing: int = 0
     starts: int = 0
@@ -154,7 +156,7 @@ def _ends(
     if not problem.parameters:
         return ends
     (low, high), first = problem.bounds(), ends[0]
-    plateaus = np.flatnonzero(_flat(first.linear or linearise(problem, first.vector)))
+    plateaus = np.flatnonzero(first.flat)
     for index in plateaus:
         scan = np.repeat(first.vector[None], PLATEAU_SCAN, axis=0)
         scan[:, index] = np.linspace(low[index], high[index], PLATEAU_SCAN)
@@ -173,10 +175,14 @@ def _flat(linear: Linearisation) -> np.ndarray:
     return np.asarray(~np.concatenate(linear.jacobians).any(axis=0))
 
 
+class _Ended(Exception):
+    """A descent has come to its end at the candidate that scipy asks derivatives of."""
+
+
 def descend(
     problem: Problem, start: np.ndarray, iterations: int, tolerance: float, report: Report, hasty: bool = False
 ) -> SearchResult:
-    """Least squares on the loss's residuals. Only a step that is taken costs a Jacobian.
+    """Least squares on the loss's residuals. Only a step that is taken, and is not the last, costs a Jacobian.
 
     It ends with the first step that gains less than `tolerance` of the loss, also where less was gained than expected:
     there scipy's own rule goes on, in ever smaller steps along a kink. If `hasty`, with the first iterate after the
@@ -184,7 +190,7 @@ def descend(
     """
     convergence = Convergence()
     tried: dict[bytes, list[np.ndarray]] = {}
-    accepted: list[Linearisation] = []
+    matters = np.ones(len(start), dtype=bool)
     low, high = problem.bounds()
 
     def blocks_at(vector: np.ndarray) -> list[np.ndarray]:
@@ -197,36 +203,36 @@ def descend(
         return np.concatenate([*blocks_at(vector), problem.prior(vector[None])[0]])
 
     def derivatives(vector: np.ndarray) -> np.ndarray:
+        blocks = residuals(vector)
+        best = convergence.best
+        best.append(0.5 * float(blocks @ blocks))
+        convergence.mean.append(best[-1])
+        report(best[-1])
+        at_end = len(best) > 1 and best[-2] - best[-1] < tolerance * best[-2]
+        if at_end:
+            raise _Ended(vector)
         linear = linearise(problem, vector, blocks_at(vector))
+        matters[:] = ~_flat(linear)
+        if hasty and len(best) > 1 and not matters.all():
+            raise _Ended(vector)
         tried.clear()  # steps before this iterate are not tried again
         tried[vector.tobytes()] = linear.residuals
-        accepted[:] = [linear]  # scipy asks for derivatives at its iterates alone
-        blocks = [*linear.residuals, problem.prior(vector[None])[0]]
-        loss = 0.5 * sum(float(block @ block) for block in blocks)
-        convergence.best.append(loss)
-        convergence.mean.append(loss)
-        report(loss)
         prior = np.zeros(len(vector)) if linear.prior is None else linear.prior
         return np.concatenate([*linear.jacobians, np.diag(prior)])
 
-    def enough(_: OptimizeResult) -> None:
-        if len(best := convergence.best) > 1 and best[-2] - best[-1] < tolerance * best[-2]:
-            raise StopIteration
-        if hasty and _flat(accepted[0]).any():
-            raise StopIteration
-
     inside = np.clip(start, low + 1e-9, high - 1e-9)
-    result = least_squares(
-        residuals, inside, derivatives, bounds=(low, high), max_nfev=iterations, ftol=tolerance, xtol=STEP_TOLERANCE,
-        callback=enough,
-    )  # fmt: skip
-    if result.cost != convergence.best[-1]:
-        convergence.best.append(float(result.cost))
-        convergence.mean.append(float(result.cost))
-    last = accepted[0]
-    if not np.array_equal(last.vector, result.x):
-        last = linearise(problem, result.x, blocks_at(result.x))
-    return SearchResult(result.x, float(result.cost), convergence, result.status != 0, last)
+    try:
+        result = least_squares(
+            residuals, inside, derivatives, bounds=(low, high), max_nfev=iterations, ftol=tolerance,
+            xtol=STEP_TOLERANCE,
+        )  # fmt: skip
+        vector, loss, converged = result.x, float(result.cost), result.status != 0
+    except _Ended as end:
+        vector, loss, converged = end.args[0], convergence.best[-1], True
+    if loss != convergence.best[-1]:
+        convergence.best.append(loss)
+        convergence.mean.append(loss)
+    return SearchResult(vector, loss, convergence, converged, blocks_at(vector), ~matters)
 
 
 def _evolve(

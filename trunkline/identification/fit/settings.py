@@ -49,5 +49,5 @@ class IdentificationSettings(Method):
             if not set(kinds) & set(self.experiments):
                 reason = f"found it to be identified from {' and '.join(self.experiments)} alone"
                 raise ValueError(f"parameters.{name}: {reason}, expected one of {', '.join(kinds)} too")
-            if self.rest_shape == "measured" and "qpos_spring" in parameter.fields:
+            if self.rest_shape == "measured" and {"qpos_spring", "body_mass"} & set(parameter.fields):
                 raise ValueError(f"parameters.{name}: found it beside rest_shape: measured, expected one of the two")

@@ -8,13 +8,14 @@ from trunkline.errors import InputError
 from trunkline.identification.fit.fit import Fit
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.settings import IdentificationSettings
-from trunkline.identification.parameters.parameters import EVERY, names_of, parameter_named
+from trunkline.identification.parameters.parameters import EVERY, MASS, names_of, parameter_named
 from trunkline.identification.parameters.per_session import names_in
 from trunkline.identification.simulate.experiment import Experiment, prepare
 from trunkline.identification.simulate.markers import with_measured_markers
 from trunkline.identification.simulate.resting import resting_shape
 from trunkline.model.arm_model import CAPSTAN_FRICTION
 from trunkline.recordings.trials.experiments import is_static
+from trunkline.recordings.trials.splits import IDENTIFY
 from trunkline.recordings.trials.trial import Trial, sessions_of
 
 EVERY_ANGLE = f"tendon_angle{EVERY}"
@@ -63,6 +64,16 @@ def with_every(config: IdentificationSettings, model: mujoco.MjModel) -> Identif
             middle = parameter_named(parameter).read(model) if has_middle else 0.0
             spans[parameter] = Bounds(middle + span.low, middle + span.high)
     return replace(config, parameters=spans)
+
+
+def unidentifiable_mass(config: IdentificationSettings, trials: list[Trial]) -> list[str]:
+    """A line if the arm's mass is to be identified and no trial carries a load: forces scale with masses, so that only
+    what was weighed tells their size."""
+    fitted = [trial for trial in trials if trial.split == IDENTIFY and trial.experiment in config.experiments]
+    if MASS not in config.parameters or any(trial.load for trial in fitted):
+        return []
+    reason = f"found no {' or '.join(config.experiments)} with split identify that carries a load"
+    return [f"parameters.{MASS}: {reason}, expected one with its `load`, kg, in session.yaml, or no {MASS}"]
 
 
 def check_parameters(stage: str, config: IdentificationSettings, model: mujoco.MjModel) -> None:

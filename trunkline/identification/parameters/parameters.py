@@ -23,6 +23,8 @@ from trunkline.model.arm_model import ArmModel
 
 SESSION_MARK = "@"  # between a parameter and the session that has it for itself
 EVERY = "_*"  # ends the name of a numbered one in params.yaml for all that the arm has
+MASS = "mass"
+DERIVED_FROM = {"body_mass", "jnt_pos"}  # fields of which MuJoCo makes constants as it compiles
 
 
 def _mount(axis: int) -> Parameter:
@@ -40,11 +42,23 @@ def _mount(axis: int) -> Parameter:
     return Parameter("rad", ("body_quat",), read, write, signed=True)
 
 
+def _read_mass(model: mujoco.MjModel) -> float:
+    return float(model.body_mass[ArmModel(model).own_bodies].sum())
+
+
+def _write_mass(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
+    """Of the whole arm; its bodies keep their ratios, and a load its mass."""
+    bodies, factors = ArmModel(model).own_bodies, values / _read_mass(model)
+    fields["body_mass"][:, bodies] *= factors[:, None]
+    fields["body_inertia"][:, bodies] *= factors[:, None, None]
+
+
 # in the order in which they are written
 PARAMETERS: dict[str, Parameter] = JOINT_PARAMETERS | TENDON_PARAMETERS | {
     "mount_tilt_x": _mount(0),
     "mount_tilt_y": _mount(1),
     "mount_twist": _mount(2),
+    MASS: Parameter("kg", ("body_mass", "body_inertia"), _read_mass, _write_mass),
 }  # fmt: skip
 # of each tendon or section, `<name>_<number>`: what makes one, and the first number
 NUMBERED: dict[str, tuple[Callable[[int], Parameter], int]] = {
@@ -127,7 +141,12 @@ def candidate_fields(
     return fields
 
 
-def set_fields(model: mujoco.MjModel, fields: Fields, candidate: int = 0) -> None:
-    """Write one candidate's fields into `model`."""
+def set_fields(
+    model: mujoco.MjModel, fields: Fields, candidate: int = 0, data: mujoco.MjData | None = None
+) -> None:
+    """Write one candidate's fields into `model`, and the constants that follow, as when such a model is compiled: what
+    softens joint limits. `data`: of the model, to work in."""
     for name, values in fields.items():
         getattr(model, name)[:] = values[candidate].reshape(getattr(model, name).shape)
+    if DERIVED_FROM & fields.keys():
+        mujoco.mj_setConst(model, data or mujoco.MjData(model))

@@ -50,6 +50,8 @@ def save_model(spec: mujoco.MjSpec, model: mujoco.MjModel) -> str:
         ValueError: naming the field of a parameter that has no place in MJCF.
     """
     before = spec.compile()
+    if not np.array_equal(before.body_mass, model.body_mass):
+        _state_masses(spec, model)
     fields = {field for name in (*PARAMETERS, *EVERY_NAME) for field in parameter_named(name).fields}
     fields |= {field for names, _ in PER_JOINT.values() for field in names}
     for field in sorted(fields | set(STRUCTURE)):
@@ -64,6 +66,16 @@ def save_model(spec: mujoco.MjSpec, model: mujoco.MjModel) -> str:
             if not np.array_equal(old[row], new[row]):
                 _write(element, attribute, part, new[row])
     return spec.to_xml()
+
+
+def _state_masses(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
+    """Let bodies have the masses of `model`, whatever follows from geoms or from a total mass in the file."""
+    spec.compiler.settotalmass, spec.compiler.inertiafromgeom = -1, mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
+    for body in spec.bodies:
+        if model.body_mass[body.id]:
+            body.explicitinertial, body.fullinertia = True, np.full(6, np.nan)
+            body.mass, body.inertia = model.body_mass[body.id], model.body_inertia[body.id]
+            body.ipos, body.iquat = model.body_ipos[body.id], model.body_iquat[body.id]
 
 
 def _write(element, attribute: str, part: int | slice, value: np.ndarray) -> None:

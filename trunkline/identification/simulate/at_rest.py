@@ -54,9 +54,7 @@ def shapes_at_rest(
     places = np.full((count, len(trial), len(sites), 3), np.nan)
     angles, iterations = np.full((len(trial), arm.hinge_count), np.nan), 0
     for candidate in range(count):
-        set_fields(candidate_model, fields, candidate)
-        if "jnt_pos" in fields:  # what softens joint limits follows, as when such a model is compiled
-            mujoco.mj_setConst(candidate_model, data)
+        set_fields(candidate_model, fields, candidate, data)
         chain = read_chain(candidate_model)
         mujoco.mj_kinematics(candidate_model, data)
         turned = gravity @ data.xmat[arm.base_body].reshape(3, 3)  # into the mount's frame, which may be tilted

@@ -7,8 +7,8 @@ from scipy.optimize import linear_sum_assignment
 
 from trunkline.errors import InputError
 from trunkline.frames import tilt_of_gravity
-from trunkline.identification.simulate.experiment import MEASURED_SHARE, check_names, measured_pose, start_frames
-from trunkline.identification.simulate.pose_fit import fit_pose
+from trunkline.identification.simulate.pose_fit import MEASURED_SHARE, fit_pose, measured_pose, start_frames
+from trunkline.model.arm_model import ArmModel
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.recordings.trials.trial import Trial
 
@@ -40,6 +40,24 @@ def check_trials(trials: list[Trial], model: mujoco.MjModel) -> None:
             kind = EXPERIMENTS[trial.experiment]
             (check_lengths if kind.needs_motors and kind.level is None else check_sides)(trial, model)
     check_scales([trial for trial in trials if trial.tendons and EXPERIMENTS[trial.experiment].needs_motors], model)
+
+
+def check_names(trial: Trial, model: mujoco.MjModel) -> None:
+    """Refuse a trial whose markers or tendons the model does not have, or that has only some of its tendons: those
+    that it leaves out may have pulled."""
+    arm = ArmModel(model)
+    tendons = arm.cable_names
+    for key, used, names in (("markers", trial.markers, arm.markers), ("tendons", trial.tendons, tendons)):
+        unknown = [name for name in used if name not in names]
+        if unknown:
+            valid = f"names of the model: {', '.join(names)}" if names else "none, as the arm has none"
+            if key == "tendons" and names:
+                valid += "; under `tendons` or `motors`, what moves which"
+            raise InputError(f"session.yaml: {key}: trial {trial.name}: found {unknown[0]!r}, expected {valid}")
+    if trial.tendons and len(trial.tendons) < len(tendons):
+        expected = f"expected all of the model: {', '.join(tendons)}; slack ones as let out"
+        used = f"found {', '.join(trial.tendons)} alone"
+        raise InputError(f"session.yaml: tendons: trial {trial.name}: {used}, {expected}")
 
 
 def check_sides(trial: Trial, model: mujoco.MjModel) -> None:

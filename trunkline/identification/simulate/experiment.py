@@ -7,22 +7,15 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.identification.parameters.per_session import model_in
+from trunkline.identification.simulate.checks import check_names
 from trunkline.identification.simulate.loss import LossWeights
-from trunkline.identification.simulate.pose_fit import PoseFit, fit_pose
-from trunkline.model.arm_model import ArmModel
+from trunkline.identification.simulate.pose_fit import PoseFit, start_frames, start_of
 from trunkline.recordings.trials.experiments import is_static, is_stepwise
 from trunkline.recordings.trials.trial import Trial
 
 SLACK = 0.3  # m of tendon paid out where nothing pulls, more than any bend takes up
-
-
-QUIET_FRAMES = 3  # before the start: there the low-pass has not yet smeared the motion into the hold
-REACH = 2  # frames to either side for the velocity at the start; the low-pass leaves nothing finer
-SWAY_FRAMES = 8  # between the poses that tell how a hand moves the arm that it is about to let go
-LOOK_BACK = 30  # frames in which to look for a start pose that enough cameras saw
 GEOMETRY = ("jnt_pos", "jnt_axis", "body_pos", "body_quat", "site_pos")
 SAME_PLACE = 1e-5  # m, and of a quaternion; what MJCF rounds away is less
-MEASURED_SHARE = 0.6  # of the markers that must be measured in the frame of the start pose
 
 
 @dataclass
@@ -96,7 +89,7 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
     positions, measured = trial.positions[window], trial.measured[window]
     if not measured.any():
         raise InputError(f"trial {trial.name}: found no measured frame after its start at {trial.start:.2f} s")
-    fit, start, velocity = _start(trial, model_in(trial.session, model), start_frame)
+    fit, start, velocity = start_of(trial, model_in(trial.session, model), start_frame)
     lengths = commanded_lengths(trial, model)
     if command_delay and model.nu:
         lengths = np.stack(
@@ -149,75 +142,16 @@ def own_starts(
     started = []
     for experiment, trial in zip(experiments, trials, strict=True):
         if not is_static(experiment.kind) and not same[trial.session]:
-            fit, start, velocity = _start(trial, model_in(trial.session, model), start_frames(trial)[1])
+            fit, start, velocity = start_of(trial, model_in(trial.session, model), start_frames(trial)[1])
             experiment = replace(experiment, fit=fit, start=start, velocity=velocity)
         started.append(experiment)
     return started
-
-
-def _start(trial: Trial, model: mujoco.MjModel, frame: int) -> tuple[PoseFit, np.ndarray, np.ndarray]:
-    """The model's pose in `frame`, and joint angles, rad, and velocities, rad/s, to start from. Shape (n,)."""
-    fit = _fit_frame(trial, model, frame)
-    if trial.in_motion:
-        return fit, fit.qpos, _velocity(trial, model, frame)
-    if trial.swaying:
-        return fit, *_extrapolated(trial, model, frame)
-    return fit, fit.qpos, np.zeros(ArmModel(model).hinge_count)
-
-
-def start_frames(trial: Trial) -> tuple[int, int]:
-    """The last frame that is not compared, the arm being still held then, and the one of the pose to start from."""
-    static = is_static(trial.experiment)
-    last = 0 if static else max(int(np.searchsorted(trial.time, trial.start + 1e-9, side="right")) - 1, 0)
-    start_frame = _measured_frame(trial, last if trial.in_motion else max(last - QUIET_FRAMES, 0))
-    # of an arm in motion, pose and velocity hold in that frame
-    return (start_frame if trial.in_motion else last), start_frame
 
 
 def _lead(trial: Trial, last: int) -> float:
     """Time to simulate until the first frame: from the start, or from the frame whose velocity is known, s."""
     begin = trial.time[last] if trial.in_motion else max(trial.start, trial.time[last])
     return max(float(trial.time[last + 1] - begin), 1e-4)
-
-
-def measured_pose(trial: Trial, frame: int) -> tuple[np.ndarray, np.ndarray | None]:
-    """Positions (S, 3) of a frame, m, nan where not measured, and orientations (S, 4) if the trial has any."""
-    positions = np.where(trial.measured[frame][:, None], trial.positions[frame], np.nan)
-    return positions, None if trial.quaternions is None else trial.quaternions[frame]
-
-
-def _fit_frame(trial: Trial, model: mujoco.MjModel, frame: int) -> PoseFit:
-    return fit_pose(model, trial.markers, *measured_pose(trial, frame))
-
-
-def _velocity(trial: Trial, model: mujoco.MjModel, frame: int) -> np.ndarray:
-    """Joint velocities at a frame, rad/s, from the poses a few frames before and after it. Shape (nv,)."""
-    before, after = max(frame - REACH, 0), min(frame + REACH, len(trial.time) - 1)
-    turned = _fit_frame(trial, model, after).qpos - _fit_frame(trial, model, before).qpos
-    return turned / (trial.time[after] - trial.time[before])
-
-
-def _extrapolated(trial: Trial, model: mujoco.MjModel, frame: int) -> tuple[np.ndarray, np.ndarray]:
-    """Joint angles, rad, and velocities, rad/s, at the start of an arm that a hand still moves then: a parabola through
-    its poses up to `frame`, before the low-pass smears in what comes after. Each of shape (n,)."""
-    apart = min(SWAY_FRAMES, frame // 2)
-    if not apart:
-        return _fit_frame(trial, model, frame).qpos, _velocity(trial, model, frame)
-    frames = frame - apart * np.arange(3)
-    poses = np.stack([_fit_frame(trial, model, frame).qpos for frame in frames.tolist()])
-    parabola = np.polyfit(trial.time[frames] - trial.start, poses, 2)
-    return parabola[2], parabola[1]
-
-
-def _measured_frame(trial: Trial, latest: int) -> int:
-    """The last frame up to `latest` in which enough markers were measured."""
-    for frame in range(latest, max(latest - LOOK_BACK, -1), -1):
-        if trial.measured[frame].mean() >= MEASURED_SHARE:
-            return frame
-    raise InputError(
-        f"trial {trial.name}: found {int(trial.measured[latest].sum())} of {len(trial.markers)} markers measured at "
-        f"its start, {trial.time[latest]:.2f} s, expected {MEASURED_SHARE:.0%} of them"
-    )
 
 
 def commanded_lengths(trial: Trial, model: mujoco.MjModel) -> np.ndarray:
@@ -229,21 +163,3 @@ def commanded_lengths(trial: Trial, model: mujoco.MjModel) -> np.ndarray:
         pull = trial.commands[:, trial.tendons.index(name)] if name in trial.tendons else -SLACK
         lengths[:, index] = model.tendon_length0[tendon] - pull
     return lengths
-
-
-def check_names(trial: Trial, model: mujoco.MjModel) -> None:
-    """Refuse a trial whose markers or tendons the model does not have, or that has only some of its tendons: those
-    that it leaves out may have pulled."""
-    arm = ArmModel(model)
-    tendons = arm.cable_names
-    for key, used, names in (("markers", trial.markers, arm.markers), ("tendons", trial.tendons, tendons)):
-        unknown = [name for name in used if name not in names]
-        if unknown:
-            valid = f"names of the model: {', '.join(names)}" if names else "none, as the arm has none"
-            if key == "tendons" and names:
-                valid += "; under `tendons` or `motors`, what moves which"
-            raise InputError(f"session.yaml: {key}: trial {trial.name}: found {unknown[0]!r}, expected {valid}")
-    if trial.tendons and len(trial.tendons) < len(tendons):
-        expected = f"expected all of the model: {', '.join(tendons)}; slack ones as let out"
-        used = f"found {', '.join(trial.tendons)} alone"
-        raise InputError(f"session.yaml: tendons: trial {trial.name}: {used}, {expected}")

@@ -8,6 +8,7 @@ import numpy as np
 from mujoco.batch import Batch
 
 from trunkline.identification.parameters.parameter import Fields
+from trunkline.identification.parameters.parameters import DERIVED_FROM
 from trunkline.identification.parameters.spool_scale import wound_by_each
 from trunkline.identification.simulate.experiment import Experiment
 from trunkline.model.arm_model import CAPSTAN_FRICTION, ArmModel
@@ -103,7 +104,7 @@ class InMotion:
         loads = np.repeat([e.load for e in experiments], count)
         if self._loaded:
             hang(batch, batch.model, loads, tuple(fields))
-        elif "jnt_pos" in fields:  # what softens joint limits follows, as when such a model is compiled
+        elif DERIVED_FROM & fields.keys():  # what softens joint limits follows, as when such a model is compiled
             batch.set_const()
         arm = len(experiments[0].start)
         batch.bind("qpos")[:, :arm] = np.repeat([e.start for e in experiments], count, axis=0)

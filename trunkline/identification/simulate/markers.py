@@ -3,8 +3,13 @@
 import mujoco
 import numpy as np
 
-from trunkline.identification.simulate.experiment import measured_pose, start_frames
-from trunkline.identification.simulate.pose_fit import POSITION_SIGMA, PoseProblem, fit_pose
+from trunkline.identification.simulate.pose_fit import (
+    POSITION_SIGMA,
+    PoseProblem,
+    fit_pose,
+    measured_pose,
+    start_frames,
+)
 from trunkline.model.arm_model import ArmModel
 from trunkline.recordings.trials.splits import IDENTIFY
 from trunkline.recordings.trials.trial import Trial

@@ -1,4 +1,4 @@
-"""Joint angles that put the model's markers where motion capture saw them."""
+"""Joint angles that put the model's markers where motion capture saw them, and those from which a trial starts."""
 
 from dataclasses import dataclass
 
@@ -6,8 +6,11 @@ import mujoco
 import numpy as np
 from mujoco import minimize
 
+from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz
 from trunkline.model.arm_model import ArmModel
+from trunkline.recordings.trials.experiments import is_static
+from trunkline.recordings.trials.trial import Trial
 
 POSITION_SIGMA = 0.5e-3  # m, what a tracked position is trusted to
 ROTATION_SIGMA = np.radians(1.0)  # what a tracked orientation is trusted to, axis misalignment included
@@ -17,6 +20,11 @@ UNLIMITED = 2 * np.pi  # rad, of hinges without limits
 STEP_TOLERANCE = 1e-5  # relative step at convergence
 GRADIENT_TOLERANCE = 1e-3  # of the cost in units of sigma², with columns of unit length
 AT_A_TIME = 3  # markers: half the time of one by one, to the same poses
+QUIET_FRAMES = 3  # before the start: there the low-pass has not yet smeared the motion into the hold
+REACH = 2  # frames to either side for the velocity at the start; the low-pass leaves nothing finer
+SWAY_FRAMES = 8  # between the poses that tell how a hand moves the arm that it is about to let go
+LOOK_BACK = 30  # frames in which to look for a start pose that enough cameras saw
+MEASURED_SHARE = 0.6  # of the markers that must be measured in the frame of the start pose
 
 
 @dataclass
@@ -168,3 +176,62 @@ def _rotation_vector(matrix: np.ndarray) -> np.ndarray:
     mujoco.mju_mat2Quat(quaternion, matrix.ravel())
     mujoco.mju_quat2Vel(vector, quaternion, 1.0)
     return vector
+
+
+def start_frames(trial: Trial) -> tuple[int, int]:
+    """The last frame that is not compared, the arm being still held then, and the one of the pose to start from."""
+    static = is_static(trial.experiment)
+    last = 0 if static else max(int(np.searchsorted(trial.time, trial.start + 1e-9, side="right")) - 1, 0)
+    start_frame = _measured_frame(trial, last if trial.in_motion else max(last - QUIET_FRAMES, 0))
+    # of an arm in motion, pose and velocity hold in that frame
+    return (start_frame if trial.in_motion else last), start_frame
+
+
+def _measured_frame(trial: Trial, latest: int) -> int:
+    """The last frame up to `latest` in which enough markers were measured."""
+    for frame in range(latest, max(latest - LOOK_BACK, -1), -1):
+        if trial.measured[frame].mean() >= MEASURED_SHARE:
+            return frame
+    raise InputError(
+        f"trial {trial.name}: found {int(trial.measured[latest].sum())} of {len(trial.markers)} markers measured at "
+        f"its start, {trial.time[latest]:.2f} s, expected {MEASURED_SHARE:.0%} of them"
+    )
+
+
+def start_of(trial: Trial, model: mujoco.MjModel, frame: int) -> tuple[PoseFit, np.ndarray, np.ndarray]:
+    """The model's pose in `frame`, and joint angles, rad, and velocities, rad/s, to start from. Shape (n,)."""
+    fit = _fit_frame(trial, model, frame)
+    if trial.in_motion:
+        return fit, fit.qpos, _velocity(trial, model, frame)
+    if trial.swaying:
+        return fit, *_extrapolated(trial, model, frame)
+    return fit, fit.qpos, np.zeros(ArmModel(model).hinge_count)
+
+
+def measured_pose(trial: Trial, frame: int) -> tuple[np.ndarray, np.ndarray | None]:
+    """Positions (S, 3) of a frame, m, nan where not measured, and orientations (S, 4) if the trial has any."""
+    positions = np.where(trial.measured[frame][:, None], trial.positions[frame], np.nan)
+    return positions, None if trial.quaternions is None else trial.quaternions[frame]
+
+
+def _fit_frame(trial: Trial, model: mujoco.MjModel, frame: int) -> PoseFit:
+    return fit_pose(model, trial.markers, *measured_pose(trial, frame))
+
+
+def _velocity(trial: Trial, model: mujoco.MjModel, frame: int) -> np.ndarray:
+    """Joint velocities at a frame, rad/s, from the poses a few frames before and after it. Shape (nv,)."""
+    before, after = max(frame - REACH, 0), min(frame + REACH, len(trial.time) - 1)
+    turned = _fit_frame(trial, model, after).qpos - _fit_frame(trial, model, before).qpos
+    return turned / (trial.time[after] - trial.time[before])
+
+
+def _extrapolated(trial: Trial, model: mujoco.MjModel, frame: int) -> tuple[np.ndarray, np.ndarray]:
+    """Joint angles, rad, and velocities, rad/s, at the start of an arm that a hand still moves then: a parabola through
+    its poses up to `frame`, before the low-pass smears in what comes after. Each of shape (n,)."""
+    apart = min(SWAY_FRAMES, frame // 2)
+    if not apart:
+        return _fit_frame(trial, model, frame).qpos, _velocity(trial, model, frame)
+    frames = frame - apart * np.arange(3)
+    poses = np.stack([_fit_frame(trial, model, frame).qpos for frame in frames.tolist()])
+    parabola = np.polyfit(trial.time[frames] - trial.start, poses, 2)
+    return parabola[2], parabola[1]

@@ -11,6 +11,7 @@ from typing import Annotated
 import mujoco
 import numpy as np
 from pydantic import Field, PositiveFloat
+from scipy.stats import binom
 
 from trunkline.kinematics.dataset.columns import POSE
 from trunkline.kinematics.dataset.sampling import around_the_arm, in_sections, sections
@@ -158,6 +159,7 @@ class Reached:
                 "p95": np.quantile(position, 0.95) * 1e3,
                 "max": position.max() * 1e3,
             },
+            "median_interval_mm": median_interval(position * 1e3),
             "beyond_1pct": int(far.sum()),
             "beyond_1pct_unsaid": int((far & ~self.doubtful).sum()),
             "doubted": float(self.doubtful.mean()),
@@ -226,6 +228,13 @@ def score(
         "all_taut": taut.counts() | settled(model, ask, taut.targets).metrics(chain.length),
     }
     return on_model, drawn, sent
+
+
+def median_interval(values: np.ndarray) -> list[float]:
+    """The 95 % interval of the median of what `values` (N,) are drawn from: two of them, by their ranks."""
+    low, high = binom.ppf([0.025, 0.975], len(values), 0.5).astype(int)
+    ordered = np.sort(values)
+    return [float(ordered[max(low - 1, 0)]), float(ordered[min(high, len(values) - 1)])]
 
 
 def settled(model: mujoco.MjModel, ask: Ask, targets: np.ndarray) -> Reached:

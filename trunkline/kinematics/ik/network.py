@@ -48,7 +48,8 @@ class InverseKinematics(nn.Module):
     tip_half_range: torch.Tensor
 
     def __init__(self, width: int, inputs: np.ndarray, commands: np.ndarray, lengths: np.ndarray):
-        """Args: width: of each hidden layer; inputs (N, 7, 8 or 10), commands, lengths (N, K): the training set."""
+        """Args: width: of each hidden layer, half of it where the tip is foreseen; inputs (N, 7, 8 or 10), commands,
+        lengths (N, K): the training set."""
         super().__init__()
         raw = features(torch.tensor(inputs, dtype=torch.float64))
         buffers = {"mean": raw.mean(dim=0), "scale": 1 / raw.std(dim=0).clamp_min(1e-6)}
@@ -60,7 +61,7 @@ class InverseKinematics(nn.Module):
         tendons, columns = commands.shape[1], inputs.shape[1] - 7
         self.inputs = inputs.shape[1]
         self.layers = _perceptron(raw.shape[1], width, 2 * tendons)
-        self.tip_layers = _perceptron((2 if columns == 1 else columns) + tendons, width, 3)
+        self.tip_layers = _perceptron((2 if columns == 1 else columns) + tendons, max(1, width // 2), 3)
 
     def normalise(self, inputs: torch.Tensor) -> torch.Tensor:
         return (features(inputs) - self.mean) * self.scale

@@ -32,6 +32,9 @@ class TipLoss:
     excess: torch.Tensor
     push: torch.Tensor
 
+    def to(self, device: torch.device) -> "TipLoss":
+        return TipLoss(self.direct.to(device), self.excess.to(device), self.push.to(device))
+
     def __getitem__(self, rows: torch.Tensor | slice) -> "TipLoss":
         """Of these samples alone."""
         return TipLoss(self.direct[rows], self.excess[rows], self.push[rows])

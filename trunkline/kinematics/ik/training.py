@@ -2,11 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 import torch
 from pydantic import Field
+from pytorch_optimizer import SOAP
 from torch.optim.lr_scheduler import CosineAnnealingLR, LinearLR, SequentialLR
 
 from trunkline.compute.threads import thread_count
@@ -20,20 +21,29 @@ ROUNDING = 0.5e-3  # m, tip errors well under this count by their square, larger
 TIE = 0.02  # weight of plain command errors, which alone tie down how long a slack tendon is
 STRETCH = 1.0  # weight of errors of the lengths over the commands
 SLACK = 1e-3  # m, most by which slack tendons are paid out where the tip is foreseen: that moves it nowhere
-WARM_UP = 0.1  # share of the steps in which the learning rate rises from zero, while Adam learns each weight's scale
+WARM_UP = 0.1  # share of the steps in which the learning rate rises, while SOAP learns the gradients' scale
 LOWEST = 1e-3  # learning rate at both ends over the largest
 
 
 @dataclass
 class Training:
     """Attributes: width: of the hidden layers; epochs; batch: samples; learning_rate: the largest, after a warm-up,
-    from which a cosine takes it to a thousandth; seed: of weights and shuffling."""
+    from which a cosine takes it to a thousandth; seed: of weights and shuffling; device: where, "auto" for a card where
+    there is one."""
 
     width: Annotated[int, Field(ge=1, le=4096)]
     epochs: Annotated[int, Field(ge=1, le=10_000)]
     batch: Annotated[int, Field(ge=1, le=1_000_000)]
     learning_rate: Annotated[float, Field(gt=0, le=1)]
     seed: Seed
+    device: Literal["cpu", "cuda", "auto"] = "cpu"
+
+    def torch_device(self) -> torch.device:
+        """Raises: InputError: "cuda" without a card that torch can use."""
+        available = torch.cuda.is_available()
+        if self.device == "cuda" and not available:
+            raise InputError("train_ik.device: found cuda, but torch sees no such card, expected cpu or auto")
+        return torch.device("cuda" if available and self.device != "cpu" else "cpu")
 
 
 class TrainingSamples(NamedTuple):
@@ -52,6 +62,9 @@ class TrainingSamples(NamedTuple):
     pulls: torch.Tensor
     spare: torch.Tensor
     loss: TipLoss
+
+    def to(self, device: torch.device) -> "TrainingSamples":
+        return self._replace(**{name: part.to(device) for name, part in self._asdict().items()})
 
     def at(self, rows: torch.Tensor | slice) -> "TrainingSamples":
         """Of these samples alone."""
@@ -84,7 +97,7 @@ def train(
     training: Training,
     report: Callable[[int, float, float], None],
 ) -> InverseKinematics:
-    """Train on the samples where `is_train`, with Adam, on the tip error to first order.
+    """Train on the samples where `is_train`, with SOAP (Vyas et al. 2025), on the tip error to first order.
 
     The same machine and `TRUNKLINE_THREADS` give the same network; other ones sum in another order, so that last digits
     differ.
@@ -100,17 +113,19 @@ def train(
     torch.set_num_threads(thread_count())
     torch.manual_seed(training.seed)
     network = InverseKinematics(training.width, inputs[is_train], commands[is_train], lengths[is_train])
-    data = samples(network, inputs, commands, lengths, loss)
+    device = training.torch_device()
+    data = samples(network, inputs, commands, lengths, loss).to(device)
+    network = network.to(device)
     rows = torch.tensor(np.flatnonzero(is_train))
     others = data.at(torch.tensor(np.flatnonzero(~is_train)))
     shuffle = torch.Generator().manual_seed(training.seed)
     batches = len(rows) // training.batch
-    optimizer = torch.optim.Adam(network.parameters(), lr=training.learning_rate, fused=True)
+    optimizer = SOAP(network.parameters(), lr=training.learning_rate, weight_decay=0.0)
     schedule = warm_up_and_cosine(optimizer, training.epochs * batches)
     for epoch in range(1, training.epochs + 1):
         total = 0.0
         order = data.at(rows[torch.randperm(len(rows), generator=shuffle)])  # in a row: batches are parts of it
-        spares = torch.rand(len(rows), data.spare.shape[1], generator=shuffle)
+        spares = torch.rand(len(rows), data.spare.shape[1], generator=shuffle).to(device)
         for start in range(0, batches * training.batch, training.batch):
             batch = slice(start, start + training.batch)
             mean, tip = objective(network, order.at(batch), spares[batch])
@@ -127,7 +142,7 @@ def train(
         with torch.no_grad():
             deltas = network.unclipped(others.x)[0] - others.command
             report(epoch, total / batches, float(tip_distance(others.loss(deltas)).mean()))
-    return network.eval()
+    return network.cpu().eval()
 
 
 def objective(

@@ -11,6 +11,8 @@ from pydantic import Field
 from trunkline.errors import InputError
 from trunkline.model.arm.cad import CadArm
 from trunkline.model.arm.mjcf import Actuation, Solver
+from trunkline.model.arm_model import ArmModel
+from trunkline.model_files import read_spec
 
 CENTER = "_center"  # ends the name of a tracked point's site
 
@@ -33,14 +35,23 @@ class FromFile:
             raise InputError(f"build_mjcf.arm.file: found {self.file}, expected a file in {models}, which DVC watches")
         if not path.is_file():
             raise InputError(f"build_mjcf.arm.file: {path}: no such file")
-        try:
-            spec = mujoco.MjSpec.from_file(str(path))
-            model = spec.compile()
-        except ValueError as error:
-            raise InputError(f"{path}: not a model that MuJoCo reads: {str(error).splitlines()[0]}") from error
-        if fault := _missing(model) or _unlike(model):
-            raise InputError(f"{path}: {fault}")
-        return CadArm(spec, _metrics(model))
+        spec = read_arm(path)
+        return CadArm(spec, _metrics(spec.compile()))
+
+
+def read_arm(path: Path) -> mujoco.MjSpec:
+    """The MJCF at `path`, of an arm with what later stages look for.
+
+    Raises:
+        InputError: there is none, MuJoCo refuses it, or one line that says what it lacks.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such file, expected a model in MJCF")
+    spec = read_spec(path)
+    model = spec.compile()
+    if fault := _missing(model) or _unlike(model):
+        raise InputError(f"{path}: {fault}")
+    return spec
 
 
 def _missing(model: mujoco.MjModel) -> str | None:
@@ -69,14 +80,16 @@ def _unlike(model: mujoco.MjModel) -> str | None:
     """Where the model is none of a chain that hangs from `base` by hinges in pairs."""
     if not model.njnt:
         return "found no hinges, expected two on each unit"
+    count = ArmModel(model).hinge_count  # those of Maxwell branches, which a fitted model has, come behind
     for body in range(1, model.nbody):
-        name, joints = model.body(body).name, model.body_jntnum[body]
-        types = model.jnt_type[model.body_jntadr[body] :][:joints]
+        name, hinges = model.body(body).name, np.flatnonzero(model.jnt_bodyid[:count] == body)
+        joints, types = len(hinges), model.jnt_type[hinges]
         if joints not in (0, 2) or np.any(types != mujoco.mjtJoint.mjJNT_HINGE):
             return f"body {name!r}: found {joints} joints, expected two hinges, or none to be part of its parent"
-    if np.any(model.jnt_stiffness <= 0) or np.any(model.dof_damping <= 0):
-        weak = int(np.flatnonzero((model.jnt_stiffness <= 0) | (model.dof_damping <= 0))[0])
-        return f"joint {model.joint(weak).name!r}: found no stiffness or no damping, expected a guess to begin with"
+    weak = np.flatnonzero((model.jnt_stiffness[:count] <= 0) | (model.dof_damping[:count] <= 0))
+    if len(weak):
+        name = model.joint(int(weak[0])).name
+        return f"joint {name!r}: found no stiffness or no damping, expected a guess to begin with"
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     mount = data.site("base_center")

@@ -16,7 +16,7 @@ from trunkline.frames import STANDARD_GRAVITY
 from trunkline.model.arm.geometry import ChainGeometry
 from trunkline.model.arm.material import UnitProperties
 from trunkline.model.arm.tendons import Route
-from trunkline.model.arm_model import BACKLASH, PRELOAD, RATE_LIMIT, SECTIONS, WINDING
+from trunkline.model.arm_model import BACKLASH, PRELOAD, RATE_LIMIT, SECTIONS, TIP_LOAD, WINDING
 
 TENDON_RGBA = (0.15, 0.15, 0.15, 1)
 LONGEST_DEAD_TIME = 0.2  # s; what a motor remembers of its commands
@@ -153,7 +153,7 @@ def build_spec(
 def _add_load(parent, mass: float, chain: ChainGeometry) -> None:
     """A ball at the tip, half as wide as the arm there."""
     radius = chain.widths[-1] / 4
-    body = parent.add_body(name="tip_load", pos=[0, 0, -chain.lengths[-1]])
+    body = parent.add_body(name=TIP_LOAD, pos=[0, 0, -chain.lengths[-1]])
     body.explicitinertial, body.mass, body.ipos, body.inertia = True, mass, [0, 0, 0], [0.4 * mass * radius**2] * 3
     body.add_geom(
         name="tip_load_geom", type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[radius, 0, 0], contype=0, conaffinity=0, mass=0,

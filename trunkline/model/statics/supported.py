@@ -18,11 +18,13 @@ _FORCES_OFF = (
     mujoco.mjtDisableBit.mjDSBL_GRAVITY,
     mujoco.mjtDisableBit.mjDSBL_ACTUATION,
 )
+RIGHT_ANGLE = 1.0  # deg by which a unit's two hinges may be off; more is another joint than is drawn
 
 
 def require_supported(model: mujoco.MjModel) -> None:
     """Raise InputError, one line with the element's name, if `model` has a static force that the chain lacks."""
     _require_plain_options(model)
+    _require_no_fluid(model)
     _require_unbranched_hinges(model)
     _require_no_contacts(model)
     _require_site_tendons(model)
@@ -35,12 +37,21 @@ def _require_plain_options(model: mujoco.MjModel) -> None:
             raise InputError(f"model: found {count} {what}, expected none")
     for bit in _FORCES_OFF:
         if model.opt.disableflags & bit:
-            raise InputError(f"model: option flag: found {bit.name[8:].lower()} disabled, expected enabled")
+            name = bit.name.removeprefix("mjDSBL_").lower()
+            raise InputError(f"model: option flag: found {name} disabled, expected enabled")
     if model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_DIAGEXACT:
         raise InputError("model: option flag: found diagexact enabled, expected disabled")
     if np.any(model.body_gravcomp):
         name = model.body(int(np.flatnonzero(model.body_gravcomp)[0])).name
         raise InputError(f"model: body {name!r}: found gravity compensation, expected none")
+
+
+def _require_no_fluid(model: mujoco.MjModel) -> None:
+    """In wind every shape at rest bears a force; a medium that rests has none, nor one without density and
+    viscosity."""
+    if np.any(model.opt.wind) and (model.opt.density or model.opt.viscosity):
+        wind = " ".join(f"{value:g}" for value in model.opt.wind)
+        raise InputError(f"model: option wind: found {wind}, expected 0 0 0: shapes at rest are solved without wind")
 
 
 def _require_unbranched_hinges(model: mujoco.MjModel) -> None:
@@ -61,11 +72,19 @@ def _require_unbranched_hinges(model: mujoco.MjModel) -> None:
         if not np.allclose(model.jnt_pos[first], model.jnt_pos[first + 1], atol=1e-12):
             actual = f"{model.jnt_pos[first]} and {model.jnt_pos[first + 1]}"
             raise InputError(f"model: body {name!r}: found hinges at {actual}, expected one point")
+        _require_right_angle(model, name, model.jnt_axis[first : first + 2])
         parent = model.body_weldid[model.body_parentid[body]]
         expected = units[index - 1] if index else 0
         if parent != expected:
             actual, wanted = model.body(parent).name, model.body(expected).name
             raise InputError(f"model: body {name!r}: found parent {actual!r}, expected {wanted!r}: no branches")
+
+
+def _require_right_angle(model: mujoco.MjModel, body: str, axes: np.ndarray) -> None:
+    apart = np.degrees(np.arccos(np.clip(abs(axes[0] @ axes[1]), 0, 1)))
+    if 90 - apart > RIGHT_ANGLE:
+        expected = "expected axes at right angles to each other"
+        raise InputError(f"model: body {body!r}: found hinges about axes {apart:.3g}° apart, {expected}")
 
 
 def _require_no_contacts(model: mujoco.MjModel) -> None:
@@ -125,7 +144,9 @@ def _require_pulling_actuators(model: mujoco.MjModel) -> None:
                 "expected a position actuator: kp, bias 0 -kp, gear 1"
             )
         low, high = model.actuator_forcerange[actuator]
-        if not model.actuator_forcelimited[actuator] or high > 0 or low >= 0:
+        if not model.actuator_forcelimited[actuator]:
+            raise InputError(f"model: actuator {name!r}: found forcelimited off, expected forcerange -F 0: it pulls")
+        if high > 0 or low >= 0:
             raise InputError(f"model: actuator {name!r}: found force range {low:g} {high:g}, expected -F 0: it pulls")
     pulled = model.actuator_trnid[:, 0] if model.nu else np.zeros(0, int)
     for tendon in ArmModel(model).cables:

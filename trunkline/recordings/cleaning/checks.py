@@ -66,8 +66,11 @@ def deciding(items: Iterable[Item], split: Callable[[Item], str]) -> tuple[list[
     return (chosen, False) if chosen else (items, bool(items))
 
 
-def in_order(stamps: np.ndarray, disorder: float, where: str, findings: Findings) -> np.ndarray:
-    """Rows in the order of time, each instant once; refused if time runs back by more than `disorder` s."""
+def in_order(
+    stamps: np.ndarray, disorder: float, where: str, findings: Findings, at_once: bool = False
+) -> np.ndarray:
+    """Rows in the order of time; refused if time runs back by more than `disorder` s. Each instant once, unless several
+    may come `at_once`."""
     back = np.maximum.accumulate(stamps) - stamps
     if back.max(initial=0) > disorder * 1e9:
         worst = int(np.argmax(back > disorder * 1e9))
@@ -76,6 +79,11 @@ def in_order(stamps: np.ndarray, disorder: float, where: str, findings: Findings
     rows = np.argsort(stamps, kind="stable")
     if np.any(back > 0):
         findings.repairs.append(f"{int(np.sum(back > 0))} frames out of order sorted by their stamps")
+    return rows if at_once else instants(stamps, rows, findings)
+
+
+def instants(stamps: np.ndarray, rows: np.ndarray, findings: Findings) -> np.ndarray:
+    """Rows in the order of time, each instant once."""
     fresh = np.diff(stamps[rows], prepend=stamps[rows[0]] - 1) > 0
     if not fresh.all():
         findings.repairs.append(f"{int(np.sum(~fresh))} frames with a stamp that was there already dropped")

@@ -35,9 +35,10 @@ def align_clocks(raw_trials: list[RawTrial], findings: list[Findings], longest_l
     """Give every raw trial the offset of its motors' clock.
 
     By log times it is each trial's own. The arm's motion, in whose offset its lag is, checks them: no arm is ahead of
-    its tendons, or far behind them. It decides where log times are missing or impossible, with a warning that the lag
-    is included. The session's common offset comes from the split `identify` alone, so that other trials stay unused
-    until they validate; from all, with a warning, where `identify` gives none.
+    its tendons, or far behind them. It decides, with a warning that the lag is included, where log times are missing,
+    or where those of one trial alone are impossible; where those of several agree, it only warns. The session's common
+    offset comes from the split `identify` alone, so that other trials stay unused until they validate; from all, with
+    a warning, where `identify` gives none.
 
     Args:
         longest_lag: s, by which the arm may move after its tendons, and lags of trials may differ.
@@ -76,8 +77,14 @@ def _agreed(
         tells = f"clock: no trial of the split identify tells the motors' offset of {offset:.3f} s"
         remarks.append(f"{tells}; it is of trials of other splits")
     lag = float(np.median([lags[name] for name in deciding(lags, splits.__getitem__)[0]])) if lags else None
-    if logged and (lag is None or -AHEAD <= lag <= longest_lag):
-        uncertain = [record.by_log_times.uncertainty for record in findings if record.by_log_times]
+    possible = lag is None or -AHEAD <= lag <= longest_lag
+    uncertain = [record.by_log_times.uncertainty for record in findings if record.by_log_times]
+    steady = len(chosen) > 1 and logged and spread <= max(float(np.median(uncertain)), LEAST)
+    if logged and (possible or steady):
+        if not possible:
+            moves = f"by its motion the arm would move {lag:+.3f} s after its tendons, expected {-AHEAD:g} to"
+            stays = f"the log times of {len(chosen)} trials agree on {offset:.3f} s, which is used"
+            remarks.append(f"clock: {moves} {longest_lag:g} s; {stays}: are the commands those that motors had?")
         return MotorClock(offset, spread, float(np.median(uncertain)), "log times", lag), remarks
     why = "log times tell nothing of it"
     if lag is not None:

@@ -97,7 +97,8 @@ def unbroken(time: np.ndarray, positions: np.ndarray) -> slice:
         time: (T,) s, with what could be counted put back. positions: (T, S, 3) m, NaN where not seen.
     """
     passed = np.diff(time)
-    steps = np.linalg.norm(np.diff(positions, axis=0), axis=2) * (np.median(passed) / passed)[:, None]
+    # a frame that was stamped late is followed too soon, which is no speed
+    steps = np.linalg.norm(np.diff(positions, axis=0), axis=2) * np.minimum(np.median(passed) / passed, 1.0)[:, None]
     edges = [0]
     for after in range(1, len(steps) - 1):
         nearby = np.r_[steps[max(after - SIDE, 0) : after], steps[after + 1 : after + 1 + SIDE]]

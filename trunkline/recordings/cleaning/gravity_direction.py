@@ -31,10 +31,15 @@ def check_gravity_direction(
         return None, _check_hanging(raw_trials), False
     identifying = [raw for raw in tilted if raw.split == IDENTIFY]
     up, remark = _by_tilts(identifying) if identifying else (None, None)
-    if len(identifying) == len(tilted) or up is not None or (identifying and remark is None):
-        return up, remark, False
-    up, by_all = _by_tilts(tilted)
-    return (None, remark, False) if up is None and identifying else (up, by_all, up is not None)
+    by_others = False
+    if len(identifying) < len(tilted) and up is None and not (identifying and remark is None):
+        up, by_all = _by_tilts(tilted)
+        by_others = up is not None
+        remark = by_all if by_others or not identifying else remark
+    if up is not None and not possible_axes(raw_trials, measured_base)[np.argmax(AXES @ up)]:
+        contradiction = f"levels would fit {_show(up)}, along which released arms do not hang"
+        return None, f"up: {contradiction}: check `frame.up`, `base` and the levels in session.yaml", False
+    return up, remark if remark is not None else _check_hanging(raw_trials), by_others
 
 
 def _by_tilts(static: list[RawTrial]) -> tuple[np.ndarray | None, str | None]:
@@ -51,6 +56,25 @@ def _by_tilts(static: list[RawTrial]) -> tuple[np.ndarray | None, str | None]:
     if misfits[best] < FITS and misfits[second] > OFF and np.ptp(np.degrees(levels)) >= SPREAD:
         return AXES[best], f"{problem}, {np.degrees(misfits[best]):.1f}° with {_show(AXES[best])}, which was taken"
     return None, f"{problem}, and no other axis fits: check the levels, `frame.up` and `base` in session.yaml"
+
+
+def possible_axes(raw_trials: list[RawTrial], measured_base: bool = True) -> np.ndarray:
+    """Which of `AXES` may be up, as tilts and releases tell. Shape (6,).
+
+    Levels exclude axes where they fit the declared vertical and differ enough; releases, axes from which arms come to
+    rest far from hanging.
+    """
+    possible = np.ones(len(AXES), bool)
+    tilted = [raw for raw in raw_trials if EXPERIMENTS[raw.experiment].level is TILT and raw.level is not None]
+    levels = np.radians([raw.level for raw in tilted if raw.level is not None])
+    if tilted and measured_base and np.ptp(np.degrees(levels)) >= SPREAD:
+        z = np.array([_axis(raw) for raw in tilted])
+        if _misfit(z, tilted[0].up, levels) <= OFF:
+            possible &= np.array([_misfit(z, axis, levels) <= OFF for axis in AXES])
+    hanging = [_hang(raw) for raw in raw_trials if EXPERIMENTS[raw.experiment].hangs]
+    if hanging:
+        possible &= np.array([_from_hanging(np.array(hanging), axis) < LIES for axis in AXES])
+    return possible
 
 
 def check_levels(raw_trials: list[RawTrial], findings: list[Findings]) -> None:
@@ -79,13 +103,18 @@ def _check_hanging(raw_trials: list[RawTrial]) -> str | None:
     if not hanging:
         return None
     down, up = np.array(hanging), raw_trials[0].up
-    angle = np.median(np.arccos(np.clip(-down @ up, -1, 1)))
-    others = [np.median(np.arccos(np.clip(-down @ axis, -1, 1))) for axis in AXES]
+    angle = _from_hanging(down, up)
+    others = [_from_hanging(down, axis) for axis in AXES]
     best = int(np.argmin(others))
     if angle < LIES or others[best] > HANGS:
         return None
     problem = f"released arms come to rest {np.degrees(angle):.0f}° from hanging with {_show(up)}"
     return f"up: {problem}, {np.degrees(others[best]):.0f}° with {_show(AXES[best])}: check `frame.up` in session.yaml"
+
+
+def _from_hanging(down: np.ndarray, up: np.ndarray) -> float:
+    """Median angle, rad, between the directions (N, 3) in which arms come to rest and the opposite of `up`."""
+    return float(np.median(np.arccos(np.clip(-down @ up, -1, 1))))
 
 
 def _hang(raw: RawTrial) -> np.ndarray:

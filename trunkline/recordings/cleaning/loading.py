@@ -8,6 +8,7 @@ import numpy as np
 from trunkline.errors import InputError
 from trunkline.recordings.cleaning.bag_time import logged_offset
 from trunkline.recordings.cleaning.checks import Findings, TrialLimits
+from trunkline.recordings.cleaning.described_arm import Places
 from trunkline.recordings.cleaning.dropped_frames import longest_unbroken, repair_dropped_frames
 from trunkline.recordings.cleaning.invalid_samples import valid_samples
 from trunkline.recordings.cleaning.label_swaps import repair_label_swaps
@@ -23,11 +24,14 @@ from trunkline.recordings.trials.raw_trial import RawTrial
 
 
 def load_raw_trials(
-    folder: Path, session: Session, limits: TrialLimits
+    folder: Path, session: Session, limits: TrialLimits, arm: Places | None = None
 ) -> Iterator[tuple[TrialEntry, RawTrial | InputError, Findings]]:
     """Read trial by trial. A trial that cannot be used comes as the error that says why.
 
     Every raw trial has the same markers: those that session.yaml maps, or all that any log shows.
+
+    Args:
+        arm: the described one, by whose size the unit is checked; None where nobody describes it.
     """
     logs: dict[str, LogSource | InputError] = {}
     read: list[tuple[LogSource, Stretch] | InputError] = []
@@ -46,7 +50,7 @@ def load_raw_trials(
         except InputError as error:
             read.append(error)
     usable = [(trial, *some) for trial, some in zip(session.trials, read, strict=True) if isinstance(some, tuple)]
-    reference = reference_of(session, usable)
+    reference = reference_of(session, usable, arm)
     for trial, some, record in zip(session.trials, read, findings, strict=True):
         if isinstance(some, InputError):
             yield trial, some, record
@@ -100,7 +104,7 @@ def _raw_trial(
             stretch = stretch.part(part)
     motors = read_motors(source, session, stretch, trial.experiment, limits, where, findings)
     if EXPERIMENTS[trial.experiment].needs_motors:
-        check_motors(source, session, reference.joint_topics, motors, stretch, limits, where)
+        check_motors(source, session, reference.joint_topics, motors, stretch, trial.experiment, limits, where)
     raw = RawTrial(
         name=trial.name,
         experiment=trial.experiment,

@@ -9,11 +9,15 @@ from trunkline.recordings.cleaning.checks import Findings, TrialLimits, in_order
 from trunkline.recordings.cleaning.trial_window import Stretch
 from trunkline.recordings.logs.joint_stream import JointStream
 from trunkline.recordings.logs.messages import JOINTS
-from trunkline.recordings.session.session import Session
+from trunkline.recordings.session.session import MotorEntry, Session
 from trunkline.recordings.session.source import LogSource
-from trunkline.recordings.trials.experiments import is_held
+from trunkline.recordings.signals.held import OFTEN, to_and_fro, with_corners
+from trunkline.recordings.trials.experiments import EXPERIMENTS, is_held
 
+Series = tuple[np.ndarray, np.ndarray]  # times (T,) s and numbers (T, K)
 ROLES = ("command", "tendon position")
+NEAR_TURN = 0.2  # turns, by which an encoder that is whole turns off its command may differ from that
+NO_WORD = 1.0  # s before an arm at rest, from which on it is said that the last command holds
 HISTORY = 60.0  # s before an arm at rest under its motors in which its last motion is looked for
 
 
@@ -39,7 +43,7 @@ def read_motors(
         InputError: the tendons of a topic are not those of session.yaml, or of the other topic.
     """
     streams = [source.commands, source.tendon_positions]
-    tendons = next((stream.names for stream in streams if stream is not None), ())
+    tendons = _tendons([stream.names for stream in streams if stream is not None])
     mapped, coupling = session.tendons, None
     if session.tendons is not None:
         tendons = tuple(session.tendons.values())
@@ -47,26 +51,40 @@ def read_motors(
         mapped = {name: name for name in session.motors}
         tendons, coupling = session.coupling()
     recorder = by_recorder(source, session)
-    arrays = []
+    arrays, counts = [], None
     for stream, role in zip(streams, ROLES, strict=True):
         if stream is None or not len(stream.stamps):
             arrays += [np.empty(0), np.empty((0, len(tendons)))]
             continue
         columns = _columns(stream, mapped, tendons, f"{where}: {role} topic")
+        findings.repairs += stream.notes
         stamps = dated(stream, recorder, stretch)
         if recorder and session.clock != "log":
             findings.repairs.append(f"{role} messages dated by the recorder's clock, as not all have stamps")
-        rows = in_order(stamps, limits.disorder, f"{where}: {role} topic", findings)
-        seconds = (stamps[rows] - stretch.epoch) * 1e-9
-        pulls = stream.positions[rows][:, columns]
+        rows = in_order(stamps, limits.disorder, f"{where}: {role} topic", findings, at_once=True)
+        series = _together((stamps[rows] - stretch.epoch) * 1e-9, stream, rows, columns, role, findings)
+        earlier = HISTORY if role == "command" and is_held(experiment) else 0.0
+        begin, end = -limits.clock_offset - earlier, stretch.time[-1] + limits.clock_offset
+        whole = [_near(_finite(some, role, findings), begin, end, role == "command") for some in series]
+        if role == "command":
+            scales = np.ones(len(columns)) if coupling is None else np.abs(coupling).max(axis=0)
+            scales = [scales] if len(series) == 1 else scales[:, None]
+            if EXPERIMENTS[experiment].needs_motors:
+                for (seconds, numbers), scale in zip(whole, scales, strict=True):
+                    _one_publisher(seconds, numbers * scale, f"{where}: {stream.topic}")
+                last = max((some[0][-1] for some in whole if len(some[0])), default=0.0)
+                if is_held(experiment) and last < -NO_WORD:
+                    findings.repairs.append(f"commands end {-last:.1f} s before the poses: the last holds")
+            whole = [with_corners(*some, session.commands) for some in whole]
+        seconds, pulls = _side_by_side(whole)
+        if session.motors is not None:
+            if role == "command":
+                counts = seconds, pulls
+            else:
+                pulls = _unwrapped(seconds, pulls, session.motors, counts, findings)
         if coupling is not None:
             pulls = pulls @ coupling.T
-        earlier = HISTORY if role == "command" and is_held(experiment) else 0.0
-        near = (seconds > -limits.clock_offset - earlier) & (seconds < stretch.time[-1] + limits.clock_offset)
-        finite = np.isfinite(pulls).all(axis=1)
-        if not finite.all():
-            findings.repairs.append(f"{int(np.sum(~finite))} {role} messages that are not finite dropped")
-        arrays += [seconds[near & finite], pulls[near & finite]]
+        arrays += [seconds, pulls]
     return MotorSignals(tuple(tendons), *arrays)
 
 
@@ -76,6 +94,7 @@ def check_motors(
     joint_topics: tuple[str, ...],
     motors: MotorSignals,
     stretch: Stretch,
+    experiment: str,
     limits: TrialLimits,
     where: str,
 ) -> None:
@@ -87,11 +106,13 @@ def check_motors(
     kind = ", ".join(JOINTS)
     others = f"{', '.join(joint_topics) or 'none'} ({kind})"
     for key in ("commands", "tendon_positions"):
-        name = getattr(session.topics, key)
-        if name is not None and name not in joint_topics:
+        name = next((name for name in session.topics.of(key) if name not in joint_topics), None)
+        if name is not None:
             raise InputError(f"{where}: topics.{key}: found {name!r}, which no log has, expected one of: {others}")
     streams = (source.commands, source.tendon_positions)
     within = [bool(np.any(t > -limits.clock_offset)) for t in (motors.command_time, motors.tendon_time)]
+    if is_held(experiment) and len(motors.command_time):  # what was sent before the poses holds
+        within[0] = True
     lost = [stream for stream, some in zip(streams, within, strict=True) if stream and len(stream.stamps) and not some]
     if any(within) and not lost:
         return
@@ -119,11 +140,109 @@ def dated(stream: JointStream, recorder: bool, stretch: Stretch) -> np.ndarray:
     return stream.log_times + (stretch.epoch - stretch.logged) if recorder else stream.stamps
 
 
+def _finite(series: Series, role: str, findings: Findings) -> Series:
+    finite = np.isfinite(series[1]).all(axis=1)
+    if not finite.all():
+        findings.repairs.append(f"{int(np.sum(~finite))} {role} messages that are not finite dropped")
+    return series[0][finite], series[1][finite]
+
+
+def _near(series: Series, begin: float, end: float, holds: bool) -> Series:
+    """What lies between two times, s, and, of what holds, the last before."""
+    seconds, numbers = series
+    near = (seconds > begin) & (seconds < end)
+    if holds and (before := np.flatnonzero(seconds <= begin)).size:
+        near[before[-1]] = True
+    return seconds[near], numbers[near]
+
+
+def _tendons(names: list[tuple[str, ...]]) -> tuple[str, ...]:
+    """Those of a topic, of two of the one without further joints."""
+    first = next(iter(names), ())
+    return names[-1] if len(names) > 1 and set(names[-1]) < set(first) else first
+
+
+def _together(
+    seconds: np.ndarray, stream: JointStream, rows: np.ndarray, columns: list[int], role: str, findings: Findings
+) -> list[Series]:
+    """Times (T,) s and numbers (T, K) of all `columns`; where messages hold some of them, of each by itself, (T, 1)."""
+    values, sent = stream.positions[rows][:, columns], stream.sent[rows][:, columns]
+    some = sent.any(axis=1)  # others are of further joints
+    seconds, values, sent = seconds[some], values[some], sent[some]
+    if sent.all():
+        _, first = np.unique(seconds, return_index=True)
+        if len(first) < len(seconds):
+            dropped = f"{len(seconds) - len(first)} frames with a stamp that was there already dropped"
+            findings.repairs.append(dropped)
+        return [(seconds[first], values[first])]
+    findings.repairs.append(f"{role} messages that hold some of {len(columns)} motors each put together")
+    series = []
+    for column in range(len(columns)):
+        at = np.flatnonzero(sent[:, column])
+        _, first = np.unique(seconds[at], return_index=True)
+        series.append((seconds[at[first]], values[at[first]][:, [column]]))
+    return series
+
+
+def _side_by_side(series: list[Series]) -> Series:
+    """Times and columns of all, on straight lines between their samples, from when each has one."""
+    if len(series) == 1:
+        return series[0]
+    if not all(len(time) for time, _ in series):
+        return np.empty(0), np.empty((0, len(series)))
+    instants = np.unique(np.concatenate([time for time, _ in series]))
+    instants = instants[instants >= max(time[0] for time, _ in series)]
+    return instants, np.stack([np.interp(instants, time, column[:, 0]) for time, column in series], axis=1)
+
+
+def _unwrapped(
+    seconds: np.ndarray,
+    counts: np.ndarray,
+    motors: dict[str, MotorEntry],
+    commanded: tuple[np.ndarray, np.ndarray] | None,
+    findings: Findings,
+) -> np.ndarray:
+    """Measured angles (T, K) at times (T,) s of encoders that count one turn, without its jumps and whole turns off the
+    commands (times (Tc,) s, angles (Tc, K))."""
+    counts = counts.copy()
+    for column, (name, motor) in enumerate(motors.items()):
+        turn, angles = motor.full_turn, counts[:, column]
+        good = np.isfinite(angles)
+        if turn is None or not good.any() or np.ptp(angles[good]) > turn:
+            continue
+        jumps = int(np.sum(np.abs(np.diff(angles[good])) > turn / 2))
+        angles = np.unwrap(angles[good], period=turn)
+        off = 0.0
+        if commanded is not None and len(commanded[0]):
+            sent = np.interp(seconds[good], commanded[0], commanded[1][:, column])
+            off = float(np.median(angles - sent)) / turn
+        turns = round(off)
+        if not jumps and (not turns or abs(off - turns) > NEAR_TURN):
+            continue
+        counts[good, column] = angles - turns * turn
+        what = f"{jumps} jumps by a turn" if jumps else f"{turns} turns"
+        findings.repairs.append(f"{name!r}: {what} of an encoder that counts one turn taken out of what is measured")
+    return counts
+
+
+def _one_publisher(seconds: np.ndarray, pulls: np.ndarray, where: str) -> None:
+    """Refuse commands (T, K) m at times (T,) s of two publishers, which no motor could follow."""
+    places = to_and_fro(seconds, pulls)
+    if len(places) < OFTEN:
+        return
+    begin = seconds[places[0][0] + 1]
+    far = 1e3 * max(size for *_, size in places)
+    raise InputError(
+        f"{where}: commands jump to and fro {len(places)} times, by up to {far:.3g} mm, first at {begin:.2f} s, and "
+        "are back with the next message or two: do two publishers write to the topic? expected one"
+    )
+
+
 def _columns(stream: JointStream, mapped: dict[str, str] | None, tendons: tuple[str, ...], where: str) -> list[int]:
     """Where each of `tendons` is in the stream. With a map, a topic may carry either name, and further joints."""
     names = list(stream.names)
     if mapped is None:
-        if set(names) != set(tendons):
+        if not set(tendons) <= set(names):
             expected = f"expected {', '.join(tendons)} as in the other topic"
             raise InputError(f"{where}: found {', '.join(names)}, {expected}")
         return [names.index(name) for name in tendons]

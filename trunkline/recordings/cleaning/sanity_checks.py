@@ -13,7 +13,9 @@ import numpy as np
 from pydantic import Field
 
 from trunkline.frames import rotation_from_wxyz
+from trunkline.recordings.cleaning.attitudes import contradictions, turned_bases
 from trunkline.recordings.cleaning.checks import Findings, deciding
+from trunkline.recordings.cleaning.described_arm import Places, against_arm
 from trunkline.recordings.cleaning.pulls import check_pulls, encoder_zeros
 from trunkline.recordings.cleaning.usual_distances import usual_distances
 from trunkline.recordings.signals.smoothing import fill_gaps
@@ -46,13 +48,21 @@ class SanityLimits:
 
 
 def check_sanity(
-    raw_trials: list[RawTrial], findings: list[Findings], base: str | None, settings: SanityLimits
+    raw_trials: list[RawTrial],
+    findings: list[Findings],
+    base: str | None,
+    settings: SanityLimits,
+    arm: Places | None = None,
+    unit: str = "m",
 ) -> list[str]:
     """Add to each raw trial's findings what cannot be true of it; returned: what cannot be true of the session.
 
     What is usual is what the raw trials of the split `identify` say, or all where there are none of it.
 
-    Args: base: the name of the body that marks the mount, None where none does.
+    Args:
+        base: the name of the body that marks the mount, None where none does.
+        arm: the described one, None where nobody describes it.
+        unit: of the logs' positions.
     """
     chosen, _ = deciding(raw_trials, lambda raw: raw.split)
     usual = usual_distances([_bodies(raw) for raw in chosen])
@@ -63,7 +73,11 @@ def check_sanity(
         record.faults += _misplaced(raw, usual, names, settings.distance * length)
         record.faults += _motion(raw, length, settings.still)
         record.faults += check_pulls(raw, length, idle, settings.pull, zeros)
-    faults = _order(raw_trials[0].markers, usual) + _loose(chosen, usual, settings, length)
+    if base is not None:
+        for record, turned in zip(findings, turned_bases(raw_trials, base), strict=True):
+            record.faults += turned
+    faults = contradictions(chosen) or ([] if arm is None else against_arm(chosen, arm, base, unit))
+    faults += _order(raw_trials[0].markers, usual) + _loose(chosen, usual, settings, length)
     return faults if base is None else faults + _base_at_rest(chosen, base)
 
 

@@ -7,6 +7,7 @@ from typing import Literal
 from trunkline.errors import InputError
 from trunkline.recordings.cleaning.checks import Findings
 from trunkline.recordings.cleaning.clock_offset import MotorClock, align_clocks, set_gravity_direction
+from trunkline.recordings.cleaning.described_arm import Places
 from trunkline.recordings.cleaning.sanity_checks import SanityLimits, check_sanity
 from trunkline.recordings.session.session import FixedBase, Session, TrialEntry
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_stepwise
@@ -38,10 +39,13 @@ def check_session(
     plausible: SanityLimits,
     refused_trials: Refusal,
     where: str,
+    arm: Places | None = None,
 ) -> CheckedSession:
     """Compare a session's raw trials, as `load_raw_trials` gives them, and settle what they have in common.
 
-    Args: where: the session's folder, for messages.
+    Args:
+        where: the session's folder, for messages.
+        arm: the described one, None where nobody describes it.
 
     Raises:
         InputError: a trial is refused and none may be left out, none is left, or the whole session cannot be true.
@@ -61,7 +65,9 @@ def check_session(
             gathered.findings.append(record)
     base = None if isinstance(session.base, FixedBase) else session.base
     raw_trials, findings = gathered.raw_trials, gathered.findings
-    session_faults = check_sanity(raw_trials, findings, base, plausible) if raw_trials else []
+    session_faults = []
+    if raw_trials:
+        session_faults = check_sanity(raw_trials, findings, base, plausible, arm, session.frame.unit)
     if plausible.otherwise == "refuse":
         for raw, record in zip(raw_trials, findings, strict=True):
             if record.faults:
@@ -74,7 +80,7 @@ def check_session(
     if not gathered.raw_trials:
         first = next(iter(gathered.refused.values()))
         raise InputError(f"{where}: all {len(gathered.refused)} trials refused, the first: {first}")
-    missing = _missing(gathered.raw_trials)
+    missing = _missing(gathered.raw_trials) + _unlisted(session)
     for record in gathered.findings:
         record.warnings += record.faults + session_faults + missing
     set_gravity_direction(gathered.raw_trials, gathered.findings, session)
@@ -100,6 +106,15 @@ def require_enough(gathered: CheckedSession, planned: list[TrialEntry]) -> None:
         if trial.name in gathered.refused and (trial.experiment, trial.split) not in left:
             expected = f"expected another {trial.experiment} of the split {trial.split} to go on with"
             raise InputError(f"{gathered.refused[trial.name]}; {expected}")
+
+
+def _unlisted(session: Session) -> list[str]:
+    """The logs beside those of the trials, in a sentence."""
+    logs = session.unlisted
+    if not logs:
+        return []
+    names = ", ".join(logs[:3]) + (f" and {len(logs) - 3} more" if len(logs) > 3 else "")
+    return [f"logs: {names} in the folder, but in no trial of session.yaml: left out"]
 
 
 def _missing(raw_trials: list[RawTrial]) -> list[str]:

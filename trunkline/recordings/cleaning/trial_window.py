@@ -7,12 +7,16 @@ from scipy.spatial.transform import Rotation
 
 from trunkline.errors import InputError
 from trunkline.frames import wxyz_from_rotation
-from trunkline.recordings.cleaning.checks import Findings, TrialLimits, in_order
+from trunkline.recordings.cleaning.checks import Findings, TrialLimits, in_order, instants
 from trunkline.recordings.cleaning.clocks import check_clocks
 from trunkline.recordings.logs.pose_stream import PoseStream
 from trunkline.recordings.session.session import FixedBase, Session, TrialEntry
 from trunkline.recordings.session.source import LogSource
 from trunkline.recordings.signals.clock import FrameFit, fit_frames
+from trunkline.recordings.signals.even_times import even_times, is_uneven
+from trunkline.recordings.trials.experiments import is_stepwise
+
+WHOLE = 0.9  # share of bodies that are in a frame, below which frames are of different bodies, at times of their own
 
 
 @dataclass
@@ -46,10 +50,15 @@ def read_stretch(
     poses, where = source.poses, findings.where
     if poses.undecodable:
         findings.repairs.append(f"{poses.undecodable} messages that do not fit their schema dropped")
+    findings.repairs += poses.notes
     findings.logged = _log_fit(poses)
     stamps, findings.frames = _stamps(poses, session.clock, where, source.pose_topic)
-    rows = in_order(stamps, limits.disorder, f"{where}: {source.pose_topic}", findings)
+    at_once = session.clock == "log"  # a recorder that stalled may log several in one instant
+    rows = in_order(stamps, limits.disorder, f"{where}: {source.pose_topic}", findings, at_once)
     check_clocks(poses, session.clock, limits, f"{where}: {source.pose_topic}", findings)
+    if not is_stepwise(trial.experiment):
+        stamps = _evened(stamps, rows, poses, session.clock, findings)
+    rows = instants(stamps, rows, findings)
     epoch = int(stamps[rows[0]])
     time = (stamps[rows] - epoch) * 1e-9
     if trial.window is not None:
@@ -64,6 +73,32 @@ def read_stretch(
         expected = f"expected at least {limits.duration:g} s"
         raise InputError(f"{where}: found {time[-1]:.2f} s of poses in {len(time)} frames{lost}, {expected}")
     return Stretch(rows, time, epoch, int(poses.log_times[rows[0]]))
+
+
+def _evened(stamps: np.ndarray, rows: np.ndarray, poses: PoseStream, clock: str, findings: Findings) -> np.ndarray:
+    """The stamps (T,) ns, those that came late at times that are even; as they are where most came in time."""
+    time = 1e-9 * (stamps[rows] - stamps[rows[0]])
+    if not is_uneven(time) or poses.present.mean() < WHOLE:
+        return stamps
+    numbers = None if poses.frames is None else poses.frames[rows]
+    numbers = numbers if numbers is not None and np.all(np.diff(numbers) > 0) else None
+    what = "log times" if clock == "log" else "stamps"
+    even = even_times(time, numbers)
+    if even is None:
+        shortest = 1e3 * float(np.diff(time).min())
+        problem = f"{what} are uneven, the nearest two {shortest:.2g} ms apart, and do not tell which frames"
+        findings.warnings.append(f"{problem} are missing: expected even ones, or frame numbers and `clock: frame`")
+        return stamps
+    late = even.late - np.quantile(even.late, 0.05)
+    by = "their count" if numbers is None else "frame numbers"
+    missing = f", {even.missing} of them missing in between" if even.missing else ""
+    findings.repairs.append(
+        f"{what} are up to {1e3 * late.max():.0f} ms late, though frames come at {even.rate:.3g} Hz{missing}: their "
+        f"times evened out by {by}"
+    )
+    evened = stamps.copy()
+    evened[rows] = stamps[rows[0]] + np.round(even.time * 1e9).astype(np.int64)
+    return evened
 
 
 def columns_of(source: LogSource, names: list[str], where: str) -> list[int]:

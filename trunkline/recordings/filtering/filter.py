@@ -18,6 +18,8 @@ from trunkline.recordings.trials.experiments import EXPERIMENTS, ExperimentKind,
 from trunkline.recordings.trials.raw_trial import RawTrial
 from trunkline.recordings.trials.trial import Trial
 
+BEYOND, BEYOND_LEAST = 0.5, 5e-3  # share of the way that samples go, and m, by which filtered ones may go beyond them
+
 
 @dataclass
 class Filter:
@@ -176,13 +178,27 @@ def _marker(time: np.ndarray, samples: np.ndarray, grid: np.ndarray, settings: F
     smooth = low_pass(resample(time, samples, grid), settings.rate, settings.cutoff, settings.order)
     # the low-pass carries what fills a gap some frames beyond its edges
     reach = round(settings.rate / settings.cutoff / 2)
+    measured = ~binary_dilation(~bridged(time, grid, settings.longest_bridge), iterations=reach)
+    _check_within(grid[measured], smooth[measured, :3], samples[:, :3], where)
     return _Marker(
         columns=smooth,
-        measured=~binary_dilation(~bridged(time, grid, settings.longest_bridge), iterations=reach),
+        measured=measured,
         filled=int(np.sum(~bridged(time, grid, 1.5 / settings.rate))),
         dropped=int(np.sum(~inliers)),
         removed=np.mean(np.square(samples - resample(grid, smooth, time)), axis=0),
     )
+
+
+def _check_within(time: np.ndarray, filtered: np.ndarray, samples: np.ndarray, where: str) -> None:
+    """Refuse positions (G, 3) m at times (G,) s that went far from where any of the samples (T, 3) m was."""
+    low, high = samples.min(axis=0), samples.max(axis=0)
+    beyond = np.maximum(filtered - high, low - filtered).max(axis=1, initial=0)
+    allowed = BEYOND * float((high - low).max()) + BEYOND_LEAST
+    if beyond.max(initial=0) > allowed:
+        far = f"{1e3 * beyond.max():.3g} mm beyond all measured ones at {time[beyond.argmax()]:.2f} s"
+        raise InputError(
+            f"{where}: filtered positions are {far}, expected at most {1e3 * allowed:.3g} mm: are its times right?"
+        )
 
 
 def average_static(trial: Trial) -> Trial:

@@ -61,3 +61,61 @@ float64 y
 float64 z
 float64 w
 """
+QUATERNION = f"""{SEPARATOR}MSG: geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+"""
+POSE = f"""{SEPARATOR}MSG: geometry_msgs/Pose
+geometry_msgs/Point position
+geometry_msgs/Quaternion orientation
+{POINT}{QUATERNION}"""
+LAYOUT = f"""std_msgs/MultiArrayLayout layout
+{{kind}}[] data
+{SEPARATOR}MSG: std_msgs/MultiArrayLayout
+std_msgs/MultiArrayDimension[] dim
+uint32 data_offset
+{SEPARATOR}MSG: std_msgs/MultiArrayDimension
+string label
+uint32 size
+uint32 stride
+"""
+# what a message of that name usually is, for logs whose recorder could not find the definition
+KNOWN = {
+    "mocap4r2_msgs/RigidBodies": RIGID_BODIES,
+    "mocap_msgs/RigidBodies": RIGID_BODIES,
+    "mocap4r2_msgs/Markers": MARKERS,
+    "mocap_msgs/Markers": MARKERS,
+    "sensor_msgs/JointState": JOINT_STATE,
+    "interfaces/TrunkRigidBodies": TRUNK_RIGID_BODIES,
+    "motion_capture_tracking_interfaces/NamedPoseArray": f"""std_msgs/Header header
+motion_capture_tracking_interfaces/NamedPose[] poses
+{HEADER}{SEPARATOR}MSG: motion_capture_tracking_interfaces/NamedPose
+string name
+geometry_msgs/Pose pose
+{POSE}""",
+    "geometry_msgs/PoseStamped": f"""std_msgs/Header header
+geometry_msgs/Pose pose
+{HEADER}{POSE}""",
+    "geometry_msgs/PoseArray": f"""std_msgs/Header header
+geometry_msgs/Pose[] poses
+{HEADER}{POSE}""",
+    "tf2_msgs/TFMessage": f"""geometry_msgs/TransformStamped[] transforms
+{SEPARATOR}MSG: geometry_msgs/TransformStamped
+std_msgs/Header header
+string child_frame_id
+geometry_msgs/Transform transform
+{HEADER}{SEPARATOR}MSG: geometry_msgs/Transform
+geometry_msgs/Vector3 translation
+geometry_msgs/Quaternion rotation
+{SEPARATOR}MSG: geometry_msgs/Vector3
+float64 x
+float64 y
+float64 z
+{QUATERNION}""",
+    "std_msgs/Float64MultiArray": LAYOUT.format(kind="float64"),
+    "std_msgs/Float32MultiArray": LAYOUT.format(kind="float32"),
+    "std_msgs/Float64": "float64 data\n",
+    "std_msgs/Float32": "float32 data\n",
+}

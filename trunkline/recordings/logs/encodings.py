@@ -1,17 +1,87 @@
 """A topic's messages, decoded by the encoding and the schema that the log itself names."""
 
 import json
+from collections import Counter
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from types import SimpleNamespace
 
+import lz4.frame
 import numpy as np
+import zstandard
 from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
 
 from trunkline.recordings.logs import cdr
+from trunkline.recordings.logs.definitions import KNOWN
 from trunkline.recordings.logs.mcap_log import Topic
+from trunkline.recordings.logs.records import LARGEST_EXPANSION
 
 ENCODINGS = {"cdr": "ros2msg", "protobuf": "protobuf", "json": None}  # to the schema's encoding, None: any
+ZSTD, LZ4 = b"\x28\xb5\x2f\xfd", b"\x04\x22\x4d\x18"  # with which a compressed message begins
+# by the first two bytes of a message: encapsulations beside plain CDR (RTPS 2.5, table 10.3)
+ENCAPSULATIONS = {
+    0x02: "PL_CDR", 0x03: "PL_CDR", 0x06: "CDR2", 0x07: "CDR2", 0x08: "D_CDR2", 0x09: "D_CDR2", 0x0A: "PL_CDR2",
+    0x0B: "PL_CDR2",
+}  # fmt: skip
+# numbers and texts that JSON leaves out where they are 0 or empty, each with all that its object may have beside it
+VECTOR, POSE = frozenset("xyzw"), frozenset({"position", "orientation"})
+TRANSFORM = frozenset({"timestamp", "parent_frame_id", "child_frame_id", "translation", "rotation"})
+JSON_ZEROS = (
+    dict.fromkeys("xyzw", (VECTOR, lambda: 0.0))
+    | dict.fromkeys(POSE, (POSE, lambda: _Fields()))
+    | dict.fromkeys(("translation", "rotation"), (TRANSFORM, lambda: _Fields()))
+    | dict.fromkeys(("parent_frame_id", "child_frame_id"), (TRANSFORM, str))
+)
+
+
+class _Fields(SimpleNamespace):
+    """An object of JSON."""
+
+    def __getattr__(self, name: str):
+        beside, zero = JSON_ZEROS.get(name, (frozenset(), None))
+        if zero is None or not vars(self).keys() <= beside:
+            raise AttributeError(name)
+        return zero()
+
+
+def readable_topic(topic: Topic) -> tuple[Topic, list[str]]:
+    """The topic with its messages as they were sent and with a definition, and what that took, a sentence each.
+
+    Raises:
+        ValueError: no message can be read, with a reason that the log itself shows.
+    """
+    notes = []
+    packed = sum(data[:4] in (ZSTD, LZ4) for data in topic.messages)
+    if packed and packed == len(topic.messages):
+        topic = replace(topic, messages=[_unpacked(data) for data in topic.messages])
+        notes.append(f"{topic.name}: messages that are compressed one by one unpacked")
+    if topic.encoding != "cdr":
+        return topic, notes
+    kinds = Counter(data[1] for data in topic.messages if len(data) >= cdr.HEADER)
+    kind = kinds.most_common(1)[0][0] if kinds else 0
+    if kind > 1 and not kinds[0] + kinds[1]:
+        name = ENCAPSULATIONS.get(kind, f"0x{kind:04x}")
+        raise ValueError(f"found messages in the encapsulation {name}, expected plain CDR, which ROS 2 writes unless a "
+                         "QoS profile of the middleware sets another data representation: set XCDR1 there")  # fmt: skip
+    if topic.schema_encoding in ("", "ros2msg") and not topic.definition.strip():
+        usual = KNOWN.get(cdr.short_name(topic.schema))
+        if usual is None:
+            raise ValueError(f"found no text in the schema {topic.schema}, expected its definition")
+        topic = replace(topic, definition=usual.encode(), schema_encoding="ros2msg")
+        notes.append(f"{topic.name}: the schema {topic.schema} has no text in the log: read by its usual definition")
+    return topic, notes
+
+
+def _unpacked(data: bytes) -> bytes:
+    """What was compressed; `data` itself where it is damaged, which then fits no schema."""
+    most = LARGEST_EXPANSION * len(data)
+    try:
+        if data[:4] == ZSTD:
+            return zstandard.ZstdDecompressor().stream_reader(data).read(most)
+        return lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=most)
+    except (zstandard.ZstdError, RuntimeError):
+        return data
 
 
 def decode(topic: Topic) -> Iterator[tuple[np.ndarray, object]]:
@@ -41,7 +111,7 @@ def decode(topic: Topic) -> Iterator[tuple[np.ndarray, object]]:
 
 
 def _json(data: bytes) -> object:
-    return json.loads(data, object_hook=lambda fields: SimpleNamespace(**fields))
+    return json.loads(data, object_hook=lambda fields: _Fields(**fields))
 
 
 def _protobuf(topic: Topic) -> Callable[[bytes], object]:

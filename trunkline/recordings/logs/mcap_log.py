@@ -56,7 +56,19 @@ def read_log(path: Path, wanted: Collection[str] | None = None) -> Log:
     Raises:
         InputError: the file is missing, is no MCAP file, or nothing in it can be trusted.
     """
-    contents, damage = Contents(wanted), []
+    contents = Contents(wanted)
+    damage = read_contents(path, contents)
+    topics = _by_topic(contents, damage)
+    return Log(Path(path), topics, damage, len(contents.messages), contents.unchecked)
+
+
+def read_contents(path: Path, contents: Contents) -> list[str]:
+    """Fill `contents` with what a log has that can be trusted; a sentence for each thing that was lost.
+
+    Raises:
+        InputError: as for `read_log`.
+    """
+    damage: list[str] = []
     try:
         with open(path, "rb") as file:
             size = file.seek(0, SEEK_END)
@@ -79,8 +91,7 @@ def read_log(path: Path, wanted: Collection[str] | None = None) -> Log:
     nameless = sum(channel not in contents.channels for channel, *_ in contents.messages)
     if nameless:
         damage.append(f"{nameless} messages on channels that nothing describes lost")
-    topics = _by_topic(contents, damage)
-    return Log(Path(path), topics, damage, len(contents.messages), contents.unchecked)
+    return damage
 
 
 def _by_topic(contents: Contents, damage: list[str]) -> dict[str, Topic]:

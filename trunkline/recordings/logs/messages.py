@@ -56,7 +56,7 @@ def joints(*schemas: str) -> Callable[[Callable[..., DecodedJoints]], Callable[.
     return lambda function: JOINTS.update({schema: function for schema in schemas}) or function
 
 
-@poses("mocap4r2_msgs/RigidBodies")
+@poses("mocap4r2_msgs/RigidBodies", "mocap_msgs/RigidBodies")
 def rigid_bodies(message) -> DecodedPoses:
     bodies = message.rigidbodies
     return DecodedPoses(
@@ -79,7 +79,7 @@ def trunk_rigid_bodies(message) -> DecodedPoses:
     )
 
 
-@poses("motion_capture_tracking_interfaces/NamedPoseArray")
+@poses("motion_capture_tracking_interfaces/NamedPoseArray", "motion_capture_tracking_interfaces/NamedPoseArrayV2")
 def named_pose_array(message) -> DecodedPoses:
     named = message.poses
     return DecodedPoses(
@@ -127,12 +127,13 @@ def tf_message(message) -> DecodedPoses:
     )
 
 
-@poses("mocap4r2_msgs/Markers")
+@poses("mocap4r2_msgs/Markers", "mocap_msgs/Markers")
 def markers(message) -> DecodedPoses:
-    """Markers have no orientation; one without a name goes by its index."""
-    names = [marker.marker_name for marker in message.markers]
+    """Markers have no orientation; one without a name goes by its index, which older messages call `index`."""
+    names = [getattr(marker, "marker_name", "") for marker in message.markers]
     if not all(names):
-        indices = [np.asarray(marker.marker_index).astype(str) for marker in message.markers]
+        indices = [getattr(marker, "marker_index", getattr(marker, "index", None)) for marker in message.markers]
+        indices = [np.asarray(index).astype(str) for index in indices]
         pairs = zip(names, indices, strict=True)
         names = np.stack([np.full(index.shape, name) if name else index for name, index in pairs], axis=-1)
     positions = vectors([marker.translation for marker in message.markers])
@@ -141,7 +142,9 @@ def markers(message) -> DecodedPoses:
 
 @joints("sensor_msgs/JointState")
 def joint_state(message) -> DecodedJoints:
-    return DecodedJoints(moment(message.header.stamp), message.name, np.asarray(message.position, dtype=float))
+    positions = np.asarray(message.position, dtype=float)
+    names = message.name if any(message.name) or not positions.shape[-1] else None
+    return DecodedJoints(moment(message.header.stamp), names, positions)
 
 
 @joints("std_msgs/Float64MultiArray", "std_msgs/Float32MultiArray")
@@ -149,11 +152,18 @@ def float_array(message) -> DecodedJoints:
     return DecodedJoints(None, None, np.asarray(message.data, dtype=float))
 
 
+@joints("std_msgs/Float64", "std_msgs/Float32")
+def one_float(message) -> DecodedJoints:
+    return DecodedJoints(None, None, np.asarray(message.data, dtype=float)[..., None])
+
+
 def moment(time) -> np.ndarray:
-    """A ROS 2 (sec, nanosec), Foxglove (sec, nsec) or protobuf (seconds, nanos) time to ns, (...)."""
-    for whole, rest in (("sec", "nanosec"), ("sec", "nsec"), ("seconds", "nanos")):
-        if hasattr(time, rest):
-            seconds, nanoseconds = np.asarray(getattr(time, whole)), np.asarray(getattr(time, rest))
+    """A ROS 2 (sec, nanosec), Foxglove (sec, nsec) or protobuf (seconds, nanos) time to ns, (...); JSON may leave out
+    a part that is 0."""
+    for whole, rest in (("sec", "nanosec"), ("sec", "nsec"), ("seconds", "nanos"), ("sec", "sec")):
+        if hasattr(time, rest) and (rest != whole or vars(time).keys() == {whole}):
+            seconds = np.asarray(getattr(time, whole, 0))
+            nanoseconds = np.asarray(getattr(time, rest) if rest != whole else 0)
             if seconds.dtype.kind not in "iu" or nanoseconds.dtype.kind not in "iu":
                 raise TypeError("a time of whole numbers expected")
             return seconds.astype(np.int64) * 1_000_000_000 + nanoseconds.astype(np.int64)

@@ -1,17 +1,20 @@
 """A topic's messages as arrays: all poses of a log."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from trunkline.recordings.logs.cdr import short_name
-from trunkline.recordings.logs.encodings import decode
+from trunkline.recordings.logs.encodings import decode, readable_topic
 from trunkline.recordings.logs.mcap_log import Topic
 from trunkline.recordings.logs.messages import POSES, READING, DecodedPoses
 from trunkline.recordings.logs.samples import PoseSamples, union
 from trunkline.recordings.logs.transforms import in_one_frame
+
+FEWEST = 10  # frames that differ, at least, before some are repeats
+CLEAR = 10.0  # times the share that chance explains, by which they have to be more
 
 
 class Batch(NamedTuple):
@@ -37,7 +40,9 @@ class PoseStream:
     (T, B, 4) wxyz or None; NaN where absent. undecodable: messages that do not fit their schema, or that hold
     another number of poses than there are names. unnamed: poses in a message that nobody names, else None.
     parents: names of the frames that the poses are in, where messages say it for each; several, where nothing
-    connects them. twice: a name that several poses of one message have, else None; such messages do not fit either.
+    connects them. header_frames: those that headers name, by topic, in which all poses of a message are. twice: a name
+    that several poses of one message have, else None; such messages do not fit either. notes: what reading them took,
+    a sentence each.
     """
 
     stamps: np.ndarray
@@ -51,6 +56,20 @@ class PoseStream:
     unnamed: int | None = None
     parents: tuple[str, ...] = ()
     twice: str | None = None
+    notes: list[str] = field(default_factory=list)
+    header_frames: dict[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def take(self, rows: np.ndarray) -> "PoseStream":
+        """Some of its frames, (T,) flags or indices."""
+        return replace(
+            self,
+            stamps=self.stamps[rows],
+            log_times=self.log_times[rows],
+            frames=None if self.frames is None else self.frames[rows],
+            present=self.present[rows],
+            positions=self.positions[rows],
+            quaternions=None if self.quaternions is None else self.quaternions[rows],
+        )
 
 
 def pose_stream(
@@ -71,9 +90,13 @@ def pose_stream(
     Raises:
         ValueError: the messages cannot be read at all, or frames are no tree, or `frame` is none of them.
     """
-    unnamed, twice, read = None, None, []
+    unnamed, twice, read, header_frames = None, None, [], {}
+    notes: list[str] = []
     for name, topic in topics.items():
-        batches = list(_read_poses(topic))
+        topic, some = readable_topic(topic)
+        notes += some
+        header_frames[topic.name] = frames = {}
+        batches = list(_read_poses(topic, frames))
         declared = bodies if name is None else [name]
         if declared is None and any(poses.names is None for _, poses in batches):
             unnamed = max(poses.positions.shape[-2] for _, poses in batches)
@@ -88,12 +111,16 @@ def pose_stream(
     else:
         samples = _samples(read)
         if parents and list(parents) != [frame or next(iter(parents))]:
-            fixed = [(t, [part for batch in _read_poses(t) for part in _batches(*batch, t, ())]) for t in statics]
+            readable_statics = [readable_topic(topic)[0] for topic in statics]
+            fixed = [
+                (t, [part for batch in _read_poses(t) for part in _batches(*batch, t, ())]) for t in readable_statics
+            ]
             samples, parents = in_one_frame(samples, _samples(fixed), list(parents), frame)
         stream = _gather(samples)
     stream.undecodable = sum(len(topic.messages) for topic in topics.values()) - readable
-    stream.unnamed, stream.parents, stream.twice = unnamed, tuple(parents), twice
-    return stream
+    stream.unnamed, stream.parents, stream.twice, stream.notes = unnamed, tuple(parents), twice, notes
+    stream.header_frames = {name: tuple(frames) for name, frames in header_frames.items() if frames}
+    return without_repeats(stream)
 
 
 def _repeated(names: list[str] | np.ndarray | None) -> str | None:
@@ -104,7 +131,8 @@ def _repeated(names: list[str] | np.ndarray | None) -> str | None:
     return None
 
 
-def _read_poses(topic: Topic) -> Iterator[tuple[np.ndarray, DecodedPoses]]:
+def _read_poses(topic: Topic, frames: dict[str, None] | None = None) -> Iterator[tuple[np.ndarray, DecodedPoses]]:
+    """Batches, or single messages, as `decode` gives them; the frames that their headers name are added to `frames`."""
     reader = POSES[short_name(topic.schema)]
     for rows, message in decode(topic):
         try:
@@ -113,7 +141,14 @@ def _read_poses(topic: Topic) -> Iterator[tuple[np.ndarray, DecodedPoses]]:
             named = names if names is None or isinstance(names, np.ndarray) else [str(name) for name in names]
         except READING:
             continue
+        if frames is not None and poses.parents is None and (frame := _header_frame(message)):
+            frames[frame] = None
         yield rows, poses._replace(names=named)
+
+
+def _header_frame(message) -> str:
+    """The frame that the header of a message names, or the message itself as Foxglove's do; empty where none does."""
+    return str(getattr(getattr(message, "header", message), "frame_id", "")).strip("/")
 
 
 def _batches(rows: np.ndarray, poses: DecodedPoses, topic: Topic, declared: Sequence[str] | None) -> Iterator[Batch]:
@@ -207,3 +242,43 @@ def _samples(read: list[tuple[Topic, list[Batch]]]) -> PoseSamples:
             ))  # fmt: skip
     samples = PoseSamples(*(np.concatenate(values) for values in zip(*parts, strict=True)))
     return samples.take(np.argsort(samples.logged, kind="stable"))
+
+
+def without_repeats(stream: PoseStream) -> PoseStream:
+    """The stream without the frames that only repeat the one before, to the last bit, under new stamps: a driver's loop
+    that is faster than its cameras publishes each pose several times.
+
+    Noise makes every frame another, so that of a log that a model made, or that was rounded, nothing is left out, nor
+    of a long standstill, in which a driver sees nothing.
+    """
+    order = np.argsort(stream.stamps if stream.stamps.any() else stream.log_times, kind="stable")
+    values = stream.positions[order]
+    if stream.quaternions is not None:
+        values = np.concatenate([values, stream.quaternions[order]], axis=2)
+    equal = values[:-1] == values[1:]
+    alike = equal | (np.isnan(values[:-1]) & np.isnan(values[1:]))
+    moving = ~alike.all(axis=(0, 2))  # a body that stands for a constant tells nothing
+    if not moving.any():
+        return stream
+    numbers = np.where(np.isnan(values), np.inf, values)[:, moving].reshape(len(order), -1) + 0.0  # no -0
+    whole = np.ascontiguousarray(numbers).view(np.dtype((np.void, numbers.itemsize * numbers.shape[1]))).ravel()
+    _, first, which, sizes = np.unique(whole, return_index=True, return_inverse=True, return_counts=True)
+    last = len(order) - 1 - np.unique(which[::-1], return_index=True)[1]
+    near = last - first <= 2 * sizes  # the next pose may come before the last repeat
+    usual = sizes <= 2 * int(np.ceil(np.median(sizes))) + 1
+    repeats = (near & usual & np.isfinite(numbers[first]).any(axis=1))[which]
+    repeats[first] = False
+    if not repeats.any() or len(sizes) < FEWEST:
+        return stream
+    by_chance = np.prod(alike[~repeats[1:]].mean(axis=0)[moving])  # that a frame's rounded numbers stay by themselves
+    if CLEAR * by_chance > repeats.mean():
+        return stream
+    keep = np.ones(len(order), bool)
+    keep[order[repeats]] = False
+    fresh = stream.take(keep)
+    time = np.sort(fresh.stamps if fresh.stamps.any() else fresh.log_times)
+    seconds = 1e-9 * (time[-1] - time[0])
+    rate = f", poses are new at {(len(time) - 1) / seconds:.4g} Hz" if seconds > 0 else ""
+    count = f"{int(repeats.sum())} of {len(order)} frames"
+    fresh.notes = [*fresh.notes, f"{count} repeat the one before to the last bit, under new stamps: dropped{rate}"]
+    return fresh

@@ -49,6 +49,18 @@ class Contents:
     expected: int | None = None  # messages, by the log's own statistics
     chunks: set[bytes] = field(default_factory=set)  # digests of those read
 
+    def add(self, channel_id: int, body: bytes) -> None:
+        """One message record."""
+        _, _, log_time, _ = MESSAGE_HEADER.unpack_from(body)
+        if log_time > LATEST:
+            self.undated += 1
+        else:
+            data = body[MESSAGE_HEADER.size :] if self.keeps(channel_id) else None
+            self.messages.append((channel_id, log_time, data))
+
+    def attach(self, opcode: int, body: bytes) -> None:
+        """A header, an attachment or a metadata record: none has poses or commands."""
+
     def keeps(self, channel_id: int) -> bool:
         """Whether a channel's data is kept: also where what describes it has not come yet."""
         channel = self.channels.get(channel_id)
@@ -79,7 +91,7 @@ def read_all(file: BinaryIO, contents: Contents, damage: list[str], path: Path) 
                 contents.unchecked += 0 if checked else len(contents.messages) - before
                 contents.chunks.add(digest)
             elif opcode == Opcode.DATA_END:
-                crc = DataEnd.read(_stream(body)).data_section_crc
+                crc = DataEnd.read(stream_of(body)).data_section_crc
                 if crc and crc == _checksum(file, position):
                     contents.unchecked = 0
                 elif crc:
@@ -89,7 +101,7 @@ def read_all(file: BinaryIO, contents: Contents, damage: list[str], path: Path) 
                     if not damage:
                         damage.append("the data section's checksum is wrong though every chunk's is right")
             elif opcode == Opcode.STATISTICS:
-                contents.expected = Statistics.read(_stream(body)).message_count
+                contents.expected = Statistics.read(stream_of(body)).message_count
             else:
                 unchunked |= opcode == Opcode.MESSAGE
                 contents.unchecked += opcode == Opcode.MESSAGE
@@ -132,19 +144,17 @@ def _read_records(data: bytes, contents: Contents) -> None:
 
 def _read_record(opcode: int, body: bytes, contents: Contents) -> None:
     if opcode == Opcode.MESSAGE:
-        channel, _, log_time, _ = MESSAGE_HEADER.unpack_from(body)
-        if log_time > LATEST:
-            contents.undated += 1
-            return
-        contents.messages.append((channel, log_time, body[MESSAGE_HEADER.size :] if contents.keeps(channel) else None))
+        contents.add(MESSAGE_HEADER.unpack_from(body)[0], body)
     elif opcode == Opcode.SCHEMA:
-        schema = Schema.read(_stream(body))
+        schema = Schema.read(stream_of(body))
         if contents.schemas.setdefault(schema.id, schema) != schema:
             raise ValueError(f"schema {schema.id} is described before, and differently")
     elif opcode == Opcode.CHANNEL:
-        channel = Channel.read(_stream(body))
+        channel = Channel.read(stream_of(body))
         if contents.channels.setdefault(channel.id, channel) != channel:
             raise ValueError(f"channel {channel.id} is described before, and differently")
+    elif opcode in (Opcode.HEADER, Opcode.ATTACHMENT, Opcode.METADATA):
+        contents.attach(opcode, body)
 
 
 def _chunk_data(body: bytes) -> tuple[bytes, bool]:
@@ -153,7 +163,7 @@ def _chunk_data(body: bytes) -> tuple[bytes, bool]:
     Raises:
         ValueError: they are not.
     """
-    chunk = Chunk.read(_stream(body))
+    chunk = Chunk.read(stream_of(body))
     data = _decompress(chunk.compression, chunk.data, chunk.uncompressed_size)
     if len(data) != chunk.uncompressed_size:
         raise ValueError(f"{len(data)} bytes, expected {chunk.uncompressed_size}")
@@ -192,7 +202,7 @@ def read_cut_chunk(rest: BinaryIO, contents: Contents) -> str:
     return f", {len(contents.messages) - before} messages of the chunk that was cut are readable"
 
 
-def _stream(body: bytes) -> ReadDataStream:
+def stream_of(body: bytes) -> ReadDataStream:
     return ReadDataStream(BytesIO(body))
 
 

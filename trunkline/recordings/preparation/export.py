@@ -6,46 +6,73 @@ semicolons where numbers have decimal commas. Quaternions are x, y, z, w; an occ
 
 import codecs
 import csv
+import re
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.recordings.logs.pose_stream import PoseStream
+from trunkline.recordings.signals.units import METRES_PER
 
-METRES = {"meters": 1.0, "millimeters": 1e-3, "centimeters": 1e-2}
+METRES = {unit: METRES_PER[short] for unit, short in
+          {"meters": "m", "millimeters": "mm", "centimeters": "cm", "inches": "inch"}.items()}  # fmt: skip
 POSITION, ROTATION = ("Position", "XYZ"), ("Rotation", "WXYZ")
+UNLABELLED = re.compile(r"(.*[:_ ])?unlabell?ed([:_ ]*\d+)?", re.IGNORECASE)  # what Motive calls a marker of no asset
 
 
-def read_export(path: Path) -> PoseStream:
+class Export(NamedTuple):
+    """What a CSV holds. remarks: what is to be said of it, a sentence each."""
+
+    poses: PoseStream
+    remarks: list[str]
+
+
+def read_export(path: Path, unit: str | None = None) -> Export:
     """Read a CSV that Motive exported: positions in m, a stamp for each frame by the clock on UTC, or from 0.
+
+    Unlabelled markers are left out. Where the header promises more frames than there are, those that are whole count.
+
+    Args:
+        unit: one of `METRES`, of a CSV whose header names none.
 
     Raises:
         InputError: naming the file and what is missing, or the row that cannot be read.
     """
     try:
-        rows = _rows(_text(Path(path)).splitlines())
+        text = _text(Path(path))
+        rows = _rows(text.splitlines())
     except (OSError, csv.Error) as error:
         raise InputError(f"{path}: {error}, expected a CSV export of Motive") from error
-    first = next((i for i, row in enumerate(rows) if len(row) > 2 and row[0].strip() == "Frame"), None)
+    first = next((i for i, row in enumerate(rows) if _begins_frames(row)), None)
     if first is None:
-        raise InputError(f"{path}: found no row that begins with Frame, expected a CSV export of Motive with header")
-    about = dict(zip(rows[0][::2], rows[0][1::2], strict=False))
-    scale = _scale(path, about)
+        problem = "found no row that begins with Frame and Time: this is no export of Motive's"
+        raise InputError(f"{path}: {problem}, expected its CSV with header")
+    about, remarks = dict(zip(rows[0][::2], rows[0][1::2], strict=False)), []
+    scale = _scale(path, about, unit)
     columns = _columns(path, rows[:first], rows[first])
     kind = "Rigid Body" if any(key[0] == "Rigid Body" for key in columns) else "Marker"
-    names = tuple(dict.fromkeys(key[1] for key in columns if key[0] == kind and key[2] == "Position"))
+    every = tuple(dict.fromkeys(key[1] for key in columns if key[0] == kind and key[2] == "Position"))
+    names = tuple(name for name in every if kind != "Marker" or not UNLABELLED.fullmatch(name))
     if not names:
         problem = ", ".join(sorted({key[0] for key in columns})) or "nothing"
-        raise InputError(f"{path}: found columns of {problem}, expected positions of rigid bodies or markers")
+        problem = "unlabelled markers alone" if every else f"columns of {problem}"
+        raise InputError(f"{path}: found {problem}, expected positions of rigid bodies or of markers with labels")
+    if len(names) < len(every):
+        remarks.append(f"{len(every) - len(names)} unlabelled markers left out")
+    total = about.get("Total Exported Frames", "")
+    frames = sum(any(map(str.strip, row)) for row in rows[first + 1 :])
+    if total.isdigit() and frames < int(total):
+        torn = bool(frames) and text[-1] not in "\r\n"  # the last number may lack digits
+        rows = rows[:-1] if torn else rows
+        lost = ", the last of them cut off and left out" if torn else ""
+        expected = f"the header says {total} (Total Exported Frames): is it all there?"
+        remarks.append(f"found {frames} frames{lost}, {expected}")
     numbers = _numbers(path, rows, first + 1)
     if not len(numbers):
         raise InputError(f"{path}: found no frame below the header")
-    total = about.get("Total Exported Frames", "")
-    if total.isdigit() and len(numbers) < int(total):
-        problem = f"found {len(numbers)} frames, the header says {total} (Total Exported Frames): the file is cut off"
-        raise InputError(f"{path}: {problem}, expected a whole export")
 
     def gather(component: str, axes: str) -> np.ndarray | None:
         wanted = [(kind, name, component, axis) for name in names for axis in axes]
@@ -64,7 +91,7 @@ def read_export(path: Path) -> PoseStream:
         quaternions[hidden] = np.nan
     positions[hidden] = np.nan
     stamps = _start(about) + np.round(numbers[:, 1] * 1e9).astype(np.int64)
-    return PoseStream(
+    poses = PoseStream(
         stamps=stamps,
         log_times=stamps,
         frames=numbers[:, 0].astype(int),
@@ -73,6 +100,12 @@ def read_export(path: Path) -> PoseStream:
         positions=scale * positions,
         quaternions=quaternions,
     )
+    return Export(poses, remarks)
+
+
+def _begins_frames(row: list[str]) -> bool:
+    """Whether it is the row above the numbers; Vicon's has Sub Frame in place of Time."""
+    return len(row) > 2 and row[0].strip() == "Frame" and row[1].strip().lower().startswith("time")
 
 
 def _text(path: Path) -> str:
@@ -94,14 +127,18 @@ def _rows(lines: list[str]) -> list[list[str]]:
     return [[cell.replace(",", ".") for cell in row] for row in csv.reader(lines, delimiter=";")]
 
 
-def _scale(path: Path, about: dict[str, str]) -> float:
-    """Metres per unit of the export."""
+def _scale(path: Path, about: dict[str, str], declared: str | None) -> float:
+    """Metres per unit of the export, which its header names, or else whoever imports it."""
     if about.get("Coordinate Space", "Global") != "Global":
         raise InputError(f"{path}: coordinate space: found {about['Coordinate Space']}, expected Global")
-    unit = about.get("Length Units", "")
-    if unit.lower() not in METRES:
-        raise InputError(f"{path}: length units: found {unit or 'none'}, expected one of {', '.join(METRES)}")
-    return METRES[unit.lower()]
+    unit = about.get("Length Units", "").strip().lower() or declared
+    if unit is None:
+        raise InputError(f"{path}: length units: found none in the header, expected `--unit`: {', '.join(METRES)}")
+    if unit not in METRES:
+        raise InputError(f"{path}: length units: found {about['Length Units']}, expected one of {', '.join(METRES)}")
+    if declared not in (None, unit):
+        raise InputError(f"{path}: length units: found {unit} in the header, expected `--unit {unit}`, or none")
+    return METRES[unit]
 
 
 def _columns(path: Path, above: list[list[str]], axes: list[str]) -> dict[tuple[str, str, str, str], int]:

@@ -12,6 +12,7 @@ from trunkline.errors import InputError, in_one_line
 from trunkline.program import program_name
 from trunkline.recordings.preparation.proposal import propose
 from trunkline.recordings.preparation.survey import describe, survey
+from trunkline.recordings.session.session import logs_in, unreadable_in
 
 
 @in_one_line
@@ -20,9 +21,10 @@ def main(arguments: list[str] | None = None) -> int:
         prog=program_name("inspect"), description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
-    parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help="an MCAP log, or a folder of them")
-    surveys, code = [], 0
-    for path in _logs(parser.parse_args(arguments).logs):
+    parser.add_argument("logs", nargs="+", type=Path, metavar="LOG",
+                        help="an MCAP log, or a folder of them, or of folders with one each")  # fmt: skip
+    surveys, code, places = [], 0, parser.parse_args(arguments).logs
+    for path in _logs(places):
         try:
             surveys.append(survey(path))
         except InputError as error:
@@ -30,13 +32,28 @@ def main(arguments: list[str] | None = None) -> int:
             code = 1
             continue
         print("\n".join(describe(surveys[-1])))
-    text = propose(surveys)
-    print(f"\nProposed session.yaml:\n\n{text}" if text else "\nNo log holds poses: no session.yaml to propose.")
-    return code
+    folder = places[0] if len(places) == 1 and places[0].is_dir() else None
+    if text := propose(surveys, folder=folder):
+        print(f"\nProposed session.yaml:\n\n{text}")
+        return code
+    if surveys:
+        print("\nNo log holds poses: no session.yaml to propose.", file=sys.stderr)
+    return 1
 
 
 def _logs(paths: list[Path]) -> list[Path]:
-    return [log for path in paths for log in (sorted(path.glob("*.mcap")) if path.is_dir() else [path])]
+    """The logs that are named, and those in folders that are, or one folder further down.
+
+    Raises:
+        InputError: a folder holds none.
+    """
+    logs = []
+    for path in paths:
+        inside = [path / name for name in logs_in(path)] if path.is_dir() else [path]
+        if not inside:
+            raise InputError(f"{path}: found no MCAP log, nor one folder down, expected some{unreadable_in(path)}")
+        logs += inside
+    return logs
 
 
 if __name__ == "__main__":

@@ -1,27 +1,29 @@
 """OptiTrack Motive's CSV export as MCAP logs: `trunkline import-motive --session
 data/raw/NAME CSV…`
 
-Up is +y. Rigid bodies become `mocap4r2_msgs/msg/RigidBodies`, and where an export has none, its markers become
-`mocap4r2_msgs/msg/Markers`. A session.yaml is proposed unless there is one.
+Rigid bodies become `mocap4r2_msgs/msg/RigidBodies`, and where an export has none, its labelled markers become
+`mocap4r2_msgs/msg/Markers`. A session.yaml is proposed unless there is one; up in it is +y, or what the arm shows.
 """
 
 import argparse
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
 from mcap_ros2.writer import Writer
 
-from trunkline.errors import in_one_line
+from trunkline.errors import InputError, in_one_line
 from trunkline.files import written_whole
 from trunkline.program import program_name
 from trunkline.recordings.logs.definitions import MARKERS, RIGID_BODIES
 from trunkline.recordings.logs.pose_stream import PoseStream
-from trunkline.recordings.preparation.export import read_export
+from trunkline.recordings.preparation.export import METRES, read_export
 from trunkline.recordings.preparation.proposal import propose
 from trunkline.recordings.preparation.survey import survey
+from trunkline.recordings.session.session import named_logs
 
-UP = (0, 1, 0)
+UPS = ((0, 1, 0), (0, 0, 1))  # of an export: as Motive makes it by default, and as it can
 
 
 def write_log(path: Path, poses: PoseStream) -> None:
@@ -59,18 +61,48 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument("exports", nargs="+", type=Path, metavar="CSV", help="an export of Motive's, a trial each")
     parser.add_argument("--session", required=True, type=Path, help="folder that becomes the session")
+    parser.add_argument("--unit", choices=METRES, help="of exports whose header has no Length Units")
     chosen = parser.parse_args(arguments)
     chosen.session.mkdir(parents=True, exist_ok=True)
-    for path in chosen.exports:
-        poses, log = read_export(path), chosen.session / f"{path.stem}.mcap"
+    logs = {path: chosen.session / f"{path.stem}.mcap" for path in chosen.exports}
+    _require_new(logs, chosen.exports, chosen.unit)
+    for path, log in logs.items():
+        poses, remarks = read_export(path, chosen.unit)
         write_log(log, poses)
         visible = 100 * poses.present.mean()
         print(f"{log}: {len(poses.stamps)} frames of {len(poses.names)} bodies, {visible:.1f} % seen")
+        for remark in remarks:
+            print(f"import-motive: warning: {path}: {remark}", file=sys.stderr)
     target = chosen.session / "session.yaml"
     if not target.exists():
-        target.write_text(propose([survey(log) for log in sorted(chosen.session.glob("*.mcap"))], UP))
+        target.write_text(propose([survey(log) for log in sorted(chosen.session.glob("*.mcap"))], UPS))
         print(f"{target}: proposed; check each trial's experiment, level and split")
+    elif new := [log.name for log in logs.values() if log.name not in named_logs(target)]:
+        print(f"{target}: left as it is, without {', '.join(new)}: add what is missing to its trials")
     return 0
+
+
+def _require_new(logs: dict[Path, Path], exports: list[Path], unit: str | None) -> None:
+    """Refuse exports that would become one log, and one that would replace a log of another take."""
+    first: dict[Path, Path] = {}
+    for path in exports:
+        log = logs[path]
+        if log in first:
+            problem = f"{path}: found {first[log]} of the same name, and both would become {log}"
+            raise InputError(f"{problem}, expected each take under a name of its own")
+        first[log] = path
+    for path, log in logs.items():
+        if log.exists() and not _becomes(path, log, unit):
+            problem = f"{path}: found {log} there already, of another take or unit"
+            raise InputError(f"{problem}, expected a name of its own, or that you delete that log first")
+
+
+def _becomes(path: Path, log: Path, unit: str | None) -> bool:
+    """Whether a log is what an export would be converted to."""
+    with tempfile.TemporaryDirectory() as folder:
+        anew = Path(folder) / log.name
+        write_log(anew, read_export(path, unit).poses)
+        return anew.read_bytes() == log.read_bytes()
 
 
 if __name__ == "__main__":

@@ -8,11 +8,20 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.recordings.logs.cdr import short_name
-from trunkline.recordings.logs.joint_stream import JointStream, joint_stream
+from trunkline.recordings.logs.joint_stream import JointStream
 from trunkline.recordings.logs.mcap_log import Log, Topic, read_log
 from trunkline.recordings.logs.messages import JOINTS, POSES
 from trunkline.recordings.logs.pose_stream import PoseStream, pose_stream
-from trunkline.recordings.session.source import COMMAND_WORDS, POSITION_WORDS, TWIN, choose, pose_topics, static_topics
+from trunkline.recordings.session.source import (
+    COMMAND_WORDS,
+    POSITION_WORDS,
+    TWIN,
+    motor_stream,
+    pose_topics,
+    several_frames,
+    static_topics,
+    without_unset,
+)
 
 LIVE = "/core/input"  # a topic of a live session alone
 OTHERS = re.compile(r"/headset/|/joint_states$|/joints/command$")  # of people and of the rigid robot
@@ -44,16 +53,22 @@ def survey(path: Path) -> LogSurvey:
     try:
         result.pose_topics = pose_topics(arms, None)
         if result.pose_topics:
-            result.poses = pose_stream(result.pose_topics, statics=static_topics(result.log))
+            result.poses = without_unset(pose_stream(result.pose_topics, statics=static_topics(result.log)))
+            result.notes += result.poses.notes
+            if clash := several_frames(result.poses, result.pose_topics):
+                result.notes.append(f"poses: {clash}")
     except (InputError, ValueError) as error:
         result.notes.append(f"poses: {error}")
+    names = None
     for role, words in (("command", COMMAND_WORDS), ("position", POSITION_WORDS)):
         try:
-            topic = choose(arms, None, JOINTS, role, words)
-            if topic is not None:
-                stream = joint_stream(topic)
-                setattr(result, f"{role}_topic", topic.name)
+            stream, notes = motor_stream(arms, None, role, words, names)
+            result.notes += notes
+            if stream is not None:
+                result.notes += stream.notes
+                setattr(result, f"{role}_topic", stream.topic)
                 setattr(result, "commands" if role == "command" else "tendon_positions", stream)
+                names = set(stream.names) if stream.unnamed is None else None
         except (InputError, ValueError) as error:
             result.notes.append(f"{role}: {error}")
     return result

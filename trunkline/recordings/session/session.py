@@ -22,10 +22,12 @@ from pydantic import (
 
 from trunkline.errors import InputError, nearest
 from trunkline.recordings.session.shared_recordings import check_shared
+from trunkline.recordings.signals.held import Between
 from trunkline.recordings.trials.experiments import EXPERIMENTS, LOAD, ExperimentName, Level
 from trunkline.recordings.trials.splits import SplitName
 from trunkline.settings import read_yaml, rename_keys
 
+NONE = "none"  # in place of a topic's name
 RENAMED = {"segments": "markers"}  # keys of the release before
 
 
@@ -76,7 +78,7 @@ class MocapFrame(Entry):
 
     name: str | None = None
     up: Vector
-    unit: Literal["m", "mm"] = "m"
+    unit: Literal["m", "mm", "cm", "inch"] = "m"
     gravity: Literal["standard", "none"] = "standard"
 
     @model_validator(mode="after")
@@ -104,11 +106,25 @@ class FixedBase(Entry):
 
 
 class Topics(Entry):
-    """Topic names; what is left out is found by its schema. poses: one topic, or body to topic."""
+    """Topic names; what is left out is found by its schema. poses: one topic, or body to topic.
+
+    commands, tendon_positions: one topic, several, or motor to topic; `none` where no topic is one.
+    """
 
     poses: str | dict[str, str] | None = None
-    commands: str | None = None
-    tendon_positions: str | None = None
+    commands: str | list[str] | dict[str, str] | None = None
+    tendon_positions: str | list[str] | dict[str, str] | None = None
+
+    @field_validator("commands", "tendon_positions", mode="before")
+    @classmethod
+    def _left_out(cls, names):
+        return names or NONE  # an empty value in session.yaml means that there is none
+
+    def of(self, key: str) -> list[str]:
+        """All topics that `commands` or `tendon_positions` names."""
+        names = getattr(self, key)
+        names = [] if names in (None, NONE) else names
+        return [names] if isinstance(names, str) else list(names.values() if isinstance(names, dict) else names)
 
 
 UNITS = {"m": 1.0, "mm": 1e-3, "rad": 1.0, "deg": np.pi / 180}
@@ -134,6 +150,11 @@ class MotorEntry(Entry):
             raise ValueError(f"spool_radius: found {self.spool_radius}, expected none for a motor that counts "
                              f"{self.unit}")
         return self
+
+    @property
+    def full_turn(self) -> float | None:
+        """In the unit of its numbers; None of a motor that does not count angles."""
+        return {"rad": 2 * np.pi, "deg": 360.0}.get(self.unit)
 
     @property
     def metres(self) -> float:
@@ -186,7 +207,10 @@ class Session(Entry):
     that the stamps show. With `log`, commands and tendon positions are dated by it too.
     motors: name in the log to what it moves, in place of `tendons`, where motors count otherwise than in metres of a
     tendon's pull, or move several.
-    shared: what is to be said of trials that share data, by trial; see `check_shared`.
+    commands: whether they hold until the next, or go on in a straight line to it; by default they hold, but for ramps
+    whose samples come evenly.
+    shared: what is to be said of trials that share data, by trial; see `check_shared`. unlisted: the folder's logs that
+    no trial is of.
     """
 
     frame: MocapFrame
@@ -197,8 +221,10 @@ class Session(Entry):
     topics: Topics = Topics()
     bodies: list[str] | None = Field(default=None, min_length=1)
     clock: Literal["stamp", "log", "frame"] = "stamp"
+    commands: Between | None = None
     trials: list[TrialEntry] = Field(min_length=1)
     _shared: dict[str, list[str]] = PrivateAttr(default_factory=dict)
+    _unlisted: list[str] = PrivateAttr(default_factory=list)
 
     def coupling(self) -> tuple[tuple[str, ...], np.ndarray]:
         """Names of the tendons that `motors` moves, and by how much, m for each unit of a motor's numbers. Shape
@@ -211,6 +237,10 @@ class Session(Entry):
     @property
     def shared(self) -> dict[str, list[str]]:
         return self._shared
+
+    @property
+    def unlisted(self) -> list[str]:
+        return self._unlisted
 
     @field_validator("base", mode="before")
     @classmethod
@@ -257,6 +287,35 @@ def session_folders(folder: Path, only: list[str] | None = None) -> dict[str, Pa
     return {name: folder / name for name in only or inside} or {folder.name: folder}
 
 
+def logs_in(folder: Path) -> list[str]:
+    """The MCAP logs of a session by their paths below it: its own, then those in folders one down, as ROS 2 records a
+    folder for each; none of folders that are sessions themselves."""
+    inside = [log for log in folder.glob("[!.]*/[!.]*.mcap") if not (log.parent / "session.yaml").is_file()]
+    return [log.relative_to(folder).as_posix() for logs in (folder.glob("*.mcap"), inside) for log in sorted(logs)]
+
+
+def unreadable_in(folder: Path) -> str:
+    """What else is there of which logs can be made, and how, as the end of a sentence; empty where nothing is."""
+    remedies = {
+        "*.mcap.zst*": "decompress them, as by `zstd -d`",
+        "*.mcap.lz4": "decompress them, as by `lz4 -d`",
+        "*.db3": "`ros2 bag convert` makes MCAP of them",
+        "*.bag": "`mcap convert` makes MCAP of them",
+    }
+    for pattern, remedy in remedies.items():
+        if files := [file for level in ("", "[!.]*/") for file in folder.glob(level + pattern)]:
+            return f"; found {len(files)} files such as {files[0].relative_to(folder)}: {remedy}"
+    return ""
+
+
+def named_logs(path: Path) -> set[str]:
+    """The logs that a session.yaml names, whatever else is wrong with it."""
+    content = OmegaConf.to_container(read_yaml(path), resolve=False)
+    trials = content.get("trials") if isinstance(content, dict) else None
+    entries = trials if isinstance(trials, list) else []
+    return {str(trial.get("file")) for trial in entries if isinstance(trial, dict)}
+
+
 def read_session(folder: Path) -> Session:
     """Read and check `folder`/session.yaml.
 
@@ -265,12 +324,15 @@ def read_session(folder: Path) -> Session:
     """
     folder = Path(folder)
     path = folder / "session.yaml"
-    logs = sorted(log.name for log in folder.glob("*.mcap")) if folder.is_dir() else None
+    logs = logs_in(folder) if folder.is_dir() else None
     if logs is None:
         there = ", ".join(sessions_in(folder.parent)) or "none yet"
         raise InputError(f"{folder}: no such folder, expected a session of MCAP logs and a session.yaml; found {there}")
     if not path.is_file():
-        raise InputError(f"{folder}: found {len(logs)} logs and no session.yaml, expected both")
+        deeper = sum("/" in log for log in logs)
+        place = f" ({deeper} of them one folder down)" if deeper else ""
+        remedy = "`trunkline inspect` proposes one" if logs else f"expected both{unreadable_in(folder)}"
+        raise InputError(f"{folder}: found {len(logs)} logs{place} and no session.yaml, {remedy}")
     content = OmegaConf.to_container(read_yaml(path), resolve=False)
     assert isinstance(content, dict)
     rename_keys(content, RENAMED, str(path))
@@ -288,6 +350,7 @@ def read_session(folder: Path) -> Session:
         if name in names[:index]:
             raise InputError(f"{path}: trials.{index}.name: found {name!r} again, expected each name once")
     session._shared = check_shared(folder, session.trials)
+    session._unlisted = sorted(set(logs) - {trial.file for trial in session.trials})
     return session
 
 

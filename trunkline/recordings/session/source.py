@@ -5,15 +5,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
+import numpy as np
+
 from trunkline.errors import InputError
 from trunkline.recordings.logs.cdr import short_name
-from trunkline.recordings.logs.joint_stream import JointStream, joint_stream
+from trunkline.recordings.logs.joint_stream import JointStream, joined, joint_stream
 from trunkline.recordings.logs.mcap_log import Log, Topic, read_log
 from trunkline.recordings.logs.messages import JOINTS, POSES, TOPIC_PER_BODY
 from trunkline.recordings.logs.pose_stream import PoseStream, pose_stream
-from trunkline.recordings.session.session import Session
+from trunkline.recordings.session.session import NONE, Session
 
 Stream = TypeVar("Stream")
+Dated = TypeVar("Dated", PoseStream, JointStream)
+UNSET = 86_400_000_000_000  # ns, a day from the others, by which a clock is another than theirs
 STATIC = "tf_static"  # how the topic's name ends
 TWIN = "tf_twin"  # the same, of poses that a model drew and nobody measured (docs/live-sessions.md)
 COMMAND_WORDS, POSITION_WORDS = ("command", "cmd", "target"), ("state", "position")
@@ -64,22 +68,108 @@ def open_log(path: Path, session: Session) -> LogSource:
     if len(poses.parents) > 1 and session.frame.name is None:
         problem = f"found poses in the frames {', '.join(poses.parents)}, which nothing connects"
         raise InputError(f"{where}: {problem}, expected one, or its name in session.yaml: frame.name")
-    commands = _joints(log, session.topics.commands, "command", COMMAND_WORDS, session)
-    tendon_positions = _joints(log, session.topics.tendon_positions, "tendon position", POSITION_WORDS, session)
+    if clash := several_frames(poses, topics, session):
+        raise InputError(f"{path}: {clash}")
+    declared = session.tendons or session.motors
+    names = None if declared is None else {*declared, *(session.tendons or {}).values()}
+    chosen = session.topics
+    commands, _ = _joints(log, chosen.commands, "command", COMMAND_WORDS, names, session)
+    if names is None and commands is not None and commands.unnamed is None:
+        names = set(commands.names)
+    tendon_positions, notes = _joints(log, chosen.tendon_positions, "tendon position", POSITION_WORDS, names, session)
+    poses.notes += notes
+    if session.clock != "log":
+        poses = without_unset(poses)
+        commands, tendon_positions = (some and without_unset(some) for some in (commands, tendon_positions))
     joint_topics = tuple(name for name, t in log.topics.items() if short_name(t.schema) in JOINTS)
     log.topics = {}  # decoded: the raw messages can go
     return LogSource(log, name, poses, commands, tendon_positions, joint_topics)
 
 
-def _joints(log: Log, wanted: str | None, role: str, words: tuple[str, ...], session: Session) -> JointStream | None:
-    topic = choose(log, wanted, JOINTS, role, words)
-    if topic is None:
-        return None
-    where = f"{log.path}: {topic.name}"
-    stream = _understood(where, joint_stream, topic)
-    if stream.unnamed is not None and session.tendons is None:
+def several_frames(poses: PoseStream, topics: dict[str | None, Topic], session: Session | None = None) -> str:
+    """That poses of the session, or any, are in several frames by their headers, with topics and frames; else empty.
+
+    A frame that is called as the topic's own body is none that it could be in: some drivers write that name.
+    """
+    used = None
+    if session is not None and session.markers is not None:
+        used = {*session.markers, session.base if isinstance(session.base, str) else ""}
+    in_frame: dict[str, list[str]] = {}
+    for body, topic in topics.items():
+        if used is None or body is None or body in used:
+            for frame in poses.header_frames.get(topic.name, ()):
+                if frame != body:
+                    in_frame.setdefault(frame, []).append(topic.name)
+    if len(in_frame) < 2:
+        return ""
+    frames = ", ".join(f"{frame!r} ({', '.join(names)})" for frame, names in in_frame.items())
+    return f"header.frame_id: found poses in the frames {frames}, expected all of them in one"
+
+
+def _joints(
+    log: Log, wanted: str | list[str] | dict[str, str] | None, role: str, words: tuple[str, ...],
+    names: set[str] | None, session: Session,
+) -> tuple[JointStream | None, list[str]]:  # fmt: skip
+    """The stream of a role, and what is to be said of topics that were left out."""
+    stream, notes = motor_stream(log, wanted, role, words, names)
+    if stream is not None and stream.unnamed is not None and session.tendons is None and session.motors is None:
         problem = f"found {stream.unnamed} numbers without names"
-        raise InputError(f"{where}: {problem}, expected `tendons` in session.yaml to name them, in order")
+        raise InputError(
+            f"{log.path}: {stream.topic}: {problem}, expected `tendons` in session.yaml to name them, in order"
+        )
+    return stream, notes
+
+
+def motor_stream(
+    log: Log, wanted: str | list[str] | dict[str, str] | None, role: str, words: tuple[str, ...],
+    names: set[str] | None,
+) -> tuple[JointStream | None, list[str]]:  # fmt: skip
+    """The topics of a role as one stream, and what is to be said of those that were left out. Several topics hold a
+    motor each.
+
+    Args: names: of the motors, where they are known; of topics that nobody named those that share none are left out.
+    """
+    if wanted == NONE:
+        return None, []
+    if isinstance(wanted, dict):
+        topics = {motor: choose(log, name, JOINTS, role) for motor, name in wanted.items()}
+    elif isinstance(wanted, list):
+        topics = {name: choose(log, name, JOINTS, role) for name in wanted}
+    elif wanted is not None:
+        topics = {wanted: choose(log, wanted, JOINTS, role)}
+    else:
+        several = _best(log, JOINTS, words)
+        topics = dict(zip(_names_in(several), several, strict=True)) if several else {}
+    streams, notes = [], []
+    for motor, topic in topics.items():
+        if topic is None:
+            continue
+        stream = _understood(f"{log.path}: {topic.name}", joint_stream, topic, motor if len(topics) > 1 else None)
+        if wanted is None and names and stream.unnamed is None and stream.names and not names & set(stream.names):
+            others = ", ".join(stream.names[:3]) + (", …" if len(stream.names) > 3 else "")
+            notes.append(f"{topic.name} left out as {role} topic: found {others}, none of {', '.join(sorted(names))}")
+            continue
+        streams.append(stream)
+    every = [name for stream in streams for name in stream.names]
+    if len(set(every)) < len(every) and len(streams) > 1:
+        listed = ", ".join(stream.topic for stream in streams)
+        raise InputError(f"{log.path}: {role} topic: found {listed}, expected one, or its name in session.yaml: topics")
+    return (joined(streams) if streams else None), notes
+
+
+def without_unset(stream: Dated) -> Dated:
+    """A stream of messages with stamps, without those whose sender's clock was not set yet."""
+    if not stream.stamps.any():
+        return stream
+    good = np.abs(stream.stamps - np.median(stream.stamps)) < UNSET
+    if good.all() or good.mean() < 0.5:
+        return stream
+    number, stamp = int(np.argmin(good)) + 1, 1e-9 * stream.stamps[np.argmin(good)]
+    count = int(np.sum(~good))
+    of = "the stamp of a message is" if count == 1 else f"stamps of {count} messages are"
+    problem = f"{of} a day or more from the others, such as {stamp:.9g} s of number"
+    stream = stream.take(good)
+    stream.notes = [*stream.notes, f"{problem} {number}, as if a clock was not set yet: left out"]
     return stream
 
 

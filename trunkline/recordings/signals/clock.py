@@ -9,6 +9,8 @@ from trunkline.recordings.signals.smoothing import fill_gaps
 WINDOW = 0.5  # s, in each of which the quickest messages of two topics are compared
 MIN_TRAVEL = 5e-3  # m; a tendon that moves less says nothing about time
 CERTAIN = 0.3  # of the tendons' motion that a fit may leave unexplained, against what it leaves on average
+APART = 0.1  # s, by which two offsets differ, or that they are from the end of those tried
+NEARLY = 0.2  # of the way from the best offset's residual to the mean one, within which another is a rival
 SHAPE_MODES = 5  # principal motions of the arm that explain the tendons, with their products
 
 
@@ -25,14 +27,16 @@ class FrameFit:
 @dataclass
 class OffsetFit:
     """time = motor time + offset, s, by motion: the arm's lag behind its tendons is in it. ratio: what remains
-    unexplained of the tendons' motion there, over what remains on average; near 0 is certain, near 1 is a guess."""
+    unexplained of the tendons' motion there, over what remains on average; near 0 is certain, near 1 is a guess.
+    rival: whether another offset may be as good."""
 
     offset: float
     ratio: float
+    rival: bool = False
 
     @property
     def certain(self) -> bool:
-        return self.ratio < CERTAIN
+        return self.ratio < CERTAIN and not self.rival
 
 
 @dataclass
@@ -90,7 +94,19 @@ def estimate_offset(
     if 0 < best < len(offsets) - 1:  # the vertex of the parabola through the three lowest
         left, middle, right = residuals[best - 1 : best + 2]
         offset += 0.005 * 0.5 * (left - right) / max(left - 2 * middle + right, 1e-300)
-    return OffsetFit(float(offset), float(residuals[best] / residuals.mean()))
+    rival = _rival(offsets, residuals, best)
+    return OffsetFit(float(offset), float(residuals[best] / residuals.mean()), rival)
+
+
+def _rival(offsets: np.ndarray, residuals: np.ndarray, best: int) -> bool:
+    """Whether another offset (n,) s explains the tendons nearly as well, a period of the motion away, or one beyond
+    those that were tried may do better."""
+    low = (residuals[1:-1] <= residuals[:-2]) & (residuals[1:-1] <= residuals[2:])
+    others = np.flatnonzero(low) + 1
+    others = others[np.abs(offsets[others] - offsets[best]) > APART]
+    near = residuals[best] + NEARLY * (residuals.mean() - residuals[best])
+    at_end = min(offsets[best] - offsets[0], offsets[-1] - offsets[best]) < APART / 2
+    return bool(at_end or np.any(residuals[others] < near))
 
 
 def offset_by_log_times(

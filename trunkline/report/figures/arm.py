@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from trunkline.model.arm_model import ArmModel
+from trunkline.model.arm_model import TIP_LOAD, ArmModel
 from trunkline.report.figures.style import IDENTIFIED, INITIAL, TENDON, UNIT, UNIT_EDGE, VALIDATE
 
 SLIMMEST = 0.2  # half of the side view's width over its height: ticks need room
@@ -46,7 +46,7 @@ def _side_view(side: Axes, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         x, z = data.geom_xpos[geom][[0, 2]]
         corners = np.array([[-radius, -half], [radius, -half], [radius, half], [-radius, half]])
         body = model.body(model.geom_bodyid[geom])
-        load = body.name == "tip_load"
+        load = body.name == TIP_LOAD
         face, label = (VALIDATE, f"load, {_in_words(body.mass[0])}") if load else (UNIT, None)
         side.fill(*(corners + [x, z]).T * 1000, facecolor=face, edgecolor=UNIT_EDGE, linewidth=0.6, label=label)
     arm = ArmModel(model)

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 from trunkline.errors import in_one_line
+from trunkline.model.arm_model import ArmModel
 from trunkline.model.statics.chain import read_chain
 from trunkline.program import program_name
 from trunkline.recordings.session.session import read_session
@@ -34,7 +35,7 @@ def main(arguments: list[str] | None = None) -> int:
                         help=f"the drawing; default: {DRAWINGS}/<ARM's name>.png")  # fmt: skip
     args = parser.parse_args(arguments)
     model = read_drawing(args.arm, Path("."))
-    if model.nu:
+    if model.nu or len(ArmModel(model).cables):
         read_chain(model)  # what the statics cannot solve is told here
     session = None if args.session is None else read_session(args.session)
     for lines in (unit_lines(model), tendon_lines(model), marker_lines(model)):

@@ -6,9 +6,9 @@ import mujoco
 from omegaconf import OmegaConf
 
 from trunkline.errors import InputError
+from trunkline.model.arm.from_file import read_arm
 from trunkline.model.arm.kinds import Arm
 from trunkline.model.arm.mjcf import Actuation, Solver
-from trunkline.model_files import read_spec
 from trunkline.pipeline.config import own_or_project, validated
 from trunkline.settings import read_yaml, settings
 
@@ -40,4 +40,4 @@ def read_drawing(path: Path, root: Path) -> mujoco.MjModel:
         return drawn.arm.build(drawn.actuation, drawn.solver, conf / STAGE / "mjcf").spec.compile()
     if path.suffix != ".xml":
         raise InputError(f"{path}: expected an arm's description, .yaml, or a model in MJCF, .xml")
-    return read_spec(path).compile()
+    return read_arm(path).compile()

@@ -6,13 +6,12 @@ import mujoco
 import numpy as np
 
 from trunkline.identification.parameters.parameters import parameters_of
-from trunkline.model.arm_model import ArmModel
+from trunkline.model.arm_model import TIP_LOAD, ArmModel
 from trunkline.recordings.session.session import Session
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 
 WIDEST = 180.0  # deg between neighbouring tendons, from which on they cannot bend the arm to every side
 DENSEST = 11_340.0  # kg/m³, lead
-LOAD = "tip_load"  # the body that an arm's description hangs at the tip
 ALIKE = 1e-3  # share by which neighbouring units may differ and stand in one line
 
 
@@ -55,7 +54,7 @@ def units_of(model: mujoco.MjModel) -> list[Unit]:
 def load_of(model: mujoco.MjModel) -> float:
     """What hangs at the tip by the description, g; 0 without a load."""
     names = [model.body(index).name for index in range(model.nbody)]
-    return 1e3 * float(model.body(LOAD).mass[0]) if LOAD in names else 0.0
+    return 1e3 * float(model.body(TIP_LOAD).mass[0]) if TIP_LOAD in names else 0.0
 
 
 def unit_lines(model: mujoco.MjModel) -> list[str]:
@@ -122,7 +121,7 @@ def marker_lines(model: mujoco.MjModel) -> list[str]:
 def doubt_lines(model: mujoco.MjModel, session: Session | None) -> list[str]:
     """What to know before any log is recorded, or of a session."""
     arm = ArmModel(model)
-    lines = [*_hardly_meant(model), "masses are as described: no log tells them; weigh the arm"]
+    lines = [*_hardly_meant(model), "masses are as described: no log without a load tells them; weigh the arm"]
     angles = np.sort([_angle(model, cable) for cable in arm.cables])
     if len(angles):
         gaps = np.diff(np.append(angles, angles[0] + 360))

@@ -16,6 +16,7 @@ from trunkline.errors import InputError, in_one_line
 from trunkline.identification.evaluation.error_tables import marker_table, trial_table
 from trunkline.identification.results.scoring import evaluate
 from trunkline.identification.simulate.checks import check_trials
+from trunkline.model.places import marker_places
 from trunkline.pipeline.stage import output_folder, write_metrics
 from trunkline.program import program_name
 from trunkline.recordings.trials.trial import sessions_of
@@ -59,7 +60,7 @@ def _run(args: argparse.Namespace) -> int:
     twin = Twin.load(args.model)
     models = {"model": twin.arm.model} | ({} if args.cad is None else {"cad": Twin.load(args.cad).arm.model})
     written = written_beside(twin, args.settings)
-    trials = trials_of(args.session, args.settings, "evaluate")
+    trials = trials_of(args.session, args.settings, "evaluate", marker_places(models["model"]))
     if len(sessions_of(trials)) == 1 and (session := written.session_of(trials)):
         print(f"evaluate: the session {session} of those that the model was fitted to")
         trials = [replace(trial, session=session, name=f"{session}/{trial.name}") for trial in trials]

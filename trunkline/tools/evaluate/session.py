@@ -8,6 +8,7 @@ from typing import Any
 from trunkline.compute.progress import progress
 from trunkline.errors import InputError
 from trunkline.pipeline.config import settings_of
+from trunkline.recordings.cleaning.described_arm import Places
 from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.cleaning.quality import by_sentence, judge
 from trunkline.recordings.cleaning.same_arm import check_each_session
@@ -19,27 +20,30 @@ from trunkline.recordings.trials.splits import SPLITS
 from trunkline.recordings.trials.trial import Trial, read_trials
 
 
-def trials_of(folder: Path, root: Path, caller: str) -> list[Trial]:
+def trials_of(folder: Path, root: Path, caller: str, arm: Places | None = None) -> list[Trial]:
     """Every trial of a session, of all splits, filtered; what is refused, repaired or doubtful is said on stderr.
 
     Args and errors as of `read_trials_of`.
     """
-    return read_trials_of(folder, root, caller)[0]
+    return read_trials_of(folder, root, caller, arm)[0]
 
 
-def read_trials_of(folder: Path, root: Path, caller: str) -> tuple[list[Trial], list[RawTrial]]:
+def read_trials_of(
+    folder: Path, root: Path, caller: str, arm: Places | None = None
+) -> tuple[list[Trial], list[RawTrial]]:
     """`trials_of`, and the raw trials that they were filtered from, in the same order; none where they came filtered.
 
     Args:
         folder: logs and session.yaml, several such folders of one arm, or what the stage `filter` writes.
         root: holds the params.yaml that says how to take logs in and to filter them.
         caller: the command, which begins what is said.
+        arm: the described one, by which logs are checked; None where nobody describes it.
 
     Raises:
         InputError: it is no such folder, or no trial of it can be used.
     """
     if not (folder / "trials.parquet").is_file():
-        return _from_logs(folder, root, caller)
+        return _from_logs(folder, root, caller, arm)
     try:
         trials = read_trials(folder, SPLITS)
     except KeyError as error:
@@ -54,9 +58,9 @@ def read_trials_of(folder: Path, root: Path, caller: str) -> tuple[list[Trial], 
     return trials, []
 
 
-def _from_logs(folder: Path, root: Path, caller: str) -> tuple[list[Trial], list[RawTrial]]:
+def _from_logs(folder: Path, root: Path, caller: str, arm: Places | None) -> tuple[list[Trial], list[RawTrial]]:
     ingest, settings = settings_of("ingest", root), settings_of("filter", root)
-    raw = partial(_gathered, ingest=ingest, caller=caller)
+    raw = partial(_gathered, ingest=ingest, caller=caller, arm=arm)
     quality = check_each_session(session_folders(folder), raw, ingest.plausible.distance)
     gathered = together(list(quality.values()))
     for name, reason in gathered.refused.items():
@@ -73,11 +77,11 @@ def _from_logs(folder: Path, root: Path, caller: str) -> tuple[list[Trial], list
     return trials, gathered.raw_trials
 
 
-def _gathered(folder: Path, session: Session, ingest: Any, caller: str) -> CheckedSession:
+def _gathered(folder: Path, session: Session, ingest: Any, caller: str, arm: Places | None) -> CheckedSession:
     """ingest: settings of the stage."""
     taken = []
     with progress(len(session.trials), caller, "trials") as bar:
-        for entry in load_raw_trials(folder, session, ingest.limits):
+        for entry in load_raw_trials(folder, session, ingest.limits, arm):
             taken.append(entry)
             bar.update(1, trial=entry[0].name)
-    return check_session(taken, session, ingest.plausible, "leave_out", f"{folder}")
+    return check_session(taken, session, ingest.plausible, "leave_out", f"{folder}", arm)

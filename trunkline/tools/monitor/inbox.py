@@ -58,9 +58,10 @@ def sessions_of(folder: Path) -> list[Path]:
 
 
 def without_session(folder: Path) -> list[Path]:
-    """Folders with logs and no session.yaml, the watched one among them."""
+    """Folders with logs and no session.yaml, the watched one among them; not those of a session, a folder a log."""
     logs = [*folder.glob("*.mcap"), *folder.glob("[!.]*/*.mcap")]
-    return sorted({log.parent for log in logs if not (log.parent / "session.yaml").is_file()})
+    bags = {log.parent for log in logs if (log.parent.parent / "session.yaml").is_file()}
+    return sorted({log.parent for log in logs if not (log.parent / "session.yaml").is_file()} - bags)
 
 
 def planned(session: Path) -> list[dict]:

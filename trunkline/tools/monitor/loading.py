@@ -65,6 +65,7 @@ def _so_far(session: Path, files: set[str]) -> Iterator[tuple[Path, Session]]:
         folder = Path(name) / session.resolve().name
         folder.mkdir()
         for file in sorted(files):
+            (folder / file).parent.mkdir(exist_ok=True)
             os.symlink((session / file).resolve(), folder / file)
         OmegaConf.save(OmegaConf.create(content), folder / "session.yaml")
         try:

@@ -9,6 +9,7 @@ from pathlib import Path
 from trunkline.compute.progress import progress
 from trunkline.errors import InputError
 from trunkline.identification.simulate.checks import check_trials
+from trunkline.model.places import marker_places
 from trunkline.pipeline.config import settings_of
 from trunkline.pipeline.stage import output_folder
 from trunkline.recordings.trials.splits import DECIDING
@@ -241,7 +242,8 @@ def reference_scores(
     history = History.opened(out / "reference.jsonl", made_of | {"reference": marks}, replace=True)
     if history.rows and history.rows[-1].get("last"):
         return [read_score(row) for row in history.rows], False
-    trials = [trial for trial in trials_of(reference, settings, "monitor") if trial.split in DECIDING]
+    trials = trials_of(reference, settings, "monitor", marker_places(scorer.model))
+    trials = [trial for trial in trials if trial.split in DECIDING]
     check_trials(trials, scorer.model)
     with progress(len(trials), "monitor: reference", "trials") as bar:
         for number, trial in enumerate(trials, 1):

@@ -1,0 +1,59 @@
+"""By how far the twin's tip may be elsewhere at rest: friction counts once, in the futures or beside them."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+
+from tests.ar.hybrid.conftest import hybrid_settings
+from tests.support.operator import READY_JOINTS
+from tests.support.small_arm import small_spec
+from trunkline.ar.hybrid.rollout_batch import preview
+from trunkline.ar.hybrid.rollouts import CommandTrajectory
+from trunkline.ar.hybrid.tip_uncertainty import BaseAlignment, TipUncertainty
+from trunkline.ar.hybrid.uncertainty import GraspUncertainty
+from trunkline.ar.preview.preview_twin import RobotModel, compose_twin
+from trunkline.ar.session.settings import SessionConfig
+from trunkline.ar.teleop.messages import World
+from trunkline.kinematics.panda.mounts import PandaRobot
+from trunkline.model.arm.guide_holes import GuideHoles, add_holes
+from trunkline.model.arm_model import ArmModel
+from trunkline.pipeline.config import PROJECT, load_folder
+from trunkline.twin.discrepancy import Discrepancy, Lacking
+
+SETTINGS = replace(load_folder(SessionConfig, PROJECT / "conf/live").preview, step=0.002)
+PULL, STEP = np.array([0.04, 0.0, 0.0]), 0.01
+LACKING = Lacking("", Discrepancy(np.zeros((1, 3)), 16), 180.0, 180.0, 1.0, 1.0)  # nothing, of any pose
+CASES = {"rubbing": GuideHoles(0.12, 2), "no friction on the holes": GuideHoles(0.0, 2), "no holes": GuideHoles()}
+
+
+def robot_model(holes: GuideHoles) -> RobotModel:
+    """Of a small arm whose cables have some friction of their own too."""
+    arm = small_spec()
+    add_holes(arm, holes)
+    robot = hybrid_settings(robot="panda").robot
+    assert isinstance(robot, PandaRobot)
+    return RobotModel(arm, GraspUncertainty(), robot, BaseAlignment(0.0, 0.0), LACKING)
+
+
+def pull(arm: mujoco.MjModel) -> CommandTrajectory:
+    """Drawn in within half a second, and held."""
+    share = np.clip(np.arange(100) / 50, 0, 1)[:, None]
+    straight = arm.tendon_length0[arm.actuator_trnid[:, 0]]
+    return CommandTrajectory(STEP, np.tile(READY_JOINTS, (100, 1)), straight - share * PULL)
+
+
+@pytest.mark.parametrize("holes", CASES.values(), ids=CASES)
+def test_the_friction_band_is_left_out_where_the_model_that_is_stepped_rubs(holes):
+    """With 0 beside the band, the radius is that of the futures alone, else wider by nine tenths of half the band."""
+    made = robot_model(holes)
+    trajectory = pull(made.arm.copy().compile())
+    twin = compose_twin(made, World("w"), None, trajectory.joints[0], trajectory.commands[0], SETTINGS)
+    tip = made.tip_uncertainty(trajectory, None)
+    assert isinstance(tip, TipUncertainty)
+    half = float(np.linalg.norm(tip.friction))
+    assert (half == 0) == ArmModel(twin.model).rubs == (holes == CASES["rubbing"])
+    assert half == 0 or half > 1e-3
+    radius = preview(twin, trajectory, made.uncertainty, None, 2, tip=tip).stated.radii[-1]
+    assert radius == pytest.approx(0.9 * half, rel=0.1, abs=1e-6)
