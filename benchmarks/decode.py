@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
-from mcap_ros2.writer import Writer
 from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from trunkline.recordings.logs.definitions import RIGID_BODIES
 from trunkline.recordings.logs.mcap_log import read_log
-from trunkline.recordings.logs.pose_stream import pose_stream
+from trunkline.recordings.logs.pose_stream import PoseStream, pose_stream
+from trunkline.recordings.preparation.motive import write_log
 from upkeep.results import recorded
 
 SCHEMA, BODIES, RATE = "mocap4r2_msgs/msg/RigidBodies", 19, 120
@@ -45,30 +45,11 @@ def write(path: Path) -> int:
     """Write the log; the number of poses in it."""
     rng = np.random.default_rng(0)
     positions, quaternions = rng.normal(size=(FRAMES, BODIES, 3)), rng.normal(size=(FRAMES, BODIES, 4))
-    seen = rng.random((FRAMES, BODIES)) >= HIDDEN
-    with open(path, "wb") as file, Writer(file, chunk_size=2**20) as writer:
-        schema = writer.register_msgdef(SCHEMA, RIGID_BODIES)
-        for frame in range(FRAMES):
-            stamp = START + frame * 1_000_000_000 // RATE
-            content = {
-                "header": {
-                    "stamp": dict(zip(("sec", "nanosec"), divmod(stamp, 10**9), strict=True)),
-                    "frame_id": "mocap",
-                },
-                "frame_number": frame,
-                "rigidbodies": [
-                    {
-                        "rigid_body_name": f"unit_{body:02d}",
-                        "pose": {
-                            "position": dict(zip("xyz", positions[frame, body].tolist(), strict=True)),
-                            "orientation": dict(zip("wxyz", quaternions[frame, body].tolist(), strict=True)),
-                        },
-                    }
-                    for body in np.flatnonzero(seen[frame])
-                ],
-            }
-            writer.write_message("/rigid_bodies", schema, content, stamp, stamp, frame)
-    return int(seen.sum())
+    present = rng.random((FRAMES, BODIES)) >= HIDDEN
+    stamps = START + np.arange(FRAMES) * 1_000_000_000 // RATE
+    names = tuple(f"unit_{body:02d}" for body in range(BODIES))
+    write_log(path, PoseStream(stamps, stamps, np.arange(FRAMES), names, present, positions, quaternions))
+    return int(present.sum())
 
 
 def timed(reader: Callable[[Path], np.ndarray], path: Path, rounds: int) -> tuple[float, np.ndarray]:

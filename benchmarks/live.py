@@ -125,11 +125,8 @@ async def plainly(package: Path, watchers: int, stops: int) -> tuple[list[Row], 
             ("the same while one more reads nothing", halves(rest.ages), "95th: 5"),
             ("frames that are held for it", str(looks.most(rest, deaf)), "3"),
         ]
-        holds, looks, first_serial = (
-            Holds(made, [made.robot.robot_state().hold_time]),
-            Looks(server),
-            made.controller.state.serial,
-        )
+        holds, looks = Holds(made, [made.robot.robot_state().hold_time]), Looks(server)
+        first_serial = made.controller.state.serial
 
         def look() -> None:
             holds.look()
