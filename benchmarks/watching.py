@@ -156,9 +156,8 @@ class Asker:
     def _lose(self) -> None:
         self.lost += 1
         if self.lost > max(len(self.took), MOST_LOST):
-            raise InputError(
-                f"trigger: found {self.lost} presses for which no plan is asked: {self.guest.told['state']}"
-            )
+            state = self.guest.told["state"]
+            raise InputError(f"trigger: found {self.lost} presses for which no plan is asked: {state}")
         self._pressed, self._since = 0.0, time.monotonic()
 
 

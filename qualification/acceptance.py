@@ -119,11 +119,7 @@ def planning(
 
 
 def previews(
-    process: PreviewProcess,
-    package: Package,
-    config: SessionConfig,
-    simulation: Simulation,
-    world: World,
+    process: PreviewProcess, package: Package, config: SessionConfig, simulation: Simulation, world: World
 ) -> Iterator[Previewed]:
     """PLANS of them, of places at random; those that are refused are left out."""
     rng, made = np.random.default_rng(0), 0
