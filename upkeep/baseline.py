@@ -56,7 +56,7 @@ class Chained(Renewal):
 
 
 @settings
-class Baseline:
+class MetricBaseline:
     """metrics: stage: dotted key: value, of the last of `changes`, which are in order. unchained: those of before there
     was a chain, as they were; the hash before the first of the chain is theirs."""
 
@@ -69,11 +69,11 @@ def baseline_file(limits: Path) -> Path:
     return limits.with_name("baseline.json")
 
 
-def read_baseline(path: Path) -> Baseline:
+def read_baseline(path: Path) -> MetricBaseline:
     """The baseline at `path`; InputError where it is missing, malformed or holds a number that is not finite."""
     if not path.is_file():
         raise InputError(f'{path}: no such file, expected a baseline (`make baseline REASON="..."`)')
-    return checked(path, path.read_text(encoding="utf-8"), TypeAdapter(Baseline))
+    return checked(path, path.read_text(encoding="utf-8"), TypeAdapter(MetricBaseline))
 
 
 def rounded(value: Any) -> Any:
@@ -98,7 +98,7 @@ def root_hash(unchained: list[Renewal]) -> str:
     return digest([{"commit": change.commit, "reason": change.reason, "worse": change.worse} for change in unchained])
 
 
-def breaks(baseline: Baseline) -> list[str]:
+def breaks(baseline: MetricBaseline) -> list[str]:
     """One line per place at which the chain does not hold, so that something was edited or dropped; needs no Git."""
     broken, parent = [], root_hash(baseline.unchained)
     for number, change in enumerate(baseline.changes):
@@ -119,7 +119,7 @@ def unchecked(folder: Path) -> str:
     return "a shallow clone" if shallow.strip() == "true" else ""
 
 
-def disagreements(baseline: Baseline, folder: Path) -> list[str]:
+def disagreements(baseline: MetricBaseline, folder: Path) -> list[str]:
     """One line per value that is not that of its commit's metrics, or one that says that this commit is not in the
     history. Empty where Git cannot say (`unchecked`)."""
     commit, wrong = baseline.changes[-1].commit, []
@@ -156,7 +156,7 @@ def _beside(name: Path) -> bool:
     return name.name in rows or name.suffix in (".md", ".png")
 
 
-def unrun(limits: Limits, baseline: Baseline, folder: Path) -> list[str]:
+def unrun(limits: Limits, baseline: MetricBaseline, folder: Path) -> list[str]:
     """Stages that have neither metrics in `folder` nor a row in the baseline."""
     return [
         stage
@@ -165,7 +165,7 @@ def unrun(limits: Limits, baseline: Baseline, folder: Path) -> list[str]:
     ]
 
 
-def renewed(before: Baseline | None, limits: Limits, folder: Path, commit: str, reason: str) -> Baseline:
+def renewed(before: MetricBaseline | None, limits: Limits, folder: Path, commit: str, reason: str) -> MetricBaseline:
     """The baseline after `before`, of the metrics in `folder`.
 
     Raises:
@@ -192,7 +192,7 @@ def renewed(before: Baseline | None, limits: Limits, folder: Path, commit: str, 
     changes = [] if before is None else before.changes
     parent = changes[-1].hash if changes else root_hash([])
     change = linked(parent, commit, reason, worse, values)
-    return Baseline(changes=[*changes, change], metrics=values, unchained=before.unchained if before else [])
+    return MetricBaseline(changes=[*changes, change], metrics=values, unchained=before.unchained if before else [])
 
 
 def _output(folder: Path, *arguments: str) -> str | None:
@@ -204,7 +204,7 @@ def _output(folder: Path, *arguments: str) -> str | None:
     return None if done.returncode else done.stdout
 
 
-def _wanted(before: Baseline, after: Baseline, limits: Path) -> bool:
+def _wanted(before: MetricBaseline, after: MetricBaseline, limits: Path) -> bool:
     """Whether `after` says anything new: other values, or the same ones of a commit that is in the history.
 
     Raises:
@@ -241,7 +241,7 @@ def main(root: Path = Path("."), words: list[str] | None = None) -> int:
             continue
         written[path] = after
     for path, after in written.items():  # all or none
-        write_json(path, TypeAdapter(Baseline).dump_python(after))
+        write_json(path, TypeAdapter(MetricBaseline).dump_python(after))
         print(f"baseline: wrote {path.relative_to(root)}")
         for line in after.changes[-1].worse:
             print(f"baseline: worse: {line}")

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from trunkline.errors import InputError
 from upkeep.baseline import (
-    Baseline,
+    MetricBaseline,
     baseline_file,
     breaks,
     company,
@@ -28,7 +28,7 @@ from upkeep.limits import Limits, limit_files, metrics_folder, read_limits, read
 from upkeep.provenance import stale
 
 
-def failures(limits: Limits, baseline: Baseline, folder: Path) -> list[str]:
+def failures(limits: Limits, baseline: MetricBaseline, folder: Path) -> list[str]:
     """One line per metric in `folder` that breaks its limit, naming stage and key; empty if all is well."""
     problems, never = [], unrun(limits, baseline, folder)
     for stage, rows in limits.items():

@@ -24,7 +24,7 @@ BESIDE = {"identified": "", "cad": ": CAD", "null": ": null model", "noise_floor
 
 
 @dataclass(frozen=True)
-class Effect:
+class Unmodeled:
     """What a plant of the lab has that acts in the trials from which the parameters `on` come.
 
     unless: the model has it too if this parameter is identified, or one that differs by a number at its end.
@@ -56,28 +56,28 @@ RUBBING = ("tendon_friction", "friction_time")
 MOTORS = (*CURLED, "kv", "time_constant", "dead_time", "rate_limit", "backlash")
 LACKING = {
     "cousin": (
-        Effect("a motor with a limited rate and a delay", ("kp", "kv")),
-        Effect("a motor with a limited rate and a delay, which has no time constant", ("time_constant",)),
-        Effect("two joints in every unit", ("hardening", "damping", "kp")),
-        Effect("dry friction in the joints", ("hardening", "damping", *RUBBING, "kv"), unless="joint_friction"),
-        Effect("scatter from unit to unit", SPRINGS),
-        Effect("masses off", ("stiffness", "damping", "tendon_friction", "kp", "kv", "force_range")),
-        Effect("another integrator", ("damping",)),
+        Unmodeled("a motor with a limited rate and a delay", ("kp", "kv")),
+        Unmodeled("a motor with a limited rate and a delay, which has no time constant", ("time_constant",)),
+        Unmodeled("two joints in every unit", ("hardening", "damping", "kp")),
+        Unmodeled("dry friction in the joints", ("hardening", "damping", *RUBBING, "kv"), unless="joint_friction"),
+        Unmodeled("scatter from unit to unit", SPRINGS),
+        Unmodeled("masses off", ("stiffness", "damping", "tendon_friction", "kp", "kv", "force_range")),
+        Unmodeled("another integrator", ("damping",)),
     ),
     "stranger": (
-        Effect("a limited rate of the motors", MOTORS, unless="rate_limit"),
-        Effect("backlash of the motors", MOTORS, unless="backlash"),
-        Effect("cables that differ", MOTORS),
-        Effect("dead time of the motors", MOTORS, unless="dead_time"),
-        Effect("friction on its holes", (*SPRINGS, *RUBBING, "kp", "kv", "force_range"), "capstan_friction"),
-        Effect("Maxwell branches", ("damping", *RELAXING, *MEMORY, *RUBBING, "kp", "kv"), "relaxation", "branches"),
-        Effect("sliders", (*SPRINGS, "damping", *RELAXING, *MEMORY, *RUBBING, *CURLED), "hysteresis", "sliders"),
-        Effect("a rest shape", (*SPRINGS, *LEAN), unless="rest_bend_x"),
-        Effect("a rest shape that grows towards the tip", (*BENDS, *LEAN), unless="rest_gradient_x"),
-        Effect("a mount that leans", (*SPRINGS, *REST), unless="mount_tilt_x"),
-        Effect("several links in every unit", (*SPRINGS, "damping", "kp"), unless="joint_place"),
-        Effect("scatter from link to link", (*SPRINGS, *REST, *LEAN)),
-        Effect("masses off", ("stiffness", "damping", "tendon_friction", "kp", "kv", "force_range")),
+        Unmodeled("a limited rate of the motors", MOTORS, unless="rate_limit"),
+        Unmodeled("backlash of the motors", MOTORS, unless="backlash"),
+        Unmodeled("cables that differ", MOTORS),
+        Unmodeled("dead time of the motors", MOTORS, unless="dead_time"),
+        Unmodeled("friction on its holes", (*SPRINGS, *RUBBING, "kp", "kv", "force_range"), "capstan_friction"),
+        Unmodeled("Maxwell branches", ("damping", *RELAXING, *MEMORY, *RUBBING, "kp", "kv"), "relaxation", "branches"),
+        Unmodeled("sliders", (*SPRINGS, "damping", *RELAXING, *MEMORY, *RUBBING, *CURLED), "hysteresis", "sliders"),
+        Unmodeled("a rest shape", (*SPRINGS, *LEAN), unless="rest_bend_x"),
+        Unmodeled("a rest shape that grows towards the tip", (*BENDS, *LEAN), unless="rest_gradient_x"),
+        Unmodeled("a mount that leans", (*SPRINGS, *REST), unless="mount_tilt_x"),
+        Unmodeled("several links in every unit", (*SPRINGS, "damping", "kp"), unless="joint_place"),
+        Unmodeled("scatter from link to link", (*SPRINGS, *REST, *LEAN)),
+        Unmodeled("masses off", ("stiffness", "damping", "tendon_friction", "kp", "kv", "force_range")),
     ),
 }
 

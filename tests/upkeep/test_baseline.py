@@ -11,7 +11,7 @@ from tests.support.gated import changed, commit, git, made, renew, stored, write
 from trunkline.errors import InputError
 from trunkline.pipeline.stage import write_json
 from upkeep import baseline, gate
-from upkeep.baseline import Baseline, Renewal, breaks, linked, root_hash
+from upkeep.baseline import MetricBaseline, Renewal, breaks, linked, root_hash
 from upkeep.limits import Limit
 
 
@@ -36,7 +36,8 @@ def chain():
         metrics = {"fit": {"spread": 4.0 + number, "accuracy": 0.95}, "map": {"reach": 1.0}}
         changes.append(linked(parent, f"b{number}", f"reason {number}", [f"fit: spread: {number}"], metrics))
         parent = changes[-1].hash
-    return json.loads(TypeAdapter(Baseline).dump_json(Baseline(changes=changes, metrics=metrics, unchained=unchained)))
+    baseline = MetricBaseline(changes=changes, metrics=metrics, unchained=unchained)
+    return json.loads(TypeAdapter(MetricBaseline).dump_json(baseline))
 
 
 def set_to(value, *path):
@@ -81,7 +82,7 @@ EDITS = {
 
 
 def read(content):
-    return TypeAdapter(Baseline).validate_json(json.dumps(content), strict=True)
+    return TypeAdapter(MetricBaseline).validate_json(json.dumps(content), strict=True)
 
 
 def test_a_chain_that_nobody_touched_holds():
