@@ -39,9 +39,9 @@ def main(path: Path) -> None:
     network = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
     poses, times = targets.astype(np.float32), []
     for index in range(SINGLE):
-        one = poses[index % len(poses)][None]
+        pose = poses[index % len(poses)][None]
         started = time.perf_counter()
-        network.run(None, {"pose": one})
+        network.run(None, {"pose": pose})
         times.append(time.perf_counter() - started)
     print(f"{path}: median {1e6 * np.median(times):.1f} us an answer, one thread")
 
@@ -49,12 +49,12 @@ def main(path: Path) -> None:
     refine(chain, targets[:2], lengths[:2])  # compiles
     for steps in (0, 1, 2, 3):
         started = time.perf_counter()
-        found = refine(chain, targets, lengths, steps)
+        refined = refine(chain, targets, lengths, steps)
         seconds = (time.perf_counter() - started) / len(targets)
-        error = 1e3 * found.position_error
+        error = 1e3 * refined.position_error
         print(f"{steps} Gauss-Newton steps: tip error median {np.median(error):.2g} mm, 95 % below "
               f"{np.quantile(error, 0.95):.2g} mm, "
-              f"{(found.position_error <= 1e-3 * chain.length).mean():.1%} within 0.1 % of length, "
+              f"{(refined.position_error <= 1e-3 * chain.length).mean():.1%} within 0.1 % of length, "
               f"{1e3 * seconds:.1f} ms each, the first forward kinematics included")
 
 
