@@ -122,7 +122,6 @@ def later(project, tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.usefixtures("figures_not_laid_out")
 def test_evaluate_tells_of_each_session_and_knows_one_alone(later, capsys):
     model = "artifacts/identify_control/arm.xml"
     assert evaluate([model, f"{FILTERED}"]) == 0
@@ -143,7 +142,6 @@ def test_evaluate_tells_of_each_session_and_knows_one_alone(later, capsys):
     assert friday["model"] == whole["by_session"]["friday"]["model"]
 
 
-@pytest.mark.usefixtures("figures_not_laid_out")
 def test_another_session_of_the_same_name_is_doubted(later, capsys):
     trials = [replace(t, positions=t.positions + 1e-5 * np.arange(3)) for t in read_trials(FILTERED, SPLITS)]
     write_trials(FILTERED, trials)

@@ -43,6 +43,8 @@ def hardening_stump() -> mujoco.MjModel:
         joint.solimp_limit = [0.5, 0.95, 0.05, 0.4, 3]
         joint.axis = np.array(joint.axis) + rng.uniform(-0.1, 0.1, 3)
     for first, second in zip(spec.joints[::2], spec.joints[1::2], strict=True):
+        axis = first.axis / np.linalg.norm(first.axis)
+        second.axis = second.axis - (second.axis @ axis) * axis  # at right angles
         for number, sign in enumerate((1, -1), 1):
             name = f"{first.name}_{DIAGONAL}_{number}"
             diagonal = spec.add_tendon(name=name, stiffness=[0, 0, number * first.stiffness[0]])

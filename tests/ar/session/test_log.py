@@ -200,11 +200,11 @@ def test_a_session_in_which_the_arm_was_seen_is_one_to_identify_from(tmp_path, c
 def test_what_a_twin_drew_of_a_real_machine_is_not_taken_for_the_arm(tmp_path, capsys):
     truth, path = motion_truth(), tmp_path / "run.mcap"
     told_of(path, truth, hardware=REAL)
-    assert inspect([str(path)]) == 0
-    output = capsys.readouterr().out
+    assert inspect([str(path)]) == 1
+    output, message = capsys.readouterr()
     assert re.search(rf"{TWIN} +tf2_msgs/msg/TFMessage \(cdr\), drawn by a twin, not read", output)
     assert f"  {POSES} " not in output
-    assert "no session.yaml to propose" in output
+    assert "no session.yaml to propose" in message
     (tmp_path / "session.yaml").write_text(
         "frame: {up: [0, 0, 1], unit: m}\nbase: base\ntopics: {commands: /tendons/command}\n"
         "trials: [{file: run.mcap, experiment: motion, split: identify}]\n"

@@ -108,7 +108,7 @@ def test_a_mistake_in_the_list_is_one_line(tmp_path, capsys, arms, message):
 
 def test_only_what_a_stage_needs_is_run():
     stages = yaml.safe_load((PROJECT / "dvc.yaml").read_text())["stages"]
-    assert list(needed(stages, "filter", PROJECT)) == ["ingest", "filter"]
+    assert list(needed(stages, "filter", PROJECT)) == ["ingest", "filter", "build_mjcf"]
     assert "train_ik" not in needed(stages, "score", PROJECT)
     with pytest.raises(InputError, match="--until: found 'scor', expected a stage of .*did you mean 'score'"):
         needed(stages, "scor", PROJECT)
