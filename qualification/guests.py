@@ -19,7 +19,7 @@ HZ = 72.0  # of inputs
 Place = tuple[float, float, float]  # m, in the base frame
 
 RIGID, TIP, LENGTH = (0.5, 0.0, 0.55), (0.62, 0.0, 0.2), 0.6  # m, of the targets and of rays at first
-SEEN = 7  # an input's flags: both hands tracked, the page visible
+SEEN, UNDRAWN = 15, 7  # an input's flags: both hands tracked, the page visible, the robot drawn; all but that
 WATCHED = 0.2  # s after a preview's end, at which it is said to have been shown
 
 
