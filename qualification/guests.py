@@ -65,8 +65,9 @@ class Guest:
     async def say(self, **message) -> None:
         await self.socket.send_json(message)
 
-    async def send(self, kind: str, rows: bytes = b"", flags: int = 0, count: int = 0) -> None:
-        head = struct.pack("<BBHId", binary.FROM_CLIENT[kind].number, flags, count, self.received, self.now())
+    async def send(self, kind: str, rows: bytes = b"", flags: int = 0, count: int = 0, late: float = 0.0) -> None:
+        """late: s by which its stamp is older than now."""
+        head = struct.pack("<BBHId", binary.FROM_CLIENT[kind].number, flags, count, self.received, self.now() - late)
         await self.socket.send_bytes(head + rows)
 
     async def leave(self) -> None:

@@ -105,7 +105,7 @@ class SessionController:
         self._inputs: deque[HandInput] = deque(maxlen=MOST_INPUTS)
         self._last, self._fresh = self._nobody, True
         self._shift = 0.0  # s from a client's stamps to the core's
-        self._undrawn = 0.0  # s in which who controls has drawn nothing
+        self._drawn, self._undrawn = False, 0.0  # since the last tick; s in which who controls has drawn nothing
         self.notice = ""  # for all: the core's, or why who controls counts as silent
         self._instead = ("", "")  # a notice of the core's, and what is told instead
         self._stop, self._fault, self._shown_digest, self._since, self._believed = False, "", "", 0.0, ""
@@ -136,7 +136,7 @@ class SessionController:
             heard = last.stamp - self._shift
             return f"input: stamp {stamp:.6g} s is not after {heard:.6g} s: heard before"
         stamp += self._shift
-        self._undrawn = 0.0 if drawn else self._undrawn
+        self._drawn = self._drawn or drawn
         self._inputs.append(HandInput(stamp, left, right))
         return ""
 
@@ -150,7 +150,8 @@ class SessionController:
     def control(self, alignment: Pose | None, unfit: str = "") -> None:
         """Somebody else controls now, or nobody, who is aligned so."""
         self._inputs.clear()
-        self._last, self._fresh, self._undrawn = self._nobody, True, 0.0
+        self._last, self._fresh = self._nobody, True
+        self._drawn, self._undrawn = False, 0.0
         self.align(alignment, unfit)
         self.robot.stop()
 
@@ -218,8 +219,9 @@ class SessionController:
             self._believe(robot_state, executor)
         joints: Joints = tuple(float(q) for q in robot_state.joints)  # type: ignore[assignment]
         steps = list(self._inputs) or [self._last]
-        self._undrawn += dt
-        blind = bool(self._inputs) and self._undrawn > UNDRAWN and self.intent is not None and self.intent.mode in ACTING
+        self._undrawn, self._drawn = 0.0 if self._drawn else self._undrawn + dt, False
+        acts = self.intent is not None and self.intent.mode in ACTING
+        blind = acts and bool(self._inputs) and self._undrawn > UNDRAWN
         if blind:
             steps = [self._silence()]
         self._inputs.clear()
