@@ -595,6 +595,10 @@ def test_where_the_log_ends_a_robot_under_way_holds():
             log_writer.fault = "log: run.mcap: no space left on device; nothing is executed"
             await guest.hears("state", mode="stopped", robot="idle")
             assert here.robot.stops
+            log_writer.fault = ""  # its process is back
+            guest.left, guest.right = hand(MOUNT, primary=1.0), hand(TIP)
+            await guest.hears("state", mode="aim", notice="")
+            assert here.log[-1] == "log: written again"
 
     asyncio.run(session())
 
