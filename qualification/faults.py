@@ -51,14 +51,14 @@ NOBODY, GOES_ON = "(nobody is left to say it)", "(nothing: the plan goes on to i
 @dataclass(frozen=True)
 class Fault:
     """`do` it, and `mend` it: who controls is there again, and holds its grips. Without that, it ends its session.
-    motors: on a session that has some. told: to who controls, from the beginning. allowed: s for which it may go on
-    before it counts; None where it does not concern the motion."""
+    motors: on a session that has some. word: told to who controls, from the beginning. allowed: s for which it may go
+    on before it counts; None where it does not concern the motion."""
 
     title: str
     do: Callable[[OperatedSession], None]
     mend: Callable[[OperatedSession], None] | None = None
     motors: bool = False
-    told: str = ""
+    word: str = ""
     allowed: float | None = 0.0
 
 
@@ -129,7 +129,7 @@ FAULTS = (
     Fault(f"server hangs for {HANG:g} s", _hang, _tell("grip")),
     Fault("process that plans hangs", _stop("planner"), _resume("planner"), allowed=None),
     Fault(f"the same, as it follows ({PLANNER_TIMEOUT:g} s allowed)", _stop("planner"), _resume("planner"),
-          told="follow", allowed=PLANNER_TIMEOUT),
+          word="follow", allowed=PLANNER_TIMEOUT),
     Fault(f"log's process hangs for {STALL:g} s", _stall, _tell("grip"), allowed=None),
     Fault(f"log's process hangs ({SILENT:g} s allowed)", _stop("journal"), _resume("journal"), allowed=SILENT),
     Fault("server killed -9", lambda s: s.signal(signal.SIGKILL)),
@@ -182,7 +182,7 @@ def _wait_for_motion(fault: Fault, scene: OperatedSession) -> None:
 def session(package: Path, faults: list[Fault]) -> list[Suffered]:
     """Of each fault in turn, in one session: no more than the last of them ends it."""
     found = []
-    with staged(package, faults[-1].motors, faults[-1].told) as scene:
+    with staged(package, faults[-1].motors, faults[-1].word) as scene:
         for fault in faults:
             found.append(suffered(fault, scene))
             print(f"{fault.title}: {1e3 * found[-1].held:.0f} ms", file=sys.stderr, flush=True)
@@ -217,8 +217,8 @@ def _line(done: float, within: float, lines: list[tuple[float, str]]) -> str:
 
 def main(package: Path, times: int) -> None:
     """Faults that are mended share a session, with the first that is not; each other one has its own."""
-    mended = [fault for fault in FAULTS if fault.mend is not None and not fault.told] * times
-    first, *others = [fault for fault in FAULTS if fault.mend is None or fault.told] * times
+    mended = [fault for fault in FAULTS if fault.mend is not None and not fault.word] * times
+    first, *others = [fault for fault in FAULTS if fault.mend is None or fault.word] * times
     found: dict[str, list[Suffered]] = {fault.title: [] for fault in FAULTS}
     for faults in ([*mended, first], *([fault] for fault in others)):
         for one in session(package, faults):

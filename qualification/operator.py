@@ -84,11 +84,9 @@ async def _operate(pipe: Connection, token: str, told: str) -> None:
                 request_time = now
                 await guest.say(type="lease", action="ask")
             held, side = await hands.move(guest, now), ASIDE * (-1) ** hands.cycles
-            held = {"grip": held | {"grip": 1.0, "trigger": 0.0}, "release": {}}.get(told, held)
-            if told == "follow":
-                side = ASIDE * math.sin(2 * math.pi * now / SWING)
-                pressed = float(hands.mode == "aim" and (now - hands.since) % AGAIN > AGAIN / 2)
-                held = held | {"trigger": 0.0, "stick_pressed": pressed, "grip": float(hands.mode in ("aim", "follow"))}
+            words = {"grip": held | {"grip": 1.0, "trigger": 0.0}, "release": {}, "follow": _following(hands, now)}
+            held = words.get(told, held)
+            side = ASIDE * math.sin(2 * math.pi * now / SWING) if told == "follow" else side
             rows = hands_at(_beside(RIGID, side), _beside(TIP, side), held)
             rows = np.full(len(rows) // 4, np.nan, dtype="<f4").tobytes() if told == "nan" else rows
             flags = {"lose": LOST, "blind": UNDRAWN}.get(told, SEEN)
@@ -97,6 +95,12 @@ async def _operate(pipe: Connection, token: str, told: str) -> None:
                 pipe.send("")
                 gripped = np.inf
             await asyncio.sleep(1 / HZ)
+
+
+def _following(hands: Hands, now: float) -> dict[str, float]:
+    """Grips, and the stick pressed now and then until the robot follows."""
+    pressed = hands.mode == "aim" and (now - hands.since) % AGAIN > AGAIN / 2
+    return {"grip": float(hands.mode in ("aim", "follow")), "stick_pressed": float(pressed)}
 
 
 def _beside(place: Place, side: float) -> Place:

@@ -72,10 +72,10 @@ class OperatedSession(SessionProcess):
 
 
 @contextlib.contextmanager
-def staged(package: Path, motors: bool, told: str = "") -> Iterator[OperatedSession]:
-    """A session that an operator controls who is `told` so from the beginning; `motors` as of `running`."""
+def staged(package: Path, motors: bool, word: str = "") -> Iterator[OperatedSession]:
+    """A session whose operator is told `word` from the beginning; `motors` as of `running`."""
     with running(package, motors) as session:
-        scene = OperatedSession(**vars(session), operator=OperatorProcess(session.told.token, told))
+        scene = OperatedSession(**vars(session), operator=OperatorProcess(session.told.token, word))
         try:
             yield scene
         finally:

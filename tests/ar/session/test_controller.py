@@ -571,11 +571,11 @@ def test_who_moves_the_robot_and_draws_nothing_counts_as_silent_and_is_told_why(
     session.flags = UNSEEN
     assert session.wait(UNDRAWN - DT).motion == "execute"
     assert session.wait(2 * DT).mode == "hold"
-    told = session.controller.state_message("somebody").notice
-    assert told == "the page has drawn nothing for 0.25 s; holding"
-    assert [fields["notice"] for kind, fields in events if kind == "mode"] == [told]
+    notice = session.controller.state_message("somebody").notice
+    assert notice == "the page has drawn nothing for 0.25 s; holding"
+    assert [fields["notice"] for kind, fields in events if kind == "mode"] == [notice]
     session.assert_it_stays()
-    assert session.controller.state_message("somebody").notice == told
+    assert session.controller.state_message("somebody").notice == notice
     session.flags = TRACKED
     session.assert_it_stays()  # not by drawing again either
     session.left, session.right = {}, {}
