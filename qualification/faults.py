@@ -2,6 +2,8 @@
 
     python -m qualification.faults [PACKAGE] [--times 5]
 
+What does not concern the motion must not end it: then the plan goes on to its end, and so does the session.
+
 The session is the real one on the simulated robot: server, log, planning and robot are processes of their own, and so
 is the client that controls. It goes through aim, preview, confirmation and execution; as the robot moves, something is
 done to one of them. Times are noted by the robot's own process, of its axes as they are sent, on one clock; where that
@@ -23,31 +25,41 @@ import numpy as np
 
 from qualification.command import qualify
 from qualification.hushed import HUSH
-from qualification.operator import JUMP, PATIENCE
+from qualification.operator import DRIFTS, JUMP, LATE, PATIENCE
 from qualification.scene import OperatedSession, staged
+from trunkline.ar.session.clock import FORWARD
+from trunkline.ar.session.controller import UNDRAWN
+from trunkline.ar.session.follow import PLANNER_TIMEOUT
 from trunkline.ar.session.log_reader import read_session_log
+from trunkline.ar.session.log_writer import LATE as LOG_LATE
 from trunkline.ar.session.robot_process import DEAD_MAN
+from trunkline.ar.session.settings import read_session_config
 from trunkline.errors import InputError
 
 GOAL = 0.15  # s
 MOVING = 0.4  # s for which the robot has moved before anything is done
 HANG = 0.5  # s
+STALL = 0.6  # s
 AWAY = 0.6  # s after which who controls comes back, of the 1 s after which it controls no more
 STILL = 0.15  # s without motion: it rests
 NEVER = 3.0  # s without a hold: it was told none
 WHY = ("mode", "robot", "refused")  # events that say it
-WITHIN = 1.0  # s of the fault
+WITHIN = 1.0  # s of the fault, or of when it counts
+NOBODY, GOES_ON = "(nobody is left to say it)", "(nothing: the plan goes on to its end)"
 
 
 @dataclass(frozen=True)
 class Fault:
     """`do` it, and `mend` it: who controls is there again, and holds its grips. Without that, it ends its session.
-    motors: on a session that has some."""
+    motors: on a session that has some. word: told to who controls, from the beginning. allowed: s for which it may go
+    on before it counts; None where it does not concern the motion."""
 
     title: str
     do: Callable[[OperatedSession], None]
     mend: Callable[[OperatedSession], None] | None = None
     motors: bool = False
+    word: str = ""
+    allowed: float | None = 0.0
 
 
 @dataclass
@@ -71,6 +83,24 @@ def _kill(which: str) -> Callable[[OperatedSession], None]:
     return lambda scene: os.kill(getattr(scene.told, which), signal.SIGKILL)
 
 
+def _stop(which: str) -> Callable[[OperatedSession], None]:
+    return lambda scene: os.kill(getattr(scene.told, which), signal.SIGSTOP)
+
+
+def _resume(which: str) -> Callable[[OperatedSession], None]:
+    def resume(scene: OperatedSession) -> None:
+        os.kill(getattr(scene.told, which), signal.SIGCONT)
+        scene.operator.tell("grip")
+
+    return resume
+
+
+def _stall(scene: OperatedSession) -> None:
+    os.kill(scene.told.journal, signal.SIGSTOP)
+    time.sleep(STALL)
+    os.kill(scene.told.journal, signal.SIGCONT)
+
+
 def _hang(scene: OperatedSession) -> None:
     scene.signal(signal.SIGSTOP)
     time.sleep(HANG)
@@ -82,6 +112,7 @@ def _go_on(scene: OperatedSession) -> None:
     scene.operator.signal(signal.SIGCONT)
 
 
+SILENT = read_session_config().journal.period + LOG_LATE  # s
 FAULTS = (
     Fault("grip released", _tell("release"), _tell("grip")),
     Fault("socket closed", _tell("close"), OperatedSession.renew),
@@ -89,8 +120,18 @@ FAULTS = (
     Fault("client silent", lambda s: s.operator.signal(signal.SIGSTOP), _go_on),
     Fault("both controllers lost", _tell("lose"), _tell("grip")),
     Fault(f"client's clock jumps by {JUMP:g} s", _tell("jump"), OperatedSession.renew),
+    Fault(f"client's clock runs {DRIFTS['drift']:.0%} fast", _tell("drift"), OperatedSession.renew,
+          allowed=FORWARD / DRIFTS["drift"]),
+    Fault(f"client's clock runs {1e6 * DRIFTS['slew']:.0f} ppm fast", _tell("slew"), _tell("grip"), allowed=None),
+    Fault(f"inputs are evenly {LATE:g} s late", _tell("late"), OperatedSession.renew),
+    Fault(f"nothing drawn, inputs go on ({UNDRAWN:g} s allowed)", _tell("blind"), _tell("grip"), allowed=UNDRAWN),
     Fault("poses are no numbers", _tell("nan"), _tell("grip")),
     Fault(f"server hangs for {HANG:g} s", _hang, _tell("grip")),
+    Fault("process that plans hangs", _stop("planner"), _resume("planner"), allowed=None),
+    Fault(f"the same, as it follows ({PLANNER_TIMEOUT:g} s allowed)", _stop("planner"), _resume("planner"),
+          word="follow", allowed=PLANNER_TIMEOUT),
+    Fault(f"log's process hangs for {STALL:g} s", _stall, _tell("grip"), allowed=None),
+    Fault(f"log's process hangs ({SILENT:g} s allowed)", _stop("journal"), _resume("journal"), allowed=SILENT),
     Fault("server killed -9", lambda s: s.signal(signal.SIGKILL)),
     Fault("log's process killed", _kill("journal")),
     Fault("robot's process killed", _kill("robot")),
@@ -141,24 +182,28 @@ def _wait_for_motion(fault: Fault, scene: OperatedSession) -> None:
 def session(package: Path, faults: list[Fault]) -> list[Suffered]:
     """Of each fault in turn, in one session: no more than the last of them ends it."""
     found = []
-    with staged(package, faults[-1].motors) as scene:
+    with staged(package, faults[-1].motors, faults[-1].word) as scene:
         for fault in faults:
             found.append(suffered(fault, scene))
             print(f"{fault.title}: {1e3 * found[-1].held:.0f} ms", file=sys.stderr, flush=True)
         time.sleep(WITHIN)
     events = [event for event in read_session_log(scene.told.log).events if event["event"] in WHY]
     for one in found:
-        at, why = _why(one.done, events)
-        one.said = why or _line(one.done, scene.lines) or "(nobody is left to say it)"
+        within = WITHIN + (one.fault.allowed or 0.0)
+        at, why = _why(one.done, within, events)
+        if one.fault.allowed is None and np.isinf(one.held):
+            one.said = GOES_ON
+            continue
+        one.said = why or _line(one.done, within, scene.lines) or NOBODY
         if np.isinf(one.held) and why:  # its own process notes nothing any more
             one.held = at - one.done
     return found
 
 
-def _why(done: float, events: list[dict]) -> tuple[float, str]:
-    """The first reason that the log gives after `done`, and when."""
+def _why(done: float, within: float, events: list[dict]) -> tuple[float, str]:
+    """The first reason that the log gives `within` so many s after `done`, and when."""
     for event in events:
-        if done < event["time"] < done + WITHIN:
+        if done < event["time"] < done + within:
             words = {"mode": "notice", "refused": "reason"}.get(event["event"])
             found = event[words] if words else event["robot"]["fault"]
             if found:
@@ -166,14 +211,14 @@ def _why(done: float, events: list[dict]) -> tuple[float, str]:
     return np.inf, ""
 
 
-def _line(done: float, lines: list[tuple[float, str]]) -> str:
-    return next((f"{line} (server)" for at, line in lines if done < at < done + WITHIN), "")
+def _line(done: float, within: float, lines: list[tuple[float, str]]) -> str:
+    return next((f"{line} (server)" for at, line in lines if done < at < done + within), "")
 
 
 def main(package: Path, times: int) -> None:
     """Faults that are mended share a session, with the first that is not; each other one has its own."""
-    mended = [fault for fault in FAULTS if fault.mend is not None] * times
-    first, *others = [fault for fault in FAULTS if fault.mend is None] * times
+    mended = [fault for fault in FAULTS if fault.mend is not None and not fault.word] * times
+    first, *others = [fault for fault in FAULTS if fault.mend is None or fault.word] * times
     found: dict[str, list[Suffered]] = {fault.title: [] for fault in FAULTS}
     for faults in ([*mended, first], *([fault] for fault in others)):
         for one in session(package, faults):
@@ -183,16 +228,17 @@ def main(package: Path, times: int) -> None:
     print("|---|---:|---:|---:|---:|---:|---|")
     for title, rows in found.items():
         print(f"| {title} | {told(rows)} | {rows[0].said} |")
-    most = max(one.held for rows in found.values() for one in rows)
-    print(f"\nGoal: {1e3 * GOAL:.0f} ms; found at most {1e3 * most:.0f} ms. The robot itself brakes after"
-          f" {1e3 * DEAD_MAN:.0f} ms without a permit.")  # fmt: skip
+    late = [one.held - one.fault.allowed for rows in found.values() for one in rows if one.fault.allowed is not None]
+    print(f"\nGoal: {1e3 * GOAL:.0f} ms once it counts; found at most {1e3 * max(late):.0f} ms. The robot itself brakes"
+          f" after {1e3 * DEAD_MAN:.0f} ms without a permit.")  # fmt: skip
 
 
 def told(rows: list[Suffered]) -> str:
     held, rested = (1e3 * np.array([getattr(one, what) for one in rows]) for what in ("held", "rested"))
     resumed = [one.resumed for one in rows if one.resumed is not None]
     again = str(sum(resumed)) if resumed else "nobody comes back"
-    return f"{len(rows)} | {np.median(held):.0f} | {held.max():.0f} | {rested.max():.0f} | {again}"
+    median, most = (f"{value:.0f}" if np.isfinite(value) else "not told" for value in (np.median(held), held.max()))
+    return f"{len(rows)} | {median} | {most} | {rested.max():.0f} | {again}"
 
 
 if __name__ == "__main__":

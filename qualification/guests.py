@@ -19,7 +19,7 @@ HZ = 72.0  # of inputs
 Place = tuple[float, float, float]  # m, in the base frame
 
 RIGID, TIP, LENGTH = (0.5, 0.0, 0.55), (0.62, 0.0, 0.2), 0.6  # m, of the targets and of rays at first
-SEEN = 7  # an input's flags: both hands tracked, the page visible
+SEEN, UNDRAWN = 15, 7  # an input's flags: both hands tracked, the page visible, the robot drawn; all but that
 WATCHED = 0.2  # s after a preview's end, at which it is said to have been shown
 
 
@@ -65,8 +65,9 @@ class Guest:
     async def say(self, **message) -> None:
         await self.socket.send_json(message)
 
-    async def send(self, kind: str, rows: bytes = b"", flags: int = 0, count: int = 0) -> None:
-        head = struct.pack("<BBHId", binary.FROM_CLIENT[kind].number, flags, count, self.received, self.now())
+    async def send(self, kind: str, rows: bytes = b"", flags: int = 0, count: int = 0, late: float = 0.0) -> None:
+        """late: s by which its stamp is older than now."""
+        head = struct.pack("<BBHId", binary.FROM_CLIENT[kind].number, flags, count, self.received, self.now() - late)
         await self.socket.send_bytes(head + rows)
 
     async def leave(self) -> None:

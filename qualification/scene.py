@@ -28,11 +28,12 @@ ENDS = 20.0  # s that a session has to end
 
 @dataclass(frozen=True)
 class Told:
-    """Of a session that is ready: the pids of its robot and of its log's process, and the log."""
+    """Of a session that is ready: the pids of its robot, its log's process and the one that plans, and the log."""
 
     token: str
     robot: int
     journal: int
+    planner: int
     log: Path
 
 
@@ -71,10 +72,10 @@ class OperatedSession(SessionProcess):
 
 
 @contextlib.contextmanager
-def staged(package: Path, motors: bool) -> Iterator[OperatedSession]:
-    """A session that an operator controls; `motors` as of `running`."""
+def staged(package: Path, motors: bool, word: str = "") -> Iterator[OperatedSession]:
+    """A session whose operator is told `word` from the beginning; `motors` as of `running`."""
     with running(package, motors) as session:
-        scene = OperatedSession(**vars(session), operator=OperatorProcess(session.told.token))
+        scene = OperatedSession(**vars(session), operator=OperatorProcess(session.told.token, word))
         try:
             yield scene
         finally:
@@ -134,6 +135,8 @@ async def _serve(pipe: Connection, package: Path, motors: bool) -> None:
     async with opened(package, ADDRESS, say, hardware) as (server, made):
         assert made.robot.pid is not None
         assert made.log_writer.pid is not None
-        pipe.send(Told(server.composition.token, made.robot.pid, made.log_writer.pid, made.log_writer.path))
+        assert made.previewer.pid is not None
+        pids = made.robot.pid, made.log_writer.pid, made.previewer.pid
+        pipe.send(Told(server.composition.token, *pids, made.log_writer.path))
         with contextlib.suppress(EOFError, OSError):
             await asyncio.to_thread(pipe.recv)

@@ -158,7 +158,7 @@ class RehearsedSession:
         self.now += 1 / RATE
         controller, before = self.controller, self.controller.plan
         left, right = (hand.controller(self.now, end) for hand, end in zip(self.hands, self.rays, strict=True))
-        controller.hear(self.now, left, right)
+        controller.hear(self.now, left, right, drawn=True)  # its operator sees each frame
         intent = controller.tick(1 / RATE)
         controller.poll(self.now)
         self.rays = intent.rays

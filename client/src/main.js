@@ -23,7 +23,7 @@ const OVER = new Set(["hold", "aim", "follow", "stopped"]); // modes in which no
 const SHOWN_IN = new Set(["preview", "ready", "delay"]);
 const BUSY = new Set(["plan", ...SHOWN_IN, "execute", "follow"]); // modes after which it is to be read why they ended
 // s that two pictures may take before some are left out, how much longer one then stays, and s that count at most
-const SLOW = 0.06, REST = 2, MOST = 0.2;
+const SLOW = 0.06, REST = 2, MOST = 0.08; // together less than the 0.25 s in which who moves the robot has to draw it
 const DESKTOP = { position: new Vector3(), quaternion: new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), -Math.PI / 2) };
 
 const find = (id) => document.getElementById(id);
@@ -260,7 +260,15 @@ class Page {
     if (!immersed) this.orbit.update();
     this.drawn.scene.background = immersed ? null : (this.ground ??= new Color(BACK));
     this.renderer.render(this.drawn.scene, this.camera);
+    this.acknowledge();
     this.measure(now);
+  }
+
+  /** The robot's newest pose is in the picture, where there is one: whoever sees no robot does not move it. */
+  acknowledge() {
+    if (!this.wire || !this.frame || this.frame === this.shown || this.renderer.getContext().isContextLost()) return;
+    this.shown = this.frame;
+    this.wire.drawn = true;
   }
 
   /** How long a picture takes where it takes long: until the next could be begun. */

@@ -26,7 +26,7 @@ export function decode(buffer) {
 }
 
 /** A binary message of a client; `hands` as `desktop` and `immersive` give them, of an input only; `pose` of a view, null where it is lost. */
-export function encode(name, { received, stamp, hands = null, visible = false, pose = null }) {
+export function encode(name, { received, stamp, hands = null, visible = false, drawn = false, pose = null }) {
   const kind = FROM_CLIENT[name], rows = hands ? HANDS.length : kind.row.length ? 1 : 0;
   const message = new DataView(new ArrayBuffer(HEAD_BYTES + 4 * rows * kind.row.length));
   let flags = 0;
@@ -42,6 +42,7 @@ export function encode(name, { received, stamp, hands = null, visible = false, p
       HAND.forEach((_, place) => message.setFloat32(HEAD_BYTES + 4 * (index * HAND.length + place), numbers[place], true));
     });
     if (visible) flags |= kind.flags.visible;
+    if (drawn) flags |= kind.flags.drawn;
   }
   message.setUint8(HEAD.type.offset, kind.type);
   message.setUint8(HEAD.flags.offset, flags);
@@ -78,6 +79,7 @@ export class Wire {
     this.hello = { token, code, name, space };
     this.id = this.key = "";
     this.received = 0;
+    this.drawn = false; // whether a pose of the robot was drawn since the last input
     this.offset = null; // s, server = page + offset
     this.controls = false; // then its input acknowledges, else it does so message by message
     this.wait = FIRST_WAIT;
@@ -90,7 +92,7 @@ export class Wire {
     const socket = new WebSocket(`${protocol === "https:" ? "wss" : "ws"}://${host}/ws`);
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
-      this.received = 0;
+      [this.received, this.drawn] = [0, false];
       const { token, code, name, space } = this.hello;
       this.say("hello", { version: VERSION, token, code: token ? "" : code, key: this.key, name, space });
       this.heard.opened?.();
@@ -147,9 +149,10 @@ export class Wire {
     if (this.up) this.socket.send(JSON.stringify({ type, ...fields }));
   }
 
-  /** Poses and buttons of a frame of the page at `stamp`, s; it acknowledges what has come. */
+  /** Poses and buttons of a frame of the page at `stamp`, s; it acknowledges what has come, and what was drawn. */
   input(hands, visible, stamp) {
-    this.send("input", { hands, visible, stamp });
+    this.send("input", { hands, visible, stamp, drawn: this.drawn });
+    this.drawn = false;
   }
 
   /** The viewer's eyes in the room. */

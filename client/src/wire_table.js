@@ -94,7 +94,8 @@ export const FROM_CLIENT = {
     "flags": {
       "left_tracked": 1,
       "right_tracked": 2,
-      "visible": 4
+      "visible": 4,
+      "drawn": 8
     }
   },
   "view": {

@@ -244,6 +244,24 @@ test("a recording is played by the ghost, and a file that is none is said", asyn
   assert.deepEqual(wrongs, []);
 });
 
+test("only what was drawn is acknowledged: not by a page that has lost its picture", async (t) => {
+  const { page } = await open(t, browser, server);
+  await loaded(page);
+  await until(page, () => globalThis.trunkline.wire.drawn); // it does not control, so no input takes it
+  const after = (seconds) => page.evaluate(async (wait) => {
+    globalThis.trunkline.wire.drawn = false;
+    await new Promise((resolve) => setTimeout(resolve, 1000 * wait));
+    return globalThis.trunkline.wire.drawn;
+  }, seconds);
+  await page.evaluate(() => {
+    globalThis.lost = globalThis.trunkline.renderer.getContext().getExtension("WEBGL_lose_context");
+    globalThis.lost.loseContext();
+  });
+  assert.equal(await after(1), false);
+  await page.evaluate(() => globalThis.lost.restoreContext());
+  await until(page, () => globalThis.trunkline.wire.drawn);
+});
+
 test("axe finds nothing against the page", async (t) => {
   const { page } = await open(t, browser, server);
   await loaded(page);

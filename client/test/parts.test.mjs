@@ -33,11 +33,11 @@ test("a frame of the server is read by the table", () => {
 test("an input has each number in its place, and the flags of what is tracked", () => {
   const left = { ...noHand(), tracked: true, position: [1, 2, 3], quaternion: [0.5, 0.5, -0.5, 0.5], stick: [-0.25, 0.75], grip: true };
   const right = { ...noHand(), secondary: true };
-  const message = encode("input", { received: 9, stamp: 2.5, hands: { left, right }, visible: true });
+  const message = encode("input", { received: 9, stamp: 2.5, hands: { left, right }, visible: true, drawn: true });
   assert.equal(message.byteLength, INPUT_BYTES);
   const head = new DataView(message), rows = new Float32Array(message, HEAD_BYTES), { flags } = FROM_CLIENT.input;
   assert.deepEqual([head.getUint8(0), head.getUint8(1), head.getUint16(2, true), head.getUint32(4, true), head.getFloat64(8, true)],
-    [FROM_CLIENT.input.type, flags.left_tracked | flags.visible, 2, 9, 2.5]);
+    [FROM_CLIENT.input.type, flags.left_tracked | flags.visible | flags.drawn, 2, 9, 2.5]);
   const hand = (index) => Object.fromEntries(HAND.map((name, place) => [name, rows[index * HAND.length + place]]));
   assert.deepEqual(hand(0), { x: 1, y: 2, z: 3, qw: 0.5, qx: 0.5, qy: -0.5, qz: 0.5, trigger: 0, grip: 1, stick_x: -0.25, stick_y: 0.75, stick_pressed: 0, primary: 0, secondary: 0 });
   assert.equal(hand(1).secondary, 1);

@@ -185,7 +185,7 @@ class Guest:
     async def stop(self):
         await self.socket.send_bytes(binary("stop", self.received, self.now()))
 
-    async def input(self, left, right, stamp=None, flags=0b111):
+    async def input(self, left, right, stamp=None, flags=0b1111):
         rows = np.array([left, right], dtype="<f4").tobytes()
         head = struct.pack("<BBHId", 16, flags, 2, self.received, self.now() if stamp is None else stamp)
         await self.socket.send_bytes(head + rows)

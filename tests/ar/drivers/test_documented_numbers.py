@@ -23,7 +23,18 @@ from trunkline.ar.drivers import (
 )
 from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.ar.drivers.winch import WinchSettings
-from trunkline.ar.session import auth, client, clock, follow, hardware_process, lease, log_writer, robot_process, server
+from trunkline.ar.session import (
+    auth,
+    client,
+    clock,
+    controller,
+    follow,
+    hardware_process,
+    lease,
+    log_writer,
+    robot_process,
+    server,
+)
 from trunkline.ar.session.settings import SessionConfig as Live
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.executor import BRAKE
@@ -83,6 +94,7 @@ FIGURES = {
         (r"the next input, then (0\.1) s of braking", [BRAKE]),
         (r"(0\.12) s of silence \(`silence`\), (0\.1) s of a lost controller",
          [CORE.safety.silence, CORE.safety.grace]),
+        (r"nothing can begin \| (0\.25) s \|", [controller.UNDRAWN]),
         (r"(0\.25) s, by its stamp or there and back", [clock.LATEST]),
         (r"sends nothing for (1) s", [lease.LEASE_TIMEOUT]),
         (r"at once, or (1) s", [lease.LEASE_TIMEOUT]),

@@ -29,6 +29,7 @@ from tests.ar.teleop.test_plan import LIMITS, NETWORK, OFFSET, RADIUS, STRAIGHT,
 from tests.support.operator import PACKAGE, READY_JOINTS, config
 from trunkline.ar.hybrid.compose import compose, panda_joints
 from trunkline.ar.preview.world_model import make_world
+from trunkline.ar.session import controller as control
 from trunkline.ar.session import lease, messages
 from trunkline.ar.session import scene as pictured
 from trunkline.ar.session.anchors import Anchors
@@ -235,7 +236,7 @@ async def obey(server: Server, robot: Robot, runner: web.AppRunner, port: int, l
 
 
 async def serve(port: int, folder: Path) -> None:
-    lease.LEASE_TIMEOUT = PATIENCE
+    lease.LEASE_TIMEOUT = control.UNDRAWN = PATIENCE
     figure, token, log = Figure(), make_token(), []
     robot, planning = Robot(figure), Planning(figure)
     core = config().core

@@ -15,7 +15,7 @@ from tests.support.operator import PACKAGE, Everywhere
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import messages
 from trunkline.ar.session.binary import HAND, Received
-from trunkline.ar.session.controller import MOST_INPUTS, SessionController
+from trunkline.ar.session.controller import MOST_INPUTS, UNDRAWN, SessionController
 from trunkline.ar.session.controller_input import controllers
 from trunkline.ar.session.follow import PLANNER_TIMEOUT
 from trunkline.ar.session.log_writer import LogWriter
@@ -30,9 +30,10 @@ DT, IDENTITY = 1 / 72, (1.0, 0.0, 0.0, 0.0)
 BASE = Pose((0.0, 0.0, 0.0), IDENTITY)
 UP = np.array([0.0, 0.0, 0.6])  # from a ray's end to the hand
 DIGEST = "d" * 64
+UNSEEN = ("left_tracked", "right_tracked", "visible")
 CUBE = Obstacle("b", (9.0,) * 3, (9.1,) * 3)
 NOTHING = np.full(7, np.nan)
-TRACKED = ("left_tracked", "right_tracked", "visible")
+TRACKED = ("left_tracked", "right_tracked", "visible", "drawn")
 
 
 class ToldRobot:
@@ -254,15 +255,15 @@ def test_a_stop_is_told_to_the_robot_at_once_and_to_the_core_at_its_next_step_wh
 # --- what is heard
 
 
-def received(stamp, left=None, right=None, flags=TRACKED) -> tuple[float, Controller, Controller]:
-    """Hands over both targets with these buttons."""
+def received(stamp, left=None, right=None, flags=TRACKED) -> tuple[float, Controller, Controller, bool]:
+    """Hands over both targets with these buttons, and whether anything was drawn."""
 
     def row(place, buttons):
         at = dict(zip("xyz", np.array(place) + UP, strict=True)) | {"qw": 1.0} | (buttons or {})
         return [at.get(name, 0.0) for name in HAND]
 
     rows = np.array([row(MOUNT, left), row(TIP, right)])
-    return stamp, *controllers(Received("input", frozenset(flags), 0, stamp, rows))
+    return stamp, *controllers(Received("input", frozenset(flags), 0, stamp, rows)), "drawn" in flags
 
 
 @pytest.mark.parametrize(("stamp", "counts"), [(1.0, False), (0.9, False), (1.0 + 1e-9, True)])
@@ -406,8 +407,8 @@ class Played:
         self.wait(0.8)
         return self
 
-    def executing(self) -> "Played":
-        """A plan that was previewed and confirmed, and runs for a while."""
+    def readied(self) -> "Played":
+        """A plan that was previewed."""
         self.aimed()
         self.right = {"grip": 1.0, "trigger": 1.0}
         self.until(lambda intent: intent.mode == "preview")
@@ -415,6 +416,13 @@ class Played:
         self.wait(PREVIEW + 0.1)
         assert self.controller.preview_shown(self.controller.intent.preview, self.now) == ""
         self.until(lambda intent: intent.mode == "ready")
+        return self
+
+    def executing(self) -> "Played":
+        """A plan that was previewed and confirmed, and runs for a while."""
+        return self.readied().executing_from_ready()
+
+    def executing_from_ready(self) -> "Played":
         self.right = {"grip": 1.0, "trigger": 1.0}
         self.until(lambda intent: intent.mode == "execute")
         self.right = {"grip": 1.0}
@@ -494,6 +502,11 @@ def hidden(session):
     session.wait(0.2)
 
 
+def undrawn(session):
+    session.flags = UNSEEN
+    session.wait(UNDRAWN + 2 * DT)
+
+
 def rested(session):
     PlanFollower.stop(session.robot)
     session.wait(0.3)
@@ -518,6 +531,7 @@ WAYS = {
     "silence": (lambda s: s.wait(0.6, heard=False), "hold", "client silent for 0.6"),
     "controllers lost": (untracked, "hold", "left controller: not tracked; holding"),
     "hidden": (hidden, "hold", "left controller: not tracked; holding"),
+    "nothing drawn": (undrawn, "hold", "client silent for 0.7"),
     "nobody controls": (lambda s: s.controller.control(None), "hold", "base is not aligned; holding"),
     "somebody else controls": (handed_over, "stopped", "robot: it has come to rest by itself; stopped"),
     "alignment lost": (lambda s: s.controller.align(None, ""), "hold", "base is not aligned; holding"),
@@ -548,6 +562,63 @@ def test_a_robot_under_way_is_told_to_hold_and_does_not_go_on(session, way):
     before = session.robot.permits
     session.assert_it_stays()
     assert session.robot.permits == before
+
+
+def test_who_moves_the_robot_and_draws_nothing_counts_as_silent_and_is_told_why(session, monkeypatch):
+    session.executing()
+    events = []
+    monkeypatch.setattr(session.controller.log_writer, "event", lambda kind, **fields: events.append((kind, fields)))
+    session.flags = UNSEEN
+    assert session.wait(UNDRAWN - DT).motion == "execute"
+    assert session.wait(2 * DT).mode == "hold"
+    notice = session.controller.state_message("somebody").notice
+    assert notice == "the page has drawn nothing for 0.25 s; holding"
+    assert [fields["notice"] for kind, fields in events if kind == "mode"] == [notice]
+    session.assert_it_stays()
+    assert session.controller.state_message("somebody").notice == notice
+    session.flags = TRACKED
+    session.assert_it_stays()  # not by drawing again either
+    session.left, session.right = {}, {}
+    session.until(lambda intent: intent.mode == "aim", 1.0)
+    assert session.controller.state_message("somebody").notice == ""
+
+
+def test_a_page_that_draws_seldom_moves_the_robot_and_one_that_draws_nothing_aims(session):
+    session.flags = UNSEEN
+    session.readied()
+    session.flags = TRACKED
+    session.executing_from_ready()
+    for _ in range(2):  # together longer than nothing may be drawn
+        session.flags = UNSEEN
+        session.wait(UNDRAWN - 2 * DT)
+        session.flags = TRACKED
+        assert session.tick().motion == "execute"
+
+
+def test_as_it_follows_who_draws_nothing_counts_as_silent(session):
+    session.aimed()
+    session.right = {"grip": 1.0, "stick_pressed": 1.0}
+    session.until(lambda intent: intent.motion == "follow")
+    undrawn(session)
+    assert session.controller.intent.mode == "hold"
+
+
+def test_what_is_confirmed_by_who_draws_nothing_does_not_begin(session):
+    session.readied()
+    session.flags = UNSEEN
+    session.wait(UNDRAWN + 2 * DT)
+    assert session.controller.intent.mode == "ready"  # nothing moves: the plan is kept
+    session.right = {"grip": 1.0, "trigger": 1.0}
+    session.until(lambda intent: intent.mode == "hold", 0.1)
+    assert session.robot.permits == 0
+
+
+def test_who_takes_over_has_time_to_draw(session):
+    session.aimed()
+    session.flags = UNSEEN
+    session.wait(1.0)
+    session.controller.control(BASE)
+    assert session.controller._undrawn == 0.0
 
 
 def test_as_it_follows_it_goes_after_the_targets_and_holds_as_soon_as_nobody_answers(session):

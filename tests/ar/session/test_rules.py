@@ -66,7 +66,7 @@ def synchronized(round_trip=0.0) -> ClientClock:
     [
         (0.0, ""),
         (-FORWARD + NEAR, ""),
-        (-FORWARD - NEAR, "input: its stamp is 0.05 s ahead; the clock has jumped"),
+        (-FORWARD - NEAR, "input: its stamp is 0.05 s ahead; the clock runs fast, or has jumped"),
         (LATEST - NEAR, ""),
         (LATEST + NEAR, "input: it comes 0.25 s late, expected at most 0.25 s"),
         (JUMP - NEAR, "input: it comes 1.00 s late, expected at most 0.25 s"),

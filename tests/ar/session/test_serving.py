@@ -224,7 +224,7 @@ def test_a_robot_under_way_is_told_to_hold_and_does_not_go_on(way):
                 await guest.say(type="lease", action="release")
             else:
                 guest.sending.cancel()
-                flags = {"untracked": 0b101, "hidden": 0b011}[way]
+                flags = {"untracked": 0b1101, "hidden": 0b1011}[way]
                 for _ in range(30):
                     await guest.input(guest.left, guest.right, flags=flags)
                     await asyncio.sleep(1 / 72)
@@ -238,6 +238,23 @@ def test_a_robot_under_way_is_told_to_hold_and_does_not_go_on(way):
             await asyncio.sleep(0.5)
             np.testing.assert_array_equal(here.robot.robot.joints, joints)
             assert here.robot.state().mode != "running"
+
+    asyncio.run(session())
+
+
+@pytest.mark.realtime
+def test_who_sends_inputs_and_draws_nothing_holds_the_robot_hears_why_and_still_controls():
+    async def session():
+        async with laid() as here:
+            guest, watcher = await controlling(here), await here.come()
+            await executing(here, guest)
+            guest.sending.cancel()
+            for _ in range(30):
+                await guest.input(guest.left, guest.right, flags=0b0111)
+                await asyncio.sleep(1 / 72)
+            state = await watcher.hears("state", mode="hold", motion="hold")
+            assert state["notice"].startswith("the page has drawn nothing for 0.")
+            assert (await watcher.hears("lease"))["holder"] == guest.id
 
     asyncio.run(session())
 

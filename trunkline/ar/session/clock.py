@@ -54,7 +54,8 @@ class ClientClock:
             return "input: the clock's offset is not known yet"
         late = now - (stamp + self.offset)
         if late < -FORWARD or late > JUMP:
-            return f"input: its stamp is {abs(late):.3g} s {'old' if late > 0 else 'ahead'}; the clock has jumped"
+            why = "has jumped" if abs(late) > JUMP else "runs fast, or has jumped"
+            return f"input: its stamp is {abs(late):.3g} s {'old' if late > 0 else 'ahead'}; the clock {why}"
         if late > LATEST:
             return f"input: it comes {late:.2f} s late, expected at most {LATEST:g} s"
         if self.round_trip > LATEST:

@@ -52,6 +52,8 @@ JUST_AFTER = 1e-3  # s of the core's clock between the last input of whom contro
 HERE = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))  # of poses that are in the base frame already
 NUMBER = re.compile(r"[\d.]+")
 DIGITS = 4  # after the decimal point, of targets that are told
+UNDRAWN = 0.25  # s in which who moves the robot may have drawn no new pose of it
+ACTING = ("delay", "execute", "follow")  # modes in which it moves, or is about to
 MOST_INPUTS = 8  # of a tick; older ones than these are left out, presses and all
 
 
@@ -103,6 +105,9 @@ class SessionController:
         self._inputs: deque[HandInput] = deque(maxlen=MOST_INPUTS)
         self._last, self._fresh = self._nobody, True
         self._shift = 0.0  # s from a client's stamps to the core's
+        self._drawn, self._undrawn = False, 0.0  # since the last tick; s in which who controls has drawn nothing
+        self.notice = ""  # for all: the core's, or why who controls counts as silent
+        self._instead = ("", "")  # a notice of the core's, and what is told instead
         self._stop, self._fault, self._shown_digest, self._since, self._believed = False, "", "", 0.0, ""
         self._requested, self._ordered, self._started, self._ran = 0, False, "", False
         self._logged: tuple = ()
@@ -120,8 +125,9 @@ class SessionController:
 
     # --- what is heard
 
-    def hear(self, stamp: float, left: Controller, right: Controller) -> str:
-        """An input of whom controls, `stamp` s by its own clock; why it does not count, "" where it does."""
+    def hear(self, stamp: float, left: Controller, right: Controller, drawn: bool) -> str:
+        """An input of whom controls, `stamp` s by its own clock; why it does not count, "" where it does. drawn: since
+        the one before, a new pose of the robot was drawn where the user sees it."""
         last = self._inputs[-1] if self._inputs else self._last
         if self._fresh and math.isfinite(stamp):  # another's clock: the core's goes on from where it was
             self._shift = last.stamp + JUST_AFTER - stamp if self.state.stamp is not None else 0.0
@@ -130,6 +136,7 @@ class SessionController:
             heard = last.stamp - self._shift
             return f"input: stamp {stamp:.6g} s is not after {heard:.6g} s: heard before"
         stamp += self._shift
+        self._drawn = self._drawn or drawn
         self._inputs.append(HandInput(stamp, left, right))
         return ""
 
@@ -144,6 +151,7 @@ class SessionController:
         """Somebody else controls now, or nobody, who is aligned so."""
         self._inputs.clear()
         self._last, self._fresh = self._nobody, True
+        self._drawn, self._undrawn = False, 0.0
         self.align(alignment, unfit)
         self.robot.stop()
 
@@ -204,12 +212,18 @@ class SessionController:
     # --- what is done
 
     def tick(self, dt: float) -> Intent:
-        """Let `dt` s pass; every input since the last tick is a step of the core."""
+        """Let `dt` s pass; every input since the last tick is a step of the core. One that moves the robot and draws
+        nothing counts as silent."""
         robot_state, executor = self.robot.robot_state(), self.robot.state()
         if self.state.mode in ("hold", "aim"):
             self._believe(robot_state, executor)
         joints: Joints = tuple(float(q) for q in robot_state.joints)  # type: ignore[assignment]
         steps = list(self._inputs) or [self._last]
+        self._undrawn, self._drawn = 0.0 if self._drawn else self._undrawn + dt, False
+        acts = self.intent is not None and self.intent.mode in ACTING
+        blind = acts and bool(self._inputs) and self._undrawn > UNDRAWN
+        if blind:
+            steps = [self._silence()]
         self._inputs.clear()
         for hands in steps:
             executor = ExecutorReport("fault", "", self._fault) if self._fault else executor
@@ -233,6 +247,7 @@ class SessionController:
             self.log_writer.step(dt / len(steps), core_input, intent)
         self._last = steps[-1]
         self.intent = intent
+        self._reword(intent.notice, blind)
         self._log_tick(intent, robot_state)
         return intent
 
@@ -246,12 +261,12 @@ class SessionController:
         log_writer = self.log_writer
         log_writer.robot_state(robot_state)
         robot = self.robot.state()
-        notice, fault = (NUMBER.sub("", text) for text in (intent.notice, robot.fault))  # what counts on is told once
+        notice, fault = (NUMBER.sub("", text) for text in (self.notice, robot.fault))  # what counts on is told once
         now = (intent.mode, notice), (robot.mode, fault, robot.digest), self.alignment, self.world
         mode, acts, alignment, world = self._logged or (None,) * 4
         self._logged = now
         if now[0] != mode:
-            log_writer.event("mode", mode=intent.mode, notice=intent.notice, digest=intent.preview or intent.execute)
+            log_writer.event("mode", mode=intent.mode, notice=self.notice, digest=intent.preview or intent.execute)
         if now[1] != acts:
             log_writer.event("robot", robot=robot)
         if self.alignment != alignment:
@@ -260,6 +275,21 @@ class SessionController:
                 log_writer.alignment(self.alignment)
         if self.world is not world:
             log_writer.event("world", world=self.world)
+
+    def _silence(self) -> HandInput:
+        """For the core, an input after a gap in which nothing was drawn: it holds as for any that is silent. The
+        client's clock goes on after it."""
+        self._fresh = True
+        gap = self._undrawn + self.core.settings.safety.silence
+        return HandInput(self._last.stamp + gap, NOWHERE, NOWHERE)
+
+    def _reword(self, notice: str, blind: bool) -> None:
+        """The core's `notice`, for as long as it lasts, in words of what was not drawn."""
+        if blind:
+            self._instead = notice, f"the page has drawn nothing for {self._undrawn:.2f} s; holding"
+        before, instead = self._instead
+        self._instead = self._instead if notice == before else ("", "")
+        self.notice = instead if notice == before else notice
 
     @property
     def _rigid(self) -> int:
@@ -367,7 +397,7 @@ class SessionController:
         touched = hands[self._rigid].target is not None, hands[1 - self._rigid].target is not None
         words = next_action(intent.mode, intent.targets, holder, self.alignment is not None, touched)
         keys = next_key(intent.mode, intent.targets, holder, touched)
-        notice = intent.notice or self.refused if holder else ""
+        notice = self.notice or self.refused if holder else ""
         return messages.StateMessage(
             intent.mode, intent.motion, _joined(notice, self.blocked), words, keys,
             round(intent.countdown, 2), intent.preview, intent.execute, _rounded(intent.targets),

@@ -2,7 +2,7 @@
 
 So a slow disk delays no frame and no stop. What is lost by `kill -9` is younger than `period`. Where the log cannot be
 written any more, or nothing has been written for `period` and LATE s, `fault` says why, and whoever moves the robot has
-to hold it.
+to hold it. A process that comes back before MOST records wait has lost nothing, and ends that fault.
 """
 
 import ctypes
@@ -142,7 +142,7 @@ class LogWriterProcess(LogWriter):
         super().__init__(subject)
         context = multiprocessing.get_context("spawn")
         theirs, self._pipe = context.Pipe(duplex=False)
-        self._fault, self._lost = context.RawArray(ctypes.c_char, TEXT), ""
+        self._fault, self._lost, self._late = context.RawArray(ctypes.c_char, TEXT), "", ""
         self._written, self._sent, self._silent = context.RawValue(ctypes.c_int64, -1), 0, period + LATE
         zero = time.time_ns() - round(1e9 * self.now())  # once: a wall clock that jumps moves nothing in the log
         self.path = path
@@ -163,10 +163,15 @@ class LogWriterProcess(LogWriter):
 
     @property
     def fault(self) -> str:
+        return self._ending or self._late
+
+    @property
+    def _ending(self) -> str:
+        """Why nothing will be written any more."""
         return self._fault.value.decode(errors="replace") or self._lost
 
     def keep(self, record: Record) -> None:
-        if self.fault:
+        if self._ending:
             return
         if len(self._waiting) < MOST:
             self._waiting.append(record)
@@ -212,12 +217,15 @@ class LogWriterProcess(LogWriter):
             written = self._written.value
             looks = looks + 1 if 0 <= before == written < self._sent else 0
             before = written
-            if looks * LOOKS >= self._silent:
-                self._lose(f"its process does not answer for {self._silent:g} s")
+            late = looks * LOOKS >= self._silent
+            self._late = self._worded(f"its process does not answer for {self._silent:g} s") if late else ""
 
     def _lose(self, why: str) -> None:
         """From here on nothing is written: what is there stays without gaps."""
-        self._lost = self._lost or f"log: {self.path.name}: {why}; nothing is executed"
+        self._lost = self._lost or self._worded(why)
+
+    def _worded(self, why: str) -> str:
+        return f"log: {self.path.name}: {why}; nothing is executed"
 
 
 def new_path(folder: Path) -> Path:

@@ -270,7 +270,8 @@ class Server:
             self._refuse(client, "input: you do not control; ask for it")
             return
         reason = client.clock.fault(received.stamp, now)
-        reason = reason or self.controller.hear(received.stamp, *controller_input.controllers(received))
+        hands, drawn = controller_input.controllers(received), "drawn" in received.flags
+        reason = reason or self.controller.hear(received.stamp, *hands, drawn)
         if reason:
             self._refuse(client, reason)
         else:
@@ -460,7 +461,7 @@ class Server:
         self._gc_policy.tell(moving=self.controller.tick(dt).motion != "hold")
         if self.controller.log_writer.fault != self._unwritten:
             self._unwritten = self.controller.log_writer.fault
-            self.composition.log(self._unwritten)
+            self.composition.log(self._unwritten or "log: written again")
         self._show(now)
         if self.controller.world is not self._world:
             self._world = self.controller.world
