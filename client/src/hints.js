@@ -2,6 +2,7 @@
 
 /** Words of controllers, as the core writes its notices, in those of a keyboard. */
 const BY_KEYS = [
+  [/client silent for ([\d.]+) s; holding/g, "this page was silent for $1 s, so the robot holds: its computer is busy"],
   [/primary button takes/g, "R takes"],
   [/primary button goes on/g, "R goes on"],
   [/grips let go/g, "G was let go"],

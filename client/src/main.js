@@ -338,7 +338,7 @@ class Page {
     const { innerWidth: width, innerHeight: height } = window;
     const [status, acts] = ["status", "acts"].map((id) => find(id).getBoundingClientRect());
     document.documentElement.style.setProperty("--acts", `${Math.ceil(acts.height)}px`);
-    this.renderer.setPixelRatio(this.quality.ratio);
+    this.renderer.setPixelRatio(this.quality.ratioOf(width * height));
     this.renderer.setSize(width, height, false);
     if (!this.desktop.dragging) shape(this.camera, width, height, freeArea(width, height, status, acts));
   }

@@ -5,6 +5,7 @@ const LIGHT = 0.012; // s, below which it may rise again
 const LOOKS = 5; // pictures whose median counts
 const SETTLES = 1; // s after a change before the next
 const CALM = 10; // s of light pictures before quality rises; it doubles with each fall
+const SMALL = 400_000, READABLE = 0.7; // pixels of a window, and how coarse it becomes at most
 const LATE = 0.1; // s between inputs at which they suffer
 
 /** From best to least: pixels drawn for each of the page's, and whether the reach may be shown. */
@@ -25,8 +26,9 @@ export class Quality {
     this.isFixed = false; // for pictures that are to be as good as can be
   }
 
-  get ratio() {
-    return Math.min(LEVELS[this.at].ratio, this.finest);
+  /** Pixels drawn for each of a window of `area` pixels; of a small one not so few that nothing can be read. */
+  ratioOf(area) {
+    return Math.min(Math.max(LEVELS[this.at].ratio, area < SMALL ? READABLE : 0), this.finest);
   }
 
   get reach() {
