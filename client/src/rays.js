@@ -34,7 +34,7 @@ export class Marks {
     });
     for (const kind of ["rigid", "tip"]) {
       const end = this.ends[this.names.indexOf(kind === "rigid" ? "mount" : "tip")];
-      this.targets[kind].update(rows, at(`${kind}_target`), targets?.[kind] ?? null, end, kind === "tip" ? (targets?.object ?? "") : "");
+      this.targets[kind].update(rows, at(`${kind}_target`), targets?.[kind] ?? null, end, kind === "tip" ? (targets?.thing ?? "") : "");
     }
   }
 

@@ -16,6 +16,7 @@ export function look(camera, orbit, view, points) {
   orbit.target.copy(all.center);
   camera.position.copy(all.center).addScaledVector(ahead, (1.1 * all.radius) / Math.sin(MathUtils.degToRad(UPRIGHT / 2)));
   orbit.update();
+  camera.updateMatrixWorld();
 }
 
 /** What the state's panel and the actions' leave of a small window of `width` by `height`; of a large one, all. */
