@@ -215,7 +215,9 @@ async def listen(runner: web.AppRunner, port: int) -> web.TCPSite:
     return site
 
 
-async def obey(server: Server, robot: Robot, planning: Planning, runner: web.AppRunner, port: int, log: list[str]) -> None:
+async def obey(
+    server: Server, robot: Robot, planning: Planning, runner: web.AppRunner, port: int, log: list[str]
+) -> None:
     """Lines of the input, until it ends; the log goes out for each."""
     loop = asyncio.get_running_loop()
     site = await listen(runner, port)
