@@ -4,7 +4,8 @@
     python -m rehearsal --animate [--only reach] [--seed 0]
 
 Says where table and picture will be; how long it takes, once the first run of each experiment is made. Runs that the
-table in the folder `out` has of the same package and code are not made again. The committed metrics are of more: `dvc repro rehearsal/dvc.yaml`.
+table in the folder `out` has of the same package and code are not made again. The committed metrics are of more:
+`dvc repro rehearsal/dvc.yaml`.
 """
 
 import argparse

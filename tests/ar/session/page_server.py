@@ -4,9 +4,9 @@
 
 prints `ready PORT TOKEN` and serves until its input ends. A line on its input is a fault to be shown: `silent` and
 `speak` (the robot tells nothing new), `drop` and `listen` (all connections end, and none is taken until then), `fault`
-(the robot reports one); `doubtful` and `sure`: how a grasp is foreseen; `code` renews the pairing code. The modes that there were, and what else the server logged,
-come back as a line of JSON. With `--light` meshes have few triangles. It is patient with clients that draw by software
-beside other work: PATIENCE.
+(the robot reports one); `doubtful` and `sure`: how a grasp is foreseen; `code` renews the pairing code. The modes that
+there were, and what else the server logged, come back as a line of JSON. With `--light` meshes have few triangles. It
+is patient with clients that draw by software beside other work: PATIENCE.
 """
 
 import asyncio
