@@ -6,6 +6,7 @@ const UPRIGHT = 45; // degrees of view, of the shorter side of what is free
 const WIDEST = 95; // degrees, of the window's height
 const LARGE = { width: 900, height: 480 }; // pixels of a window whose panels stand at its corners
 const LEAST = 120; // pixels
+const MARGIN = 1.5; // of the distance from which all is just seen: a preview covers the foot of the window
 /** From the robot, in the room, where the base's x is x, and its z is up. */
 const FROM = { front: [1, 0.12, 0], side: [0, 0.12, 1], top: [0.001, 1, 0] };
 
@@ -14,7 +15,7 @@ export function look(camera, orbit, view, points) {
   const ahead = FROM[view] ? new Vector3(...FROM[view]).normalize() : new Vector3().subVectors(camera.position, orbit.target).normalize();
   const all = new Box3().setFromPoints(points).getBoundingSphere(new Sphere());
   orbit.target.copy(all.center);
-  camera.position.copy(all.center).addScaledVector(ahead, (1.1 * all.radius) / Math.sin(MathUtils.degToRad(UPRIGHT / 2)));
+  camera.position.copy(all.center).addScaledVector(ahead, (MARGIN * all.radius) / Math.sin(MathUtils.degToRad(UPRIGHT / 2)));
   orbit.update();
   camera.updateMatrixWorld();
 }
