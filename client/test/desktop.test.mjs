@@ -232,7 +232,16 @@ test("the tip's marker that is dragged onto a thing marks it, and a handle moves
     const place = desktop.wanted[0].clone().set(...thing.position);
     return [desktop.wanted[1 - desktop.rigid], place].map((point) => desktop.toScreen(point));
   });
-  await drag(page, "tip", cup[0] - from[0], cup[1] - from[1]);
+  await page.mouse.move(...from);
+  await page.mouse.down();
+  await page.mouse.move(...cup, { steps: 4 });
+  const away = await page.evaluate(() => {
+    const { desktop } = globalThis.trunkline, wanted = desktop.wanted[1 - desktop.rigid];
+    return wanted.distanceTo(wanted.clone().set(...desktop.things[0].position));
+  });
+  assert.ok(away < 1e-6, `the marker is ${away} m from the middle of what the pointer is on`);
+  await page.waitForTimeout(300);
+  await page.mouse.up();
   await until(page, () => globalThis.trunkline.state.targets?.thing === "the cup");
   await page.keyboard.press("Digit1");
   const handle = await until(page, () => {
