@@ -3,20 +3,22 @@
     python -m rehearsal [--only reach] [--runs 10] [--variants 0] [--package FILE] [--out build/rehearse]
     python -m rehearsal --animate [--only reach] [--seed 0]
 
-Runs that the table in the folder `out` has of the same package and code are not made again. The committed metrics are
-of more: `dvc repro rehearsal/dvc.yaml`.
+Says where table and picture will be; how long it takes, once the first run of each experiment is made. Runs that the
+table in the folder `out` has of the same package and code are not made again. The committed metrics are of more:
+`dvc repro rehearsal/dvc.yaml`.
 """
 
 import argparse
 import sys
+import time
 from pathlib import Path
 
 from rehearsal.animation import animate
 from rehearsal.experiments.bench import bench_of
 from rehearsal.experiments.registry import EXPERIMENTS
-from rehearsal.experiments.result import summary
+from rehearsal.experiments.result import Result, read_results, summary
 from rehearsal.report import draw
-from rehearsal.runs import make, source_of, wanted
+from rehearsal.runs import Provenance, Run, make, run_of, source_of, wanted
 from trunkline.ar.preview.package import only_package
 from trunkline.compute.threads import thread_count
 from trunkline.errors import in_one_line
@@ -44,11 +46,27 @@ def main() -> int:
         return 0
     runs = wanted({name: arguments.runs for name in names}, arguments.variants)
     source = source_of(package)
-    results = make(runs, package, source, arguments.out / "runs.csv", thread_count())
+    table, picture = arguments.out / "runs.csv", arguments.out / "rehearsal.png"
+    print(f"table: {table}, a row when a run ends; picture: {picture}, at the end", flush=True)
+    results = make_timed(runs, package, source, table, thread_count())
     goals = read_limits(Path("tests/limits.yaml"))["rehearse"]
     print(rehearsal_table(summary(results), goals, f"with package `{source.package}`", variants=True))
-    draw(results, arguments.out / "rehearsal.png")
+    draw(results, picture)
     return 0
+
+
+def make_timed(runs: list[Run], package: Path, source: Provenance, table: Path, workers: int) -> list[Result]:
+    """As `runs.make`, the first missing run of each experiment before all others; then says how long those take."""
+    made = {run_of(result) for result in source.of(read_results(table))}
+    missing = [run for run in runs if run not in made]
+    first = list({run.experiment: run for run in reversed(missing)}.values())[::-1]
+    print(f"{len(missing)} of {len(runs)} runs to make, {workers} side by side; Ctrl-C stops, the same command goes on")
+    if len(missing) > len(first):
+        began = time.monotonic()
+        make(first, package, source, table, workers)
+        minutes = (time.monotonic() - began) / len(first) * (len(missing) - len(first)) / 60
+        print(f"{len(missing) - len(first)} more runs, about {max(minutes, 1):.0f} min", flush=True)
+    return make(runs, package, source, table, workers)
 
 
 def _count(text: str) -> int:

@@ -3,10 +3,14 @@
 // A ray's length is the core's. So a hand is put where its ray ends at the wanted point, and sends no stick for it.
 
 import { MathUtils, Matrix4, Plane, Quaternion, Raycaster, Vector2, Vector3 } from "three";
+import { axisOf, onAxis, thingAt } from "./handles.js";
+import { matrixOf } from "./geoms.js";
 import { HANDS } from "./wire_table.js";
 import { noHand } from "./wire.js";
 
 const NEAR = 42; // pixels within which a marker is taken
+const BESIDE = { mouse: 9, pen: 12, touch: 22 }; // pixels within which a handle is taken
+const MARGIN = 0.01; // m about a thing, which is small on the screen
 const STEP = 0.01, FINE = 0.001, TILT = MathUtils.degToRad(2); // of an arrow
 const WHEEL = 0.0006; // m a pixel of the wheel
 const PRESS = 4; // inputs in which a key's press is held, so that it is heard however slowly they are sent
@@ -16,11 +20,14 @@ const ARROWS = { ArrowLeft: [-1, 0, 0], ArrowRight: [1, 0, 0], ArrowUp: [0, 1, 0
 
 export class DesktopHands {
   /**
-   * `acts`: what else keys do, `stop` and `reach`; `controls()`: whether input counts.
-   * Positions are in the base frame, z up.
+   * `acts`: what else keys do: `stop`, `reach`, `trigger`; `held(on)` is told of the dead man's key, `pressed(code)` of
+   * each key. Positions are in the base frame, z up.
    */
-  constructor(canvas, camera, orbit, base, marks, rigidHand, acts) {
-    Object.assign(this, { canvas, camera, orbit, base, marks, acts });
+  constructor(canvas, camera, orbit, base, marks, handles, rigidHand, acts) {
+    Object.assign(this, { canvas, camera, orbit, base, marks, handles, acts });
+    this.things = []; // what a tip's marker that is dragged onto it marks
+    this.axis = -1; // of the handle that is dragged
+    this.touches = matchMedia("(pointer: coarse)").matches; // else there are keys
     this.rigid = HANDS.indexOf(rigidHand);
     this.wanted = [null, null];
     this.length = 0.6; // m, of the core's rays; it tells where they end
@@ -41,6 +48,7 @@ export class DesktopHands {
     addEventListener("pointerup", () => this.drop());
     addEventListener("pointercancel", () => this.drop());
     canvas.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
+    addEventListener("pointerdown", ({ pointerType }) => (this.touches = pointerType === "touch"), true);
     addEventListener("keydown", (event) => this.key(event));
     addEventListener("keyup", (event) => event.code === "KeyG" && this.hold(false));
     addEventListener("blur", () => this.letGo()); // a key let go elsewhere is never heard of
@@ -85,7 +93,9 @@ export class DesktopHands {
     if (event.button !== 0 || !this.wanted[0]) return;
     this.canvas.focus();
     const [x, y] = this.pixel(event);
-    const index = this.marks.nearest((point) => this.toScreen(point), x, y, NEAR);
+    const toScreen = (point) => this.toScreen(point);
+    this.axis = this.handles.nearest(toScreen, x, y, BESIDE[event.pointerType] ?? BESIDE.mouse);
+    const index = this.axis >= 0 ? this.chosen : this.marks.nearest(toScreen, x, y, NEAR);
     if (index < 0) return;
     this.chosen = index;
     this.dragging = true;
@@ -95,11 +105,20 @@ export class DesktopHands {
     const normal = new Vector3(0, 0, 1).transformDirection(this.camera.matrixWorld);
     this.plane = new Plane().setFromNormalAndCoplanarPoint(normal, point);
     this.grabbed = point.sub(this.onPlane(event) ?? point); // it does not leap to the pointer
+    this.began = this.wanted[index].clone();
+    this.slid = this.axis >= 0 ? onAxis(this.rayInBase(event), this.began, axisOf(this.axis)) : null;
   }
 
   drag(event) {
     if (!this.dragging) return;
     this.last = event;
+    if (this.axis >= 0) {
+      const slid = this.slid && onAxis(this.rayInBase(event), this.began, axisOf(this.axis));
+      if (slid) this.wanted[this.chosen] = slid.sub(this.slid).add(this.began);
+      return;
+    }
+    const thing = this.chosen === this.rigid ? null : thingAt(this.rayInBase(event), this.things, inverseOf, MARGIN);
+    if (thing) return void (this.wanted[this.chosen] = new Vector3(...thing.position));
     const point = this.onPlane(event);
     if (point) this.wanted[this.chosen] = this.inBase(point.add(this.grabbed));
   }
@@ -107,6 +126,7 @@ export class DesktopHands {
   drop() {
     if (this.dragging) this.press("grip", SETTLES);
     this.dragging = false;
+    this.axis = -1;
     this.orbit.enabled = true;
   }
 
@@ -127,11 +147,14 @@ export class DesktopHands {
       return this.acts.stop();
     }
     if (event.ctrlKey || event.metaKey) return;
+    this.touches = false;
+    const isButton = code === "Enter" && event.target instanceof HTMLElement && /^(BUTTON|SUMMARY)$/.test(event.target.tagName);
+    if (!event.repeat && !isButton) this.acts.pressed(code);
     if (code === "KeyG" && !event.repeat) return this.hold(true);
     if (code in ARROWS && !(event.target instanceof HTMLInputElement)) return this.arrow(event);
     if (event.repeat) return;
     if (code === "Digit1" || code === "Digit2") this.chosen = code === "Digit1" ? this.rigid : 1 - this.rigid;
-    else if (code === "Enter" && !(event.target instanceof HTMLButtonElement)) this.press("trigger");
+    else if (code === "Enter" && !isButton) this.acts.trigger();
     else if (code === "KeyR") this.accept();
     else if (code === "KeyF") this.press("stick_pressed");
     else if (code === "KeyH") this.acts.reach();
@@ -158,6 +181,11 @@ export class DesktopHands {
     const forth = new Vector3().crossVectors(new Vector3(0, 0, 1), across);
     this.pointing.applyAxisAngle(across, -TILT * up).applyAxisAngle(forth, -TILT * right).normalize();
     this.press("tilt", SETTLES);
+  }
+
+  /** Whether the user holds anything that the core waits to be let go. */
+  get isHeld() {
+    return this.dead || this.dragging;
   }
 
   /** Both hands now, in the base frame. */
@@ -208,12 +236,21 @@ export class DesktopHands {
     return [((seen.x + 1) / 2) * clientWidth, ((1 - seen.y) / 2) * clientHeight];
   }
 
-  onPlane(event) {
+  /** From the eye through a point of the screen, in the room. */
+  ray(event) {
     const [x, y] = this.pixel(event);
     const at = new Vector2((2 * x) / this.canvas.clientWidth - 1, 1 - (2 * y) / this.canvas.clientHeight);
     const caster = new Raycaster();
     caster.setFromCamera(at, this.camera);
-    return caster.ray.intersectPlane(this.plane, new Vector3());
+    return caster.ray;
+  }
+
+  rayInBase(event) {
+    return this.ray(event).applyMatrix4(this.base.matrixWorld.clone().invert());
+  }
+
+  onPlane(event) {
+    return this.ray(event).intersectPlane(this.plane, new Vector3());
   }
 
   inRoom(point) {
@@ -228,3 +265,5 @@ export class DesktopHands {
     return direction.clone().applyQuaternion(this.base.quaternion.clone().invert());
   }
 }
+
+const inverseOf = ({ position, quaternion }) => matrixOf(position, quaternion).invert();

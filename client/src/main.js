@@ -5,12 +5,16 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import styles from "./page.css";
 import { BACK } from "./colours.js";
 import { DesktopHands } from "./desktop.js";
+import { Handles } from "./handles.js";
+import { askedTwice, isDoubtful, lasts, ofDevice, success, whyLost, whyNothing } from "./hints.js";
 import { Immersive, canImmerse } from "./immersive.js";
 import { Marks } from "./rays.js";
 import { PagePanel, RoomPanel, foreseenWords, remedy, words } from "./panel.js";
 import { Playback } from "./playback.js";
+import { Quality, Stopwatch, isSoftware } from "./quality.js";
 import { Recording } from "./recording.js";
 import { RobotScene } from "./scene.js";
+import { freeArea, look, shape } from "./views.js";
 import { HANDS, MARKERS } from "./wire_table.js";
 import { STRIDE, Wire, clock, noHand } from "./wire.js";
 
@@ -18,6 +22,9 @@ const KEPT = "trunkline.token"; // of this tab, so that a reload need not pair a
 const RIGID_HAND = "left"; // the core's own choice is `core.rigid_hand`, of which the markers tell
 const INPUT_RATE = 72; // Hz
 const WIDE = 1200; // pixels of a page on which the keys do not cover the robot
+const COARSE = "trunkline.coarse"; // of this tab too: drawing was slow, so the next page begins without smooth edges
+const LATELY = 3; // s in which what has happened may be why control was lost
+const STANDS = 6; // s for which a line about what was just done stands at most
 const STILL = 0.3; // s without a grip, after which the core's targets are taken over
 const OVER = new Set(["hold", "aim", "follow", "stopped"]); // modes in which no plan is shown; it may come before its mode does
 const SHOWN_IN = new Set(["preview", "ready", "delay"]);
@@ -33,7 +40,10 @@ document.adoptedStyleSheets = [sheet];
 
 class Page {
   constructor() {
-    this.renderer = new WebGLRenderer({ canvas: find("view"), antialias: true, alpha: true });
+    const antialias = !isSoftware() && !sessionStorage.getItem(COARSE);
+    this.renderer = new WebGLRenderer({ canvas: find("view"), antialias, alpha: true });
+    this.quality = new Quality(() => this.redraw(), devicePixelRatio);
+    this.stopwatch = new Stopwatch(this.renderer.getContext(), clock, (seconds) => this.quality.took(seconds, clock()));
     this.renderer.outputColorSpace = SRGBColorSpace;
     this.renderer.xr.enabled = true;
     this.camera = new PerspectiveCamera(45, 1, 0.02, 30);
@@ -44,13 +54,17 @@ class Page {
     this.marks = new Marks(this.drawn.base, RIGID_HAND);
     this.board = new RoomPanel(this.drawn.scene);
     this.panel = new PagePanel(find);
-    this.desktop = new DesktopHands(this.renderer.domElement, this.camera, this.orbit, this.drawn.base, this.marks, RIGID_HAND, {
+    this.handles = new Handles(this.drawn.base);
+    this.desktop = new DesktopHands(this.renderer.domElement, this.camera, this.orbit, this.drawn.base, this.marks, this.handles, RIGID_HAND, {
       stop: () => this.wire.stop(),
-      reach: () => this.drawn.showReach(!this.drawn.reachShown),
+      reach: () => this.chooseReach(),
+      trigger: () => this.trigger(),
       held: (on) => find("grip").setAttribute("aria-pressed", String(on)),
+      pressed: (code) => this.explain(code),
     });
     this.immersive = new Immersive(this.renderer, (type, fields) => this.wire?.say(type, fields), () => this.leftHeadset());
     Object.assign(this, { state: null, lease: null, reason: null, frame: null, playback: null, told: null, recording: null });
+    Object.assign(this, { lost: "", arrived: null, asked: "", inputAt: null, worst: { gap: 0, at: -Infinity }, hiddenAt: -Infinity });
     this.reaches = { rigid: null, tip: null };
     this.ready = Promise.resolve(); // when the scene is there, whose sizes a preview needs
     this.connect();
@@ -58,6 +72,12 @@ class Page {
     this.stand(DESKTOP);
     this.resize();
     addEventListener("resize", () => this.resize());
+    document.addEventListener("visibilitychange", () => (this.hiddenAt = clock()));
+    const panels = new ResizeObserver(() => this.resize());
+    for (const id of ["status", "acts"]) panels.observe(find(id));
+    const light = matchMedia("(prefers-color-scheme: light)");
+    light.addEventListener("change", () => this.theme(light.matches));
+    this.theme(light.matches);
     find("help").open = innerWidth >= WIDE;
     [this.before, this.took] = [clock(), 0];
     this.hands = { left: noHand(), right: noHand() };
@@ -83,6 +103,7 @@ class Page {
       welcome: (message) => this.welcome(message),
       closed: (reason, final) => {
         [this.reason, this.ended] = [reason, final];
+        if (this.wire.controls) this.lost = "Control was lost with the connection. Press “Take control” to go on.";
         this.wire.controls = false;
         this.state = this.lease = null;
         this.show(null);
@@ -92,11 +113,17 @@ class Page {
       },
       lease: (message) => {
         this.lease = message;
+        const had = this.wire.controls;
         this.wire.controls = message.holder === this.wire.id;
+        this.heardOfControl(had);
       },
       aligning: (message) => this.immersive.heard(message),
       state: (message) => this.changed(message),
-      world: ({ world }) => this.drawn.world(world),
+      world: ({ world }) => {
+        this.things = world.things;
+        this.desktop.things = world.things.filter(({ support }) => support !== "held");
+        this.drawn.world(world);
+      },
       robot: (message) => this.robot(message),
       shell: ({ rows }) => this.drawn.shell(rows),
       preview: (message) => this.ready.then(() => this.loaded && (message.kind ? this.piece(message) : this.show(message))),
@@ -124,14 +151,63 @@ class Page {
     this.loaded = digest;
   }
 
-  /** One line that the server says about what was just sent; it stands for a while. */
-  warn(text) {
-    this.warning = { text, until: clock() + 6 };
+  /** One line about what was just done; it stands for a while, at most until it has `ended`. */
+  warn(text, ended = () => false, seconds = STANDS) {
+    this.warning = { text, ended, until: clock() + seconds };
+  }
+
+  /** After news of who controls; `had`: whether this page did. */
+  heardOfControl(had) {
+    const now = clock();
+    if (this.wire.controls) [this.lost, this.released] = ["", false];
+    else if (had && !this.released) {
+      const gap = Math.max(now - this.worst.at < LATELY ? this.worst.gap : 0, now - (this.inputAt ?? now));
+      this.lost = whyLost({ gap, hidden: document.hidden || now - this.hiddenAt < LATELY });
+    }
+    if (!this.wire.controls) this.inputAt = null;
+  }
+
+  /** Why a key did nothing, where it did. */
+  explain(code) {
+    const { state, lease, wire } = this;
+    const offers = Boolean(state?.targets?.rigid?.offer || state?.targets?.tip?.offer || state?.targets?.better || this.told?.offer);
+    const now = { up: Boolean(wire?.up), controls: Boolean(wire?.controls), holder: lease?.holder ?? "", mode: state?.mode, gripped: this.desktop.dead, offers };
+    const why = whyNothing(code, now), { mode } = now;
+    if (why) this.warn(why, () => this.state?.mode !== mode || (Boolean(this.wire?.controls) !== now.controls) || this.desktop.dead !== now.gripped);
+  }
+
+  /** Asks for a plan or confirms it; a doubtful one is confirmed by the second time alone. */
+  trigger() {
+    if (this.state?.mode === "ready" && this.desktop.dead && isDoubtful(this.told) && this.asked !== this.digest) {
+      this.asked = this.digest;
+      return this.warn(askedTwice(this.told), () => this.state?.mode !== "ready", Infinity);
+    }
+    this.desktop.press("trigger");
+  }
+
+  chooseReach() {
+    this.reachChosen = true; // what slow drawing would have is for whoever has said nothing
+    this.drawn.showReach(!this.drawn.reachShown);
+  }
+
+  /** As well as drawing is fast. */
+  redraw() {
+    if (!this.reachChosen) this.drawn.showReach(this.quality.reach);
+    if (this.quality.at > this.quality.best) sessionStorage.setItem(COARSE, "1");
+    this.resize();
+  }
+
+  theme(isLight) {
+    const scheme = isLight ? "light" : "dark";
+    this.ground = new Color(BACK[scheme]);
+    this.drawn.ground(scheme);
   }
 
   changed(state) {
+    if (["delay", "execute"].includes(this.state?.mode) && state.mode === "aim" && state.robot === "done") this.arrived = this.phases.map(([name]) => name);
+    else if (!["aim", "hold"].includes(state.mode)) this.arrived = null;
     const wasBusy = BUSY.has(this.state?.mode) && !BUSY.has(state.mode);
-    if (wasBusy && state.notice) this.warn(state.notice); // the core's own is gone once it aims again
+    if (wasBusy && state.notice) this.warn(state.notice, () => BUSY.has(this.state?.mode)); // the core's own is gone once it aims again
     this.state = state;
     if (OVER.has(state.mode)) this.show(null);
     for (const kind of ["rigid", "tip"]) {
@@ -168,20 +244,38 @@ class Page {
 
   buttons() {
     find("control").addEventListener("click", () => {
-      if (this.wire?.controls) this.wire.say("lease", { action: "release" });
+      this.released = Boolean(this.wire?.controls);
+      if (this.released) this.wire.say("lease", { action: "release" });
       else this.ask();
       find("view").focus(); // else Enter, which asks for a plan, would press this button again
     });
     find("stop").addEventListener("click", () => this.wire?.stop());
-    find("plan").addEventListener("click", () => {
-      this.desktop.press("trigger");
+    tapped("plan", () => {
+      this.explain("Enter");
+      this.trigger();
       find("view").focus();
     });
+    tapped("go", () => this.desktop.accept());
+    tapped("follow", () => {
+      this.explain("KeyF");
+      this.desktop.press("stick_pressed");
+    });
+    tapped("reach", () => this.chooseReach());
+    for (const view of ["fit", "front", "side", "top"]) tapped(view, () => this.lookFrom(view));
+    for (const step of document.querySelectorAll("#pad [data-step]")) {
+      step.addEventListener("click", () => {
+        this.explain(step.dataset.step);
+        this.desktop.arrow({ code: step.dataset.step, altKey: find("tilt").getAttribute("aria-pressed") === "true", preventDefault() {} });
+      });
+    }
+    tapped("tilt", () => find("tilt").setAttribute("aria-pressed", String(find("tilt").getAttribute("aria-pressed") !== "true")));
+    tapped("which", () => (this.desktop.chosen = 1 - this.desktop.chosen));
     const grip = find("grip");
     grip.addEventListener("pointerdown", (event) => {
       grip.setPointerCapture(event.pointerId);
       this.desktop.hold(true);
     });
+    grip.addEventListener("contextmenu", (event) => event.preventDefault()); // a finger that holds asks for one
     for (const kind of ["pointerup", "pointercancel", "lostpointercapture"]) grip.addEventListener(kind, () => this.desktop.hold(false));
     const scrub = find("scrub");
     scrub.addEventListener("input", () => this.playing?.hold(Number(scrub.value)));
@@ -242,10 +336,18 @@ class Page {
   resize() {
     if (this.renderer.xr.isPresenting) return;
     const { innerWidth: width, innerHeight: height } = window;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    const [status, acts] = ["status", "acts"].map((id) => find(id).getBoundingClientRect());
+    document.documentElement.style.setProperty("--acts", `${Math.ceil(acts.height)}px`);
+    this.renderer.setPixelRatio(this.quality.ratioOf(width * height));
     this.renderer.setSize(width, height, false);
-    this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
+    if (!this.desktop.dragging) shape(this.camera, width, height, freeArea(width, height, status, acts));
+  }
+
+  lookFrom(view) {
+    const targets = this.desktop.wanted.filter(Boolean).map((point) => this.desktop.inRoom(point));
+    const all = [...(this.frame ? this.drawn.extent(this.frame.rows) : []), ...targets];
+    if (all.length) look(this.camera, this.orbit, view, all);
+    find("view").focus();
   }
 
   draw(frame) {
@@ -258,9 +360,10 @@ class Page {
     this.mark(this.hands, immersed);
     this.tell(immersed, dt);
     if (!immersed) this.orbit.update();
-    this.drawn.scene.background = immersed ? null : (this.ground ??= new Color(BACK));
+    this.drawn.scene.background = immersed ? null : this.ground;
     this.renderer.render(this.drawn.scene, this.camera);
     this.acknowledge();
+    if (!immersed) this.stopwatch.start(now);
     this.measure(now);
   }
 
@@ -317,6 +420,10 @@ class Page {
   send(hands, immersed, now) {
     this.hands = hands;
     if (!this.wire?.controls || this.wire.offset === null) return; // before the clocks have met, input does not count
+    const gap = now - (this.inputAt ?? now);
+    if (gap > this.worst.gap || now - this.worst.at > LATELY) this.worst = { gap, at: now };
+    if (!immersed && !document.hidden) this.quality.input(gap, now);
+    this.inputAt = now;
     const visible = immersed ? this.immersive.visible : !document.hidden;
     this.wire.input(hands, visible, now);
   }
@@ -335,6 +442,7 @@ class Page {
     const text = `${playing.at.toFixed(1)} of ${playing.duration.toFixed(1)} s${phase && !this.recording ? `, ${phase}` : ""}`;
     if (find("played").textContent !== text) find("played").textContent = text;
     const sure = this.recording ? "A recording." : foreseenWords(this.told);
+    find("foreseen").toggleAttribute("data-doubtful", !this.recording && isDoubtful(this.told));
     if (find("foreseen").textContent !== sure) find("foreseen").textContent = sure;
   }
 
@@ -350,6 +458,8 @@ class Page {
     this.drawn.placeShell(rows, this.drawn.count + MARKERS.indexOf("rigid_target"));
     const eye = new Vector3().setFromMatrixPosition((immersed ? this.renderer.xr.getCamera() : this.camera).matrixWorld);
     for (const target of Object.values(this.marks.targets)) target.face(eye);
+    const { desktop, wire } = this, movable = !immersed && wire?.controls && ["aim", "follow"].includes(this.state?.mode);
+    this.handles.place(movable ? desktop.wanted[desktop.chosen] : null, eye, this.camera.fov);
   }
 
   tell(immersed, dt) {
@@ -357,8 +467,9 @@ class Page {
     const age = this.frame && wire ? wire.age(this.frame.time) : null;
     const stale = !wire?.up || (this.frame?.flags.has("stale") ?? false) || (age ?? 0) > 1;
     this.drawn.fade(stale);
-    const spoken = words({ state, lease, id: wire?.id ?? "", age: this.rounded(age), up: Boolean(wire?.up && wire.id), reason, ended: this.ended, stale, immersed });
-    if (this.warning && this.warning.until > clock()) spoken.notice ||= this.warning.text;
+    const device = immersed ? "controllers" : this.desktop.touches ? "touch" : "keys";
+    const spoken = words({ state, lease, id: wire?.id ?? "", age: this.rounded(age), up: Boolean(wire?.up && wire.id), reason, ended: this.ended, stale, device, held: this.desktop.isHeld });
+    this.sayMore(spoken, device);
     if (immersed) {
       const { aligning } = this.immersive;
       if (!aligning.done && wire?.up) [spoken.title, spoken.next] = ["Where is the robot?", aligning.next];
@@ -367,8 +478,16 @@ class Page {
       this.board.show(spoken, foreseenWords(this.told) || aligning.said, eye, dt);
       return;
     }
+    const picture = this.quality.words(this.drawn.reachShown);
+    if (picture) spoken.facts.Picture = ofDevice(picture, device);
     this.panel.show(spoken);
-    const mine = Boolean(wire?.controls);
+    document.body.toggleAttribute("data-touch", this.desktop.touches);
+    const mine = Boolean(wire?.controls), targets = state?.targets;
+    const offers = Boolean(targets?.rigid?.offer || targets?.tip?.offer || this.told?.offer), stopped = state?.mode === "stopped";
+    setText(find("go").firstChild, stopped ? "Go on " : "Take the offer ");
+    find("go").hidden = !mine || !(stopped || (offers && !this.desktop.dead));
+    setText(find("which"), this.desktop.chosen === this.desktop.rigid ? "Mount" : "Tip");
+    find("reach").setAttribute("aria-pressed", String(this.drawn.reachShown));
     setText(find("control"), mine ? "Release control" : lease?.holder ? "Ask for control" : "Take control");
     find("control").disabled = !wire?.up || wire.offset === null;
     const ready = state?.mode === "ready";
@@ -377,12 +496,29 @@ class Page {
     find("grip").disabled = !mine;
   }
 
+  /** What the page itself knows, where the server says nothing, or beside it. */
+  sayMore(spoken, device) {
+    const { state, warning, lost, arrived } = this, up = Boolean(this.wire?.up);
+    if (!lasts(state?.notice ?? "", { mode: state?.mode, targets: state?.targets, gripped: this.desktop.dead })) spoken.notice = "";
+    const stands = warning && warning.until > clock() && !warning.ended() ? ofDevice(warning.text, device) : "";
+    const more = stands || (up ? lost : "");
+    if (more && more !== spoken.notice) spoken.notice = spoken.notice ? `${spoken.notice}. ${more}` : more;
+    if (!spoken.notice && up && arrived && this.wire.controls) Object.assign(spoken, { notice: success(arrived, this.things ?? []), kind: "good" });
+  }
+
   /** The age of the live robot, so that its number does not dance: it is written four times a second. */
   rounded(age) {
     if (age === null) return null;
     if (clock() - (this.agedAt ?? 0) > 0.25) [this.aged, this.agedAt] = [Math.max(age, 0), clock()];
     return this.aged;
   }
+}
+
+/** Calls `act` when the button `id` is pressed, also by a second finger, of which a browser makes no click. */
+function tapped(id, act) {
+  const button = find(id);
+  button.addEventListener("click", act);
+  button.addEventListener("pointerup", (event) => event.pointerType === "touch" && !event.isPrimary && !button.disabled && act());
 }
 
 function setText(node, text) {

@@ -1,6 +1,7 @@
 // The state in words, once for both: as text of the page, and on a board in the room.
 
 import { CanvasTexture, LinearFilter, Mesh, MeshBasicMaterial, PlaneGeometry, SRGBColorSpace, Vector3 } from "three";
+import { isDoubtful, ofDevice, whileHolding } from "./hints.js";
 import { GHOST, MOUNT, OFFER, REACH, WRONG, css } from "./colours.js";
 
 const TITLES = {
@@ -18,9 +19,10 @@ const DO = { "token: wrong": "This address is not of the session that runs now. 
 /** What to do about the `reason` for which the server has ended a connection. */
 export const remedy = (reason) => (reason in DO ? `${DO[reason]} (${reason}).` : reason);
 
-/** What there is to say of `page`: `mode`, `title`, `next`, `notice`, whether the robot has `arrived`, and facts by name. `ended`: it will not connect again by itself. `immersed`: by controllers. */
+/** What there is to say of `page`: `mode`, `title`, `next`, `notice`, whether the robot has `arrived`, and facts by name. `ended`: it will not connect again by itself. `device`: in whose words, as `ofDevice` has it; `held`: whether a key or a button is. */
 export function words(page) {
-  const { state, lease, id, age, up, reason, ended, stale, immersed } = page;
+  const { state, lease, id, age, up, reason, ended, stale, device = "keys", held = false } = page;
+  const immersed = device === "controllers";
   const mode = !up ? (reason === null ? "connecting" : "lost") : (state?.mode ?? "connecting");
   const mine = lease?.holder === id && id !== "";
   const holder = lease?.clients?.find((one) => one.id === lease.holder);
@@ -33,10 +35,12 @@ export function words(page) {
   if (state?.fault) facts.Fault = state.fault;
   let title = TITLES[mode];
   if (mode === "delay" && Number.isFinite(state.countdown)) title = `Moves in ${state.countdown.toFixed(1)} s`;
-  let next = mine || !lease?.holder ? sentence((immersed ? state?.next : state?.keys) ?? "") : "You watch. Ask for control to aim.";
+  const wanted = (immersed ? state?.next : state?.keys) ?? "";
+  const by = !immersed && mine && mode === "hold" ? whileHolding(held) : wanted;
+  let next = mine || !lease?.holder ? sentence(ofDevice(by, device)) : "You watch. Ask for control to aim.";
   if (!up) next = reason === null ? "Waiting for the server." : `The connection is lost${reason ? `: ${reason}` : ""}. Trying again.`;
   if (!up && ended) next = `The server has ended the connection: ${reason}.`;
-  return { mode, title, next, notice: (up && state?.notice) || "", arrived, facts };
+  return { mode, title, next, notice: ofDevice((up && state?.notice) || "", device), arrived, facts };
 }
 
 const sentence = (text) => (text ? `${text[0].toUpperCase()}${text.slice(1)}.` : "");
@@ -47,7 +51,7 @@ export function foreseenWords(told) {
   const spread = told.spread.length ? Math.round(1000 * told.spread[told.spread.length - 1]) : null;
   const parts = [];
   if (told.probability !== null)
-    parts.push(`Grasp holds in ${percent(told.probability)} of ${told.futures} futures (${percent(told.low)} to ${percent(told.high)})`);
+    parts.push(`Grasp holds in ${isDoubtful(told) ? "only " : ""}${percent(told.probability)} of ${told.futures} futures (${percent(told.low)} to ${percent(told.high)})`);
   if (told.miss !== null) parts.push(`the preview ends ${Math.round(1000 * told.miss)} mm from the target`);
   if (spread !== null) parts.push(`in ${percent(told.within)} of cases the robot’s tip ends within ${spread} mm of the preview’s, where it touches nothing`);
   else parts.push(`how near the robot’s tip comes to the preview’s is unknown: ${told.unknown}`);
@@ -63,7 +67,9 @@ export class PagePanel {
     this.facts = "";
   }
 
-  show({ mode, title, next, notice, facts }) {
+  /** `kind` of the notice: "" or "good". */
+  show({ mode, title, next, notice, facts, kind = "" }) {
+    if (this.parts.notice.dataset.kind !== kind) this.parts.notice.dataset.kind = kind;
     setText(this.parts.mode, title);
     if (this.parts.mode.dataset.mode !== mode) this.parts.mode.dataset.mode = mode;
     setText(this.parts.next, next);

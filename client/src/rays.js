@@ -34,7 +34,7 @@ export class Marks {
     });
     for (const kind of ["rigid", "tip"]) {
       const end = this.ends[this.names.indexOf(kind === "rigid" ? "mount" : "tip")];
-      this.targets[kind].update(rows, at(`${kind}_target`), targets?.[kind] ?? null, end);
+      this.targets[kind].update(rows, at(`${kind}_target`), targets?.[kind] ?? null, end, kind === "tip" ? (targets?.thing ?? "") : "");
     }
   }
 
@@ -112,8 +112,8 @@ class Target {
     this.group.visible = false;
   }
 
-  /** Where a target has not been set yet, what is seen through the robot is at the `end` of its ray. */
-  update(rows, at, told, end) {
+  /** Where a target has not been set yet, what is seen through the robot is at the `end` of its ray. `thing`: what it marks. */
+  update(rows, at, told, end, thing) {
     const there = Number.isFinite(rows[at]);
     this.group.visible = there || Number.isFinite(end.x);
     if (!this.group.visible) return;
@@ -122,7 +122,7 @@ class Target {
     else this.group.position.copy(end);
     const outside = told?.reach === "outside", blocked = told?.reach === "blocked";
     this.ring.visible = outside || blocked;
-    this.label.set(wordsOf(told), outside || blocked ? 0xffb08a : 0xffffff);
+    this.label.set(wordsOf(told) || thing, outside || blocked ? 0xffb08a : 0xffffff);
     const offered = told?.offer ?? null;
     this.offer.visible = this.way.visible = Boolean(offered);
     if (offered) {

@@ -13,6 +13,11 @@ const ONE = new Vector3(1, 1, 1);
 const WIDEST = 4; // m, of an obstacle that is drawn; the floor is wider
 const OBJECT = "object"; // the body of the object, where the model has one
 const FADED = 0.35; // of a live robot that is not heard of
+const SQUARE = 0.25, SQUARES = 16; // m of a square of the floor, and how many; index.html says how wide one is
+const GRID = { dark: [0x4a5663, 0x343e49], light: [0x8b98a5, 0xb9c3cc] };
+const STAND = { at: [-0.04, 0], half: 0.11, gap: 0.03 }; // m, beneath a base that stands higher than `gap` above the floor
+const STRING = { long: 0.15, radius: 0.0015, hook: 0.006 }; // m, of what hangs
+const METAL = [0.45, 0.48, 0.52, 1], THREAD = [0.8, 0.8, 0.78, 1];
 const WOOD = [0.55, 0.47, 0.38, 1], GRASPABLE = [0.35, 0.7, 0.9, 1];
 
 export class RobotScene {
@@ -23,10 +28,20 @@ export class RobotScene {
     const sun = new DirectionalLight(0xffffff, 1.5);
     sun.position.set(1.5, 3, 2);
     this.scene.add(sun);
-    this.floor = new GridHelper(4, 16, 0x4a5663, 0x343e49);
-    this.floor.rotation.x = Math.PI / 2; // three's lies across y, the base's z is up
-    this.base.add(this.floor);
+    this.ground("dark");
     this.reachShown = true;
+  }
+
+  /** The floor's grid for a "dark" or a "light" ground. */
+  ground(scheme) {
+    const height = this.floor?.position.z ?? 0, visible = this.floor?.visible ?? true;
+    this.floor?.removeFromParent();
+    this.floor?.dispose();
+    this.floor = new GridHelper(SQUARES * SQUARE, SQUARES, ...GRID[scheme]);
+    this.floor.rotation.x = Math.PI / 2; // three's lies across y, the base's z is up
+    this.floor.position.z = height;
+    this.floor.visible = visible;
+    this.base.add(this.floor);
   }
 
   /** The scene as the server has it, anew. */
@@ -39,7 +54,7 @@ export class RobotScene {
     const still = mergedGeoms(geoms.filter(({ body, size }) => body < 0 && size[0] < WIDEST / 2), meshes); // not the floor
     if (moving) {
       this.live = skinned(moving, new MeshLambertMaterial({ vertexColors: true }), bodies.length);
-      const glass = new MeshLambertMaterial({ color: GHOST, transparent: true, opacity: 0.45, depthWrite: false });
+      const glass = new MeshLambertMaterial({ color: GHOST, emissive: GHOST, emissiveIntensity: 0.4, transparent: true, opacity: 0.6, depthWrite: false });
       this.ghost = skinned(moving, glass, bodies.length);
       // First its depth alone, so that what is behind its own surface does not shine through.
       const depth = new MeshBasicMaterial({ colorWrite: false });
@@ -117,6 +132,13 @@ export class RobotScene {
     this.tipReach.quaternion.set(rows[at + 4], rows[at + 5], rows[at + 6], rows[at + 3]);
   }
 
+  /** All that is to be in view, in the room: bodies as in `rows`, and things. */
+  extent(rows) {
+    const bodies = (this.bodies ?? []).map((_, index) => new Vector3().fromArray(rows, index * STRIDE));
+    const things = (this.known?.things ?? []).map(({ position }) => new Vector3(...position));
+    return [...bodies, ...things].filter(({ x }) => Number.isFinite(x)).map((point) => this.base.localToWorld(point));
+  }
+
   showReach(shown) {
     this.reachShown = shown;
     if (this.reach) this.reach.visible = shown;
@@ -141,6 +163,7 @@ export class RobotScene {
       const known = shape === "sphere" || shape === "cylinder" ? shape : "box";
       geoms.push({ body: -1, shape: known, size, position, quaternion, rgba: GRASPABLE });
     }
+    geoms.push(...standOf(this.floor.position.z), ...world.things.filter(({ support }) => support === "hanging").flatMap(stringOf));
     const merged = mergedGeoms(geoms, []);
     this.believed = merged && new Mesh(merged, new MeshLambertMaterial({ vertexColors: true }));
     if (this.believed) this.base.add(this.believed);
@@ -165,6 +188,24 @@ export class RobotScene {
     this.future.push(tube);
     this.base.add(tube);
   }
+}
+
+const UNTURNED = [1, 0, 0, 0];
+
+/** What the base stands on, where the floor is `below` it: no obstacle of the model, but else it would float. */
+function standOf(below) {
+  if (below > -STAND.gap) return [];
+  const post = { position: [...STAND.at, below / 2], size: [STAND.half, STAND.half, -below / 2] };
+  const foot = { position: [...STAND.at, below + 0.01], size: [2 * STAND.half, 2 * STAND.half, 0.01] };
+  return [post, foot].map((one) => ({ body: -1, shape: "box", quaternion: UNTURNED, rgba: METAL, ...one }));
+}
+
+/** The string by which a thing hangs, and its hook. */
+function stringOf({ position: [x, y, z], diameter, height, shape, quaternion }) {
+  const [w, a, b] = quaternion, upright = Math.abs(1 - 2 * (a * a + b * b) / (w * w + a * a + b * b + quaternion[3] ** 2));
+  const top = z + (shape === "sphere" ? diameter : upright * height + (1 - upright) * diameter) / 2, { long, radius, hook } = STRING;
+  const thread = { shape: "cylinder", position: [x, y, top + long / 2], size: [radius, long / 2] };
+  return [thread, { shape: "sphere", position: [x, y, top + long], size: [hook] }].map((one) => ({ body: -1, quaternion: UNTURNED, rgba: THREAD, ...one }));
 }
 
 /** A mesh whose bones are in the frame of its parent, not in the room's: `detached`, bound by the identity. */

@@ -144,7 +144,7 @@ test("the robot follows while the grip is held, and the page says why it holds t
   for (let n = 0; n < 3; n++) await page.keyboard.press("ArrowUp");
   await until(page, (z) => globalThis.trunkline.state.targets.rigid.position[2] > z + 0.02, before[2]);
   await page.keyboard.up("KeyG");
-  await until(page, () => /grips let go/.test(document.querySelector("#notice").textContent));
+  await until(page, () => /G was let go/.test(document.querySelector("#notice").textContent));
   await passed(page, server, ["follow", "hold", "aim"]);
   await until(page, () => globalThis.trunkline.state.robot === "idle");
 });
@@ -220,6 +220,138 @@ test("on a small page the list of keys hides neither the state nor the next acti
     assert.ok(status.right <= keys.left, `${width}: the state ends at ${status.right}, the keys begin at ${keys.left}`);
     assert.ok(keys.bottom <= acts.top, `${width}: the keys end at ${keys.bottom}, the actions begin at ${acts.top}`);
   }
+});
+
+test("the tip's marker that is dragged onto a thing marks it, and a handle moves a target along its axis alone", async (t) => {
+  const { page } = await open(t, browser, server, { drawn: false });
+  await loaded(page);
+  await takeControl(page);
+  await drag(page, "rigid", 16, -12);
+  const [from, cup] = await page.evaluate(() => {
+    const { desktop } = globalThis.trunkline, [thing] = desktop.things;
+    const place = desktop.wanted[0].clone().set(...thing.position);
+    return [desktop.wanted[1 - desktop.rigid], place].map((point) => desktop.toScreen(point));
+  });
+  await page.mouse.move(...from);
+  await page.mouse.down();
+  await page.mouse.move(...cup, { steps: 4 });
+  const away = await page.evaluate(() => {
+    const { desktop } = globalThis.trunkline, wanted = desktop.wanted[1 - desktop.rigid];
+    return wanted.distanceTo(wanted.clone().set(...desktop.things[0].position));
+  });
+  assert.ok(away < 1e-6, `the marker is ${away} m from the middle of what the pointer is on`);
+  await page.waitForTimeout(300);
+  await page.mouse.up();
+  await until(page, () => globalThis.trunkline.state.targets?.thing === "the cup");
+  await page.keyboard.press("Digit1");
+  const handle = await until(page, () => {
+    const { handles, desktop } = globalThis.trunkline, { group } = handles;
+    if (!group.visible || group.position.distanceTo(desktop.wanted[desktop.rigid]) > 1e-6) return null;
+    return desktop.toScreen(group.position.clone().setZ(group.position.z + 0.1 * group.scale.x));
+  });
+  const before = await page.evaluate(() => globalThis.trunkline.desktop.wanted[globalThis.trunkline.desktop.rigid].toArray());
+  await page.mouse.move(...handle);
+  await page.mouse.down();
+  await page.mouse.move(handle[0] + 5, handle[1] - 40, { steps: 4 });
+  const after = await page.evaluate(() => globalThis.trunkline.desktop.wanted[globalThis.trunkline.desktop.rigid].toArray());
+  await page.mouse.up();
+  assert.deepEqual([0, 1].map((axis) => Math.abs(after[axis] - before[axis]) < 1e-9), [true, true]);
+  assert.ok(after[2] - before[2] > 0.02, `rose by ${after[2] - before[2]} m`);
+});
+
+test("a doubtful grasp looks so, and its first confirmation only asks again", async (t) => {
+  await server.tell("doubtful");
+  t.after(() => server.tell("sure"));
+  const { page } = await open(t, browser, server, { drawn: false });
+  await loaded(page);
+  await takeControl(page);
+  await drag(page, "rigid", 16, -12);
+  await drag(page, "tip", -30, -45);
+  await page.keyboard.press("Enter");
+  await inMode(page, "ready");
+  assert.ok(await page.evaluate(() => document.querySelector("#foreseen").hasAttribute("data-doubtful")));
+  await page.keyboard.down("KeyG");
+  await page.waitForTimeout(300);
+  await page.keyboard.press("Enter");
+  await until(page, () => /only 40 % of cases. Press Enter again/.test(document.querySelector("#notice").textContent));
+  await page.waitForTimeout(500);
+  assert.equal(await page.evaluate(() => globalThis.trunkline.state.mode), "ready");
+  await page.keyboard.press("Enter");
+  await passed(page, server, ["ready", "delay", "execute", "aim"]);
+  await until(page, () => /^Arrived/.test(document.querySelector("#notice").textContent));
+  await page.keyboard.up("KeyG");
+});
+
+test("a key that did nothing says why, and control that was lost does, until its cause is gone", async (t) => {
+  const { page } = await open(t, browser, server, { drawn: false });
+  await loaded(page);
+  await until(page, () => !document.querySelector("#control").disabled);
+  await page.keyboard.press("Enter");
+  await until(page, () => /press “Take control” first/.test(document.querySelector("#notice").textContent));
+  await takeControl(page);
+  await until(page, () => document.querySelector("#notice").textContent === "");
+  await server.tell("drop");
+  await server.tell("listen");
+  await until(page, () => /Control was lost with the connection/.test(document.querySelector("#notice").textContent));
+  await takeControl(page);
+  await until(page, () => !/lost/.test(document.querySelector("#notice").textContent));
+});
+
+test("in small windows and at 200 % the panels leave the robot visible, from each side", async (t) => {
+  const { page } = await open(t, browser, server, { drawn: false });
+  await loaded(page);
+  await takeControl(page);
+  for (const [width, height] of [[400, 720], [640, 360], [1280, 720]]) {
+    await page.setViewportSize({ width, height });
+    await page.waitForTimeout(300);
+    for (const view of ["", "front", "side", "top", "fit"]) {
+      if (view) await page.click(`#${view}`);
+      const [places, panels] = await page.evaluate(() => {
+        const { drawn, frame, desktop } = globalThis.trunkline;
+        const points = drawn.extent(frame.rows).map((point) => desktop.toScreen(drawn.base.worldToLocal(point)));
+        return [points, ["#status", "#acts"].map((id) => document.querySelector(id).getBoundingClientRect().toJSON())];
+      });
+      const hidden = places.filter(([x, y]) => x < 0 || y < 0 || x > width || y > height || panels.some(({ left, top, right, bottom }) => x > left && x < right && y > top && y < bottom));
+      assert.equal(hidden.length, 0, `${width} by ${height}, ${view || "as it begins"}: ${hidden.length} of ${places.length} bodies hidden`);
+    }
+  }
+});
+
+test("light and dark follow the system", async (t) => {
+  const { page } = await open(t, browser, server, { drawn: false });
+  await loaded(page);
+  const turns = (isLight) => until(page, (light) => {
+    const shades = [globalThis.trunkline.ground.getHSL({}).l, Number(/\d+/.exec(getComputedStyle(document.body).backgroundColor)[0]) / 255];
+    return shades.every((shade) => (light ? shade > 0.7 : shade < 0.3));
+  }, isLight);
+  await page.emulateMedia({ colorScheme: "light" });
+  await turns(true);
+  await page.waitForTimeout(300); // buttons change their colours softly
+  await page.evaluate(AXE);
+  const { violations } = await page.evaluate(() => globalThis.axe.run(document));
+  assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.target).join(", ")}`), []);
+  await page.emulateMedia({ colorScheme: "dark" });
+  await turns(false);
+});
+
+test("a finger needs no key: what is offered has a button, and words name it", async (t) => {
+  const { page } = await open(t, browser, server, { drawn: false, touch: true });
+  await loaded(page);
+  await until(page, () => !document.querySelector("#control").disabled);
+  await page.tap("#control");
+  await inMode(page, "aim");
+  await until(page, () => document.body.hasAttribute("data-touch"));
+  await page.tap("#pad summary");
+  await page.tap("#which"); // the tip's
+  const z = () => page.evaluate(() => globalThis.trunkline.desktop.wanted[globalThis.trunkline.desktop.chosen].z);
+  const before = await z();
+  await page.tap('[data-step="ArrowUp"]');
+  assert.ok(Math.abs((await z()) - before - 0.01) < 1e-6);
+  await page.tap("#stop");
+  await inMode(page, "stopped");
+  await until(page, () => /tap “Go on”/i.test(document.querySelector("#next").textContent));
+  await page.tap("#go");
+  await inMode(page, "aim");
 });
 
 test("a recording is played by the ghost, and a file that is none is said", async (t) => {

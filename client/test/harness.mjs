@@ -17,7 +17,7 @@ export const PYTHON = process.env.TRUNKLINE_PYTHON ?? join(root, ".venv", "bin",
 const BROWSER = process.env.TRUNKLINE_BROWSER ?? "/usr/bin/chromium";
 const LISTENS = process.env.TRUNKLINE_BROWSER_AT ?? "";
 const PICTURES = process.env.TRUNKLINE_PICTURES ?? "";
-const LONGEST = 120_000; // ms that anything may take; drawing by software on a shared core is slow
+const LONGEST = Number(process.env.TRUNKLINE_LONGEST ?? 120_000); // ms that anything may take; drawing by software on a shared core is slow
 const DRAWN = 10; // Hz at most at which tests draw, so that they also pass beside other work
 const BLIND = 36; // Hz at most without drawing
 const FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--disable-background-networking"];
@@ -50,8 +50,8 @@ export const LAUNCHED = { executablePath: BROWSER, args: FLAGS, timeout: LONGEST
 export const launch = () => (LISTENS ? chromium.connect(LISTENS, { timeout: LONGEST }) : chromium.launch(LAUNCHED));
 
 /** A page at `url` of `server`, closed with the test; `wrongs` collects console errors, exceptions and requests elsewhere. Unless it is `drawn`, it does all but fill pixels. */
-export async function open(t, browser, server, { url = server.url, headset = false, drawn = true, width = PICTURES ? 1280 : 720, height = PICTURES ? 720 : 480 } = {}) {
-  const context = await browser.newContext({ viewport: { width, height } });
+export async function open(t, browser, server, { url = server.url, headset = false, touch = false, drawn = true, width = PICTURES ? 1280 : 720, height = PICTURES ? 720 : 480 } = {}) {
+  const context = await browser.newContext({ viewport: { width, height }, hasTouch: touch });
   t.after(() => context.close());
   const page = await context.newPage();
   const wrongs = [];

@@ -6,6 +6,12 @@ import { Playback } from "../src/playback.js";
 import { Recording } from "../src/recording.js";
 import { decode, encode, noHand } from "../src/wire.js";
 import { FROM_CLIENT, FROM_SERVER, HAND, HEAD_BYTES, INPUT_BYTES } from "../src/wire_table.js";
+import { Ray, Vector3 } from "three";
+import { axisOf, onAxis, thingAt } from "../src/handles.js";
+import { askedTwice, isDoubtful, lasts, ofDevice, success, whyLost, whyNothing } from "../src/hints.js";
+import { LEVELS, Quality } from "../src/quality.js";
+import { matrixOf } from "../src/geoms.js";
+import { freeArea } from "../src/views.js";
 import { foreseenWords, remedy, words } from "../src/panel.js";
 
 /** A message `robot` of one row. */
@@ -104,4 +110,117 @@ test("a radius that is unknown is said to be, and why", () => {
     "Grasp holds in 84 % of 12 futures (68 % to 93 %); how near the robot’s tip comes to the preview’s is unknown: " +
       "mount tilted by 95°, trials up to 90°.",
   );
+});
+
+/** Gives `quality` pictures of `seconds` each, from `from` to `to` s; the time of the last. */
+function pictures(quality, seconds, from, to) {
+  let now = from;
+  for (; now < to; now += Math.max(seconds, 0.05)) quality.took(seconds, now);
+  return now;
+}
+
+test("slow pictures lower the quality step by step, the reach before all is coarse; quick ones raise it late", () => {
+  const applied = [], quality = new Quality((level) => applied.push(level), 2);
+  let now = pictures(quality, 0.02, 0, 30);
+  assert.deepEqual(applied, [], "pictures of 20 ms are no reason");
+  now = pictures(quality, 0.2, now, now + 60);
+  assert.deepEqual(applied, LEVELS.slice(1));
+  assert.equal(quality.reach, false);
+  assert.match(quality.words(true), /^slow, 0.2 s a picture; drawn coarser, without the reach; H hides the reach/);
+  assert.doesNotMatch(quality.words(false), /H hides/, "what is hidden already need not be");
+  now = pictures(quality, 0.005, now, now + 100);
+  assert.equal(quality.at, 4, "it does not swing");
+  pictures(quality, 0.005, now, now + 1000);
+  assert.equal(quality.at, 0);
+  assert.equal(quality.words(true), "");
+});
+
+test("inputs that come late lower the quality too, and a screen of one pixel a pixel begins at the level that shows it", () => {
+  const applied = [], quality = new Quality((level) => applied.push(level), 1);
+  assert.equal(quality.at, 1);
+  for (let n = 0; n < 20; n++) quality.input(0.02, n / 10);
+  assert.deepEqual(applied, []);
+  for (let n = 20; n < 40; n++) quality.input(0.15, n / 5);
+  assert.ok(applied.length > 0);
+  quality.at = LEVELS.length - 1;
+  assert.deepEqual([quality.ratioOf(1280 * 720), quality.ratioOf(400 * 720)], [0.5, 0.7]);
+});
+
+test("a notice is in the words of the device at hand", () => {
+  const notice = "tip target is 17 mm out of reach; primary button takes the nearest point that is within";
+  assert.equal(ofDevice(notice, "controllers"), notice);
+  assert.equal(ofDevice(notice, "keys"), "the tip’s target is 17 mm out of reach; R takes the nearest point that is within");
+  assert.equal(ofDevice("stopped; primary button goes on", "touch"), "stopped; “Go on” goes on");
+  assert.equal(ofDevice("hold G and press Enter to confirm, or move a target", "touch"), "hold “Let it move” and tap “Confirm”, or move a target");
+  for (const key of ["stopped", "ready", "plan", "hold", "aim"]) assert.doesNotMatch(ofDevice(whyNothing("Enter", { up: true, controls: true, mode: key, gripped: false }), "touch"), /\bEnter\b.*press|\bpress R\b|\bG\b/);
+});
+
+test("of a notice that stands while aiming, its cause is looked at", () => {
+  const at = (rigid, tip) => ({ mode: "aim", targets: { rigid: { reach: rigid }, tip: { reach: tip } }, gripped: false });
+  const outside = "tip target is 17 mm out of reach";
+  assert.ok(lasts(outside, at("inside", "outside")));
+  assert.ok(!lasts(outside, at("inside", "inside")));
+  assert.ok(!lasts("rigid target is inside the table", at("inside", "inside")));
+  assert.ok(!lasts("both targets are needed: hold a grip to set each", at("inside", "inside")));
+  assert.ok(lasts("no plan: world: the table", at("inside", "inside")), "what is not known to be over stays");
+});
+
+test("a key that does nothing says why, and one that does says nothing", () => {
+  const now = { up: true, controls: true, holder: "a", mode: "aim", gripped: false, offers: false };
+  assert.equal(whyNothing("Enter", now), "");
+  assert.equal(whyNothing("KeyX", { ...now, up: false }), "");
+  assert.match(whyNothing("Enter", { ...now, controls: false, holder: "" }), /press “Take control” first/);
+  assert.match(whyNothing("KeyG", { ...now, controls: false }), /Somebody else controls/);
+  assert.match(whyNothing("Enter", { ...now, mode: "ready" }), /Hold G, and press Enter/);
+  assert.equal(whyNothing("Enter", { ...now, mode: "ready", gripped: true }), "");
+  assert.match(whyNothing("KeyR", now), /nothing is offered/);
+  assert.match(whyNothing("KeyR", { ...now, offers: true, gripped: true }), /Let go of G/);
+  assert.equal(whyNothing("KeyR", { ...now, mode: "stopped" }), "");
+  assert.match(whyNothing("ArrowUp", { ...now, mode: "execute" }), /stay as they are/);
+});
+
+test("letting go is asked only of whom holds something", () => {
+  const page = { lease: { holder: "me", clients: [] }, id: "me", age: 0.02, up: true, reason: null, stale: false, device: "keys" };
+  const state = { mode: "hold", keys: "let go of all keys for a moment", next: "let go of grips and triggers for a moment" };
+  assert.match(words({ ...page, state, held: true }).next, /Let go of G/);
+  assert.doesNotMatch(words({ ...page, state, held: false }).next, /let go/i);
+  assert.match(words({ ...page, state, device: "controllers" }).next, /grips and triggers/);
+});
+
+test("why control was lost is what happened here of late", () => {
+  assert.match(whyLost({ gap: 1.3, hidden: false }), /sent nothing for 1.3 s.*“Take control”/);
+  assert.match(whyLost({ gap: 0.1, hidden: true }), /was hidden/);
+  assert.doesNotMatch(whyLost({ gap: 0.1, hidden: false }), /busy|hidden/);
+});
+
+test("a grasp that is likely to fail looks so and is asked of twice, one that is likely to hold is not", () => {
+  assert.ok(isDoubtful({ probability: 0.4 }) && !isDoubtful({ probability: 0.84 }) && !isDoubtful({ probability: null }) && !isDoubtful(null));
+  assert.match(foreseenWords({ ...FORESEEN, probability: 0.4, low: 0.2, high: 0.6, unknown: "x" }), /^Grasp holds in only 40 %/);
+  assert.match(askedTwice({ probability: 0.4 }), /only 40 % of cases. Press Enter again/);
+});
+
+test("what was done is said: lifted, put down, arrived", () => {
+  const cup = { name: "the cup", support: "held" };
+  assert.equal(success(["reach", "curl", "lift"], [cup]), "Held: lift of the cup is done. Now point where it goes.");
+  assert.match(success(["carry", "release"], [{ ...cup, support: "standing" }]), /^Put down/);
+  assert.match(success(["reach"], [{ ...cup, support: "standing" }]), /^Arrived/);
+});
+
+test("a handle moves along its own axis, and a ray meets the thing that it points at", () => {
+  const ray = new Ray(new Vector3(0.3, -2, 0.4), new Vector3(0, 1, 0));
+  assert.deepEqual(onAxis(ray, new Vector3(0, 0, 0.1), axisOf(2)).toArray().map((x) => Math.round(1e6 * x) / 1e6), [0, 0, 0.4]);
+  assert.deepEqual(onAxis(ray, new Vector3(0, 0, 0.1), axisOf(0)).toArray().map((x) => Math.round(1e6 * x) / 1e6), [0.3, 0, 0.1]);
+  assert.equal(onAxis(ray, new Vector3(), axisOf(1)), null, "seen end on");
+  const lying = { name: "lying", shape: "cylinder", diameter: 0.04, height: 0.3, position: [0.2, 0, 0.4], quaternion: [Math.SQRT1_2, 0, Math.SQRT1_2, 0] };
+  const behind = { ...lying, name: "behind", position: [0.3, 1, 0.4] };
+  const inverse = ({ position, quaternion }) => matrixOf(position, quaternion).invert();
+  for (const things of [[behind, lying], [lying, behind]]) assert.equal(thingAt(ray, things, inverse, 0.01).name, "lying");
+  assert.equal(thingAt(new Ray(new Vector3(0.3, -2, 0.5), new Vector3(0, 1, 0)), [behind, lying], inverse, 0.01), null);
+});
+
+test("in a small window the robot is viewed in what the panels leave free", () => {
+  const rect = (left, top, width, height) => ({ left, top, right: left + width, bottom: top + height });
+  assert.deepEqual(freeArea(1280, 720, rect(14, 14, 430, 150), rect(300, 650, 600, 56)), { left: 0, top: 0, width: 1280, height: 720 });
+  assert.deepEqual(freeArea(400, 720, rect(7, 7, 386, 143), rect(7, 620, 386, 93)), { left: 0, top: 150, width: 400, height: 470 });
+  assert.deepEqual(freeArea(640, 360, rect(7, 7, 243, 143), rect(7, 310, 500, 43)), { left: 250, top: 0, width: 390, height: 310 });
 });

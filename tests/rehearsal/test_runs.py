@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import pytest
 from matplotlib.image import imread
 
+from rehearsal import __main__ as command
 from rehearsal import runs
 from rehearsal.experiments.result import Result, read_results, summary
 from rehearsal.report import draw
@@ -49,6 +50,18 @@ def test_a_stopped_rehearsal_goes_on(made, tmp_path):
     rows = [(result.seed, result.variant) for result in results]
     assert rows == [(0, ""), (1, ""), (2, ""), (3, ""), (4, ""), (0, "off by 5 mm"), (1, "off by 5 mm")]
     assert len(make(wanted({"touch": 2}, 0), Path("package.tgz"), SOURCE, table, workers=1)) == 2  # as asked, no more
+
+
+def test_a_rehearsal_says_how_long_it_takes_after_one_run_of_each(made, tmp_path, monkeypatch, capsys):
+    times = iter([0.0, 120.0])
+    monkeypatch.setattr(command.time, "monotonic", lambda: next(times))
+    table = tmp_path / "runs.csv"
+    make([Run("touch", 0)], Path("package.tgz"), SOURCE, table, workers=1)
+    results = command.make_timed(wanted({"touch": 5}, 0), Path("package.tgz"), SOURCE, table, workers=1)
+    assert [result.seed for result in results] == [0, 1, 2, 3, 4]
+    lines = capsys.readouterr().out.splitlines()
+    assert "4 of 5 runs to make, 1 side by side" in lines[1]
+    assert "3 more runs, about 6 min" in lines
 
 
 def test_a_stopped_rehearsal_has_about_as_many_runs_of_each():

@@ -4,9 +4,9 @@
 
 prints `ready PORT TOKEN` and serves until its input ends. A line on its input is a fault to be shown: `silent` and
 `speak` (the robot tells nothing new), `drop` and `listen` (all connections end, and none is taken until then), `fault`
-(the robot reports one); `code` renews the pairing code. The modes that there were, and what else the server logged,
-come back as a line of JSON. With `--light` meshes have few triangles. It is patient with clients that draw by software
-beside other work: PATIENCE.
+(the robot reports one); `doubtful` and `sure`: how a grasp is foreseen; `code` renews the pairing code. The modes that
+there were, and what else the server logged, come back as a line of JSON. With `--light` meshes have few triangles. It
+is patient with clients that draw by software beside other work: PATIENCE.
 """
 
 import asyncio
@@ -167,6 +167,7 @@ class Planning:
 
     def __init__(self, figure: Figure) -> None:
         self.figure = figure
+        self.probability = 0.84
         self.planner = Planner(RigidIK(OFFSET), NETWORK, STRAIGHT, LIMITS, OFFSET, step=0.005)
 
     def answers(self, order: Order | FollowRequest) -> Iterator[Answer]:
@@ -195,7 +196,7 @@ class Planning:
         spread = tuple(float(share) for share in 0.004 + 0.018 * shares)
         path = tuple(tuple(map(float, tip)) for tip in tips)
         prediction = messages.PredictionMessage(
-            digest, 0.84, 0.68, 0.93, tuple(map(float, times[::9])), path, spread, 0.9, 32
+            digest, self.probability, 0.68, 0.93, tuple(map(float, times[::9])), path, spread, 0.9, 32
         )
         yield PredictionAnswer(serial, prediction)
 
@@ -215,7 +216,9 @@ async def listen(runner: web.AppRunner, port: int) -> web.TCPSite:
     return site
 
 
-async def obey(server: Server, robot: Robot, runner: web.AppRunner, port: int, log: list[str]) -> None:
+async def obey(
+    server: Server, robot: Robot, planning: Planning, runner: web.AppRunner, port: int, log: list[str]
+) -> None:
     """Lines of the input, until it ends; the log goes out for each."""
     loop = asyncio.get_running_loop()
     site = await listen(runner, port)
@@ -224,6 +227,7 @@ async def obey(server: Server, robot: Robot, runner: web.AppRunner, port: int, l
         word = line.strip()
         robot.is_silent = word == "silent" or (robot.is_silent and word != "speak")
         robot.fault = {"fault": "joint 4: torque", "well": ""}.get(word, robot.fault)
+        planning.probability = {"doubtful": 0.4, "sure": 0.84}.get(word, planning.probability)
         if word == "drop":
             await site.stop()
             for client in list(server.clients.values()):
@@ -261,7 +265,7 @@ async def serve(port: int, folder: Path) -> None:
     server.tick = watched
     runner = web.AppRunner(server.app())
     await runner.setup()
-    await obey(server, robot, runner, port, log)
+    await obey(server, robot, planning, runner, port, log)
     await runner.cleanup()
 
 
