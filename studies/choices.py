@@ -19,19 +19,14 @@ from studies.rows import Rows, digest
 from studies.stage_chain import STAGES, StageChain, committed, require_demo, run_stages
 from trunkline.errors import in_one_line
 from trunkline.identification.evaluation.evaluation import replay, scores
-from trunkline.identification.fit.optimizers import LeastSquares
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.settings import IdentificationSettings
 from trunkline.model_files import read_spec
-from trunkline.pipeline.config import PROJECT
 from trunkline.pipeline.identify import CAD_MODEL, TRIALS
 from trunkline.recordings.trials.experiments import is_static
 from trunkline.recordings.trials.splits import VALIDATE
 from trunkline.recordings.trials.trial import Trial
-from trunkline.settings import read_yaml
 
-LEAST_SQUARES = read_yaml(PROJECT / "conf/shared/optimizer/least_squares.yaml")
-OPTIMIZER = LeastSquares(**{str(key): value for key, value in LEAST_SQUARES.items()})
 JOINT_FRICTION = Bounds(low=1e-4, high=0.1)  # rad of a joint's own spring
 MOUNT = Bounds(low=-0.1, high=0.1)  # rad by which the mount is turned in the tracked base frame
 COMMAND_DELAY = 0.02  # s
@@ -78,7 +73,6 @@ CHOICES: dict[str, ModelChoice] = {
     "markers": ModelChoice("markers: measured", "identify_stiffness", {"markers": "measured"}),
     "velocity": ModelChoice("started with measured velocities", moving=True),
     "distances": ModelChoice("loss: distances", loss="distances"),
-    "least-squares": ModelChoice("optimizer: least_squares", changes={"optimizer": OPTIMIZER}),
     "joint-damping": ModelChoice("per_joint damping too", "identify_damping", {"per_joint": ["damping"]}),
 }
 

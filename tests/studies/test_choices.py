@@ -6,7 +6,6 @@ import pytest
 
 from studies.choices import CHOICES
 from studies.stage_chain import STAGES, committed
-from trunkline.identification.fit.optimizers import LeastSquares
 from trunkline.identification.fit.setup import fit_of
 
 
@@ -34,6 +33,5 @@ def test_a_choice_of_trials_starts_those_that_move_with_their_velocity():
 
 @pytest.mark.parametrize("name", CHOICES)
 def test_settings_of_a_choice_are_valid_in_every_stage(name):
-    methods = [fit_of(CHOICES[name].settings(stage), ()).method.optimizer for stage in STAGES]
-    if name == "least-squares":
-        assert all(isinstance(method, LeastSquares) for method in methods)
+    for stage in STAGES:
+        fit_of(CHOICES[name].settings(stage), ())
