@@ -67,7 +67,7 @@ def _at_fault(clocks: dict[str, np.ndarray], early: str, late: str, at: int) -> 
     if third is None:
         unusual = {name: _unusual(clocks[name], at) for name in (early, late)}
     else:
-        interval = float(np.median(np.diff(clocks[third])))
+        interval = float(np.ptp(clocks[third])) / (len(clocks[third]) - 1)
         unusual = {name: abs(size_at(relative(clocks[name], clocks[third]), at, interval)) for name in (early, late)}
     return max(unusual, key=unusual.__getitem__)
 

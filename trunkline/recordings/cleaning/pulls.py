@@ -166,7 +166,8 @@ def _exchanged(raw: RawTrial, commanded: np.ndarray) -> list[str]:
     problem = f"commands are noisier, by {1e3 * noise[0]:.2g} mm, than what is measured, by {1e3 * noise[1]:.2g} mm"
     if lag < -EARLY:
         problem = f"what is measured comes {-1e3 * lag:.0f} ms before its command"
-    return [f"topics: {problem}: are `commands` and `tendon_positions` exchanged in session.yaml?"]
+    causes = "are `commands` and `tendon_positions` exchanged in session.yaml, or dated by clocks that differ?"
+    return [f"topics: {problem}: {causes}"]
 
 
 def _commanded(raw: RawTrial) -> np.ndarray:
