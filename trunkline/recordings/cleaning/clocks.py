@@ -53,7 +53,8 @@ def _clocks(poses: PoseStream) -> dict[str, np.ndarray]:
     stamps, logged = (1e-9 * (some - some[0]) for some in (poses.stamps, poses.log_times))
     if poses.frames is not None and np.ptp(poses.frames) and np.ptp(stamps):
         counted = (poses.frames - poses.frames[0]).astype(float)
-        clocks["frame"] = counted * np.median(np.diff(stamps)) / max(np.median(np.diff(counted)), 1.0)
+        interval = np.median(np.diff(stamps)) or np.ptp(stamps) / len(stamps)  # a coarse clock stands still mostly
+        clocks["frame"] = counted * interval / max(np.median(np.diff(counted)), 1.0)
     if poses.stamps.any() and np.ptp(stamps):
         clocks["stamp"] = stamps
     if np.ptp(logged):

@@ -89,7 +89,7 @@ def _require_fine(poses: PoseStream, where: str) -> None:
     shared = (np.diff(poses.stamps[order]) == 0) & fresh.any(axis=(1, 2))
     if np.mean(shared) > COARSE:
         problem = f"found {len(np.unique(poses.stamps))} different stamps of {len(order)} different poses"
-        raise InputError(f"{where}: {problem}, expected one for each: `clock: log` or `frame` in session.yaml for such logs")
+        raise InputError(f"{where}: {problem}, expected one for each: `clock: log` or `frame` does without stamps")
 
 
 def _evened(stamps: np.ndarray, rows: np.ndarray, poses: PoseStream, clock: str, findings: Findings) -> np.ndarray:

@@ -58,7 +58,7 @@ class PoseSamples(NamedTuple):
 
 
 def _evened(clock: np.ndarray, body: np.ndarray) -> np.ndarray | None:
-    """Times (M,) ns of the samples of bodies (M,), each body's without what it came late; None where one cannot tell."""
+    """Times (M,) ns of the samples of bodies (M,), without what each came late; None where a body's cannot tell."""
     even = clock.copy()
     for which in np.unique(body):
         rows = np.flatnonzero(body == which)
