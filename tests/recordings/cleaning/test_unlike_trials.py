@@ -7,13 +7,18 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.recordings.cleaning.test_described_arm import ARM, FREE, checked, quiet
-from tests.recordings.cleaning.test_loading import edit_session, one_trial, taken
+from tests.recordings.cleaning.test_loading import PER_FRAME, edit_session, one_trial, taken
 from tests.recordings.cleaning.test_motors import curl
 from tests.recordings.logs.test_other_loggers import rewritten
+from tests.support.folders import ROOT
 from tests.support.sessions import motion_truth, record
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz
 from trunkline.recordings.logs.samples import PoseSamples
+from trunkline.recordings.preparation.survey import describe, survey
+from trunkline.recordings.session.session import read_session
+from trunkline.recordings.session.source import open_log
+from trunkline.tools.monitor.loading import load_logs
 
 TURN = Rotation.from_euler("x", 90, degrees=True)
 
@@ -158,3 +163,39 @@ def test_bodies_that_each_arrive_late_by_themselves_make_whole_frames():
     frame, first = samples.frames(body)
     assert len(first) <= frames * 1.02
     assert np.mean(np.bincount(frame) == bodies) > 0.95
+
+
+def test_poses_published_again_with_the_other_sign_of_quaternions_count_once(tmp_path):
+    def again(m):
+        twice = {key: np.repeat(getattr(m, key), 2, axis=0) for key in PER_FRAME}
+        twice["quaternions"][::2] *= -1
+        later = np.tile([0, 4_166_666], len(m.stamps))
+        return replace(m, **twice | {key: twice[key] + later for key in ("stamps", "logged")})
+
+    right, _ = one_trial(tmp_path, lambda m: None)
+    one_trial(tmp_path, again)
+    edit_session(tmp_path, "clock: frame", "clock: stamp")
+    ((raw, _),) = taken(tmp_path)
+    assert len(raw.time) == len(right.time)
+
+
+def test_monitored_logs_are_compared_with_the_arm(tmp_path):
+    record(tmp_path, FREE, replace(quiet(), up=(0.0, 0.0, 1.0)))
+    files = {f"{truth.name}.mcap" for truth in FREE}
+    assert load_logs(tmp_path, files, ROOT, ARM).refused == {}
+    longer = {name: 3 * place for name, place in ARM.items()}
+    with pytest.raises(InputError, match=r"unit: bodies are 0.333 times as far apart as on the arm"):
+        load_logs(tmp_path, files, ROOT, longer)
+
+
+def test_inspect_counts_missing_frames_by_their_numbers_alone(tmp_path):
+    def late(m):
+        delays = np.random.default_rng(0).exponential(3e6, len(m.stamps)).astype(np.int64)
+        m.stamps[:] = np.maximum.accumulate(m.stamps + delays)
+        keep = np.arange(len(m.stamps)) % 50 != 49
+        return replace(m, **{key: getattr(m, key)[keep] for key in PER_FRAME})
+
+    one_trial(tmp_path, late)
+    (log,) = tmp_path.glob("*.mcap")
+    lost = int(np.sum(np.diff(open_log(log, read_session(tmp_path)).poses.frames) - 1))
+    assert any(f"; {lost} frames missing in between;" in line for line in describe(survey(log)))
