@@ -76,4 +76,5 @@ def _out_of_reach(positions: np.ndarray, distances: np.ndarray | None) -> np.nda
     middle = np.full(positions.shape[1:], np.nan)
     visible = np.isfinite(positions[..., 0]).any(axis=0)
     middle[visible] = np.nanmedian(positions[:, visible], axis=0)
-    return np.linalg.norm(positions - middle, axis=2) > REACH * np.nanmax(distances)
+    away = np.linalg.norm(positions - middle, axis=2)
+    return np.isfinite(away) & (away > REACH * np.nanmax(distances))
