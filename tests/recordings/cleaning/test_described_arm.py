@@ -116,7 +116,7 @@ def test_a_base_of_other_axes_is_refused(tmp_path):
         return replace(truth, base_quaternion=turn.as_quat(scalar_first=True))
 
     record(tmp_path, [other(truth) for truth in FREE], quiet())
-    with pytest.raises(InputError, match=r"'base': in its axes the arm leaves it .*: are its axes not the arm's"):
+    with pytest.raises(InputError, match=r"'base': in its axes the arm leaves it .*are its axes not the arm's"):
         checked(tmp_path)
 
 

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from itertools import permutations, product
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from trunkline.frames import rotation_from_wxyz
 from trunkline.recordings.cleaning.usual_distances import usual_distances
@@ -17,7 +18,11 @@ from trunkline.recordings.trials.raw_trial import RawTrial
 SAMPLE = 30  # frames of a trial
 WANDERS = 0.2  # share of the way to a neighbour, by which it has to wander before anything is said
 STEADIER = 0.4  # of that, which is left where the true convention is taken
+DISPLACED = 0.08  # of the arm's length, by which a body next to the base may be off where its attitude has it
 TWIST = np.radians(45)  # of the base about the arm between trials, more than arms twist
+
+AS_GOOD = 1.5  # times the least that a convention leaves, within which another is not excluded
+MOST = 3  # conventions that are named
 
 CONVENTIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "inverted": lambda q: q * [1, -1, -1, -1],
@@ -35,18 +40,15 @@ def contradictions(raw_trials: list[RawTrial]) -> list[str]:
     if wanders <= WANDERS:
         return []
     problem = f"a body's way to its neighbour wanders by {100 * wanders:.0f} % of its length in the body's own axes"
-    best, remedy = wanders, ""
+    left = {f"having quaternions {name}": _wandering(turned(turns), ways) for name, turned in CONVENTIONS.items()}
     for axes, signs in product(permutations(range(3)), product((1, -1), repeat=3)):
-        left = _wandering(turns, ways[..., axes] * signs)
-        if left < 0.99 * best:
-            best, remedy = left, f"turning positions {_axes(axes, signs)}"
-    for name, convention in CONVENTIONS.items():
-        if (left := _wandering(convention(turns), ways)) < 0.99 * best:
-            best, remedy = left, f"having quaternions {name}"
+        left[f"turning positions {_axes(axes, signs)}"] = _wandering(turns, ways[..., axes] * signs)
+    best = min(left.values())
     if best > STEADIER * wanders:
         return []
-    fixed = f"{remedy} leaves {100 * best:.0f} %"
-    return [f"attitudes: {problem}; {fixed}: expected positions and attitudes in one frame, right-handed"]
+    remedies = [remedy for remedy, some in left.items() if some <= AS_GOOD * best]
+    fixed = f"; {' or '.join(remedies)} leaves {100 * best:.0f} %" if len(remedies) <= MOST else ""
+    return [f"attitudes: {problem}{fixed}: expected positions and attitudes in one frame, right-handed"]
 
 
 def turned_bases(raw_trials: list[RawTrial], base: str) -> list[list[str]]:
@@ -69,6 +71,33 @@ def turned_bases(raw_trials: list[RawTrial], base: str) -> list[list[str]]:
         angle = np.degrees(np.median(np.abs(twists[:, place][:, agreeing]))) if len(agreeing) else np.nan
         problem = f"{base!r} is turned about the arm by {angle:.0f}° against the session's other trials"
         faults[numbers[int(place)]] = [f"base: {problem}, expected one choice of its axes in a session"]
+    return faults
+
+
+def displaced_bases(raw_trials: list[RawTrial], base: str) -> list[list[str]]:
+    """For each trial that the body next to its base is at another place in the base's axes than in most of the session,
+    in a sentence: more than its turn against the base explains, as of one half of it on the way."""
+    faults: list[list[str]] = [[] for _ in raw_trials]
+    numbers = [number for number, raw in enumerate(raw_trials) if raw.quaternions is not None]
+    if len(numbers) < 3:
+        return faults
+    usual = usual_distances([np.insert(raw.positions, 0, raw.base_positions, axis=1) for raw in raw_trials])
+    near, length = int(np.nanargmin(usual[0, 1:])), float(np.nanmax(usual))
+    places = np.array([_mean_place(raw_trials[number], near) for number in numbers])
+    turns = np.array([_mean_turn(raw_trials[number], near) for number in numbers])
+    good = np.isfinite(places).all(axis=1) & np.isfinite(turns).all(axis=1)
+    numbers, places, rotations = np.array(numbers)[good], places[good], rotation_from_wxyz(turns[good])
+    off = np.zeros((len(numbers), len(numbers)))
+    for place, rotation in enumerate(rotations):
+        halves = Rotation.from_rotvec((rotation * rotations.inv()).as_rotvec() / 2)
+        off[place] = np.linalg.norm(halves.apply(places) - places[place], axis=1)
+    for place in np.flatnonzero(np.mean(off > DISPLACED * length, axis=1) > 0.5):
+        name, far = raw_trials[0].markers[near], 1e3 * float(np.median(off[place]))
+        problem = f"in the axes of {base!r}, {name!r} is {far:.0f} mm from where most trials have it"
+        faults[int(numbers[place])] = [
+            f"base: {problem}, for its attitude: expected one choice of the base's axes and place in a session, and "
+            "positions and attitudes in one frame"
+        ]
     return faults
 
 
@@ -115,6 +144,15 @@ def _mean_turn(raw: RawTrial, body: int) -> np.ndarray:
         return np.full(4, np.nan)
     base, turn = (rotation_from_wxyz(q[visible]) for q in (raw.base_quaternions, raw.quaternions[:, body]))
     return (base.inv() * turn).mean().as_quat(scalar_first=True)
+
+
+def _mean_place(raw: RawTrial, body: int) -> np.ndarray:
+    """Median place (3,) m of a body in the base's axes over a trial; NaN where both are never seen."""
+    visible = np.isfinite(raw.base_quaternions).all(axis=1) & np.isfinite(raw.positions[:, body]).all(axis=1)
+    if not visible.any():
+        return np.full(3, np.nan)
+    away = raw.positions[visible, body] - raw.base_positions[visible]
+    return np.median(rotation_from_wxyz(raw.base_quaternions[visible]).inv().apply(away), axis=0)
 
 
 def _twists(turns: np.ndarray, reference: np.ndarray) -> np.ndarray:

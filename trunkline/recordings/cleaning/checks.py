@@ -37,6 +37,7 @@ class Findings:
     where: the file and the trial, for messages.
     frames: stamps over frame numbers. logged: stamps over log times in s.
     by_log_times, by_motion: the offset of the motors' clock. log: that the trial is from, without its messages.
+    frame_names: of the frames that its poses are in, as messages name them.
     """
 
     repairs: list[str] = field(default_factory=list)
@@ -48,6 +49,7 @@ class Findings:
     by_log_times: LoggedOffset | None = None
     by_motion: OffsetFit | None = None
     log: Log | None = None
+    frame_names: tuple[str, ...] = ()
 
     def dropped(self, bad: np.ndarray, what: str, names: list[str]) -> None:
         """Note the samples `bad` (T, B) of the bodies `names` as dropped, if there are any."""

@@ -53,7 +53,8 @@ def _clocks(poses: PoseStream) -> dict[str, np.ndarray]:
     stamps, logged = (1e-9 * (some - some[0]) for some in (poses.stamps, poses.log_times))
     if poses.frames is not None and np.ptp(poses.frames) and np.ptp(stamps):
         counted = (poses.frames - poses.frames[0]).astype(float)
-        clocks["frame"] = counted * np.median(np.diff(stamps)) / max(np.median(np.diff(counted)), 1.0)
+        interval = np.median(np.diff(stamps)) or np.ptp(stamps) / len(stamps)  # a coarse clock stands still mostly
+        clocks["frame"] = counted * interval / max(np.median(np.diff(counted)), 1.0)
     if poses.stamps.any() and np.ptp(stamps):
         clocks["stamp"] = stamps
     if np.ptp(logged):
@@ -67,7 +68,7 @@ def _at_fault(clocks: dict[str, np.ndarray], early: str, late: str, at: int) -> 
     if third is None:
         unusual = {name: _unusual(clocks[name], at) for name in (early, late)}
     else:
-        interval = float(np.median(np.diff(clocks[third])))
+        interval = float(np.ptp(clocks[third])) / (len(clocks[third]) - 1)
         unusual = {name: abs(size_at(relative(clocks[name], clocks[third]), at, interval)) for name in (early, late)}
     return max(unusual, key=unusual.__getitem__)
 

@@ -16,6 +16,7 @@ from trunkline.recordings.trials.raw_trial import RawTrial
 FITS = 1.5  # ratio of distances to the described ones, or its inverse, by which another unit is taken
 WRONG = 2.0  # from which on the declared unit, or the description, is wrong; inches over centimetres are 2.54
 LONE = 2.5  # the inverse of both, of one body alone: it comes as near to the base as the arm bends
+LONGER, SHORTER = 1.04, 0.85  # ratios from which on it is said; an arm that bends is a little shorter, never longer
 OFF = 0.3  # share of the arm's length by which a body may be from where its neighbours would have it
 SIDE = np.radians(60)  # between the described arm and what is measured, next to the base, in every trial
 
@@ -74,6 +75,17 @@ def against_arm(raw_trials: list[RawTrial], arm: Places, base: str | None, unit:
     return faults or _base_axes(raw_trials, arm, base, length)
 
 
+def doubtful_size(raw_trials: list[RawTrial], arm: Places) -> str:
+    """That the session's bodies are not as far apart as on the described arm, though no unit is wrong; else empty."""
+    usual = usual_distances([np.insert(raw.positions, 0, raw.base_positions, axis=1) for raw in raw_trials])
+    markers = raw_trials[0].markers
+    ratio = size_ratio(usual, markers, arm)
+    if np.isnan(ratio) or len(markers) == 1 or SHORTER <= ratio <= LONGER:
+        return ""
+    causes = "are the cameras' calibration, the markers' places on bodies and the described lengths right?"
+    return f"unit: bodies are {ratio:.3g} times as far apart as on the arm under build_mjcf: {causes}"
+
+
 def _neighbours(markers: Sequence[str], arm: Places) -> list[tuple[int, int, float]]:
     """(body, next body, m between them on the described arm), the base being 0, along the arm; none of one unknown."""
     if not markers or not set(markers) <= arm.keys():
@@ -103,6 +115,4 @@ def _base_axes(raw_trials: list[RawTrial], arm: Places, base: str | None, length
     problem = f"in its axes the arm leaves it towards {markers[near]!r} at {where}, at {expected} as described"
     if base is None:
         return [f"base: {problem}: are `base` and `frame.up` in session.yaml right?"]
-    opposite = np.arccos(-np.cos(angles.min())) < SIDE
-    handed = "is the frame left-handed, or are" if opposite else "are"
-    return [f"base: {base!r}: {problem}: {handed} its axes not the arm's (z back along it)?"]
+    return [f"base: {base!r}: {problem}: is the frame left-handed, or are its axes not the arm's (z back along it)?"]

@@ -7,6 +7,8 @@ from trunkline.recordings.cleaning.reference import FARTHEST, Reference
 from trunkline.recordings.logs.pose_stream import PoseStream
 from trunkline.recordings.logs.transforms import is_rotation
 
+REACH = 2.0  # times the arm's length, by which no body goes away from where it usually is
+
 
 def valid_samples(
     poses: PoseStream,
@@ -31,7 +33,13 @@ def valid_samples(
     findings.dropped(far, f"with a position beyond {FARTHEST:g} m", names)
     findings.dropped(nowhere, "exactly at the origin, where a driver puts what it does not see,", names)
     positions[far | nowhere] = np.nan
-    present &= ~(far | nowhere)
+    twice = _coinciding(positions, reference.base is not None)
+    findings.dropped(twice, "exactly at the place of another body, as of one that is not seen,", names)
+    positions[twice] = np.nan
+    away = _out_of_reach(positions, reference.distances)
+    findings.dropped(away, "farther away than the arm reaches, as of a body that is not seen,", names)
+    positions[away] = np.nan
+    present &= ~(far | nowhere | twice | away)
     good = np.isfinite(positions).all(axis=-1)
     quaternions = None
     if poses.quaternions is not None:
@@ -46,3 +54,27 @@ def valid_samples(
     findings.dropped(bad, "with a position that is not finite", names)
     positions[~good] = np.nan
     return positions, quaternions
+
+
+def _coinciding(positions: np.ndarray, marked_base: bool) -> np.ndarray:
+    """Which samples (T, B) of (T, B, 3) m are at the place of another body to the last bit, but for the base's, and for
+    bodies that mostly are."""
+    twice = np.zeros(positions.shape[:2], bool)
+    for body in range(1 if marked_base else 0, positions.shape[1]):
+        others = np.delete(positions, body, axis=1)
+        twice[:, body] = (others == positions[:, [body]]).all(axis=2).any(axis=1)
+    return twice & (twice.mean(axis=0) < 0.5)
+
+
+def _out_of_reach(positions: np.ndarray, distances: np.ndarray | None) -> np.ndarray:
+    """Which samples (T, B) of (T, B, 3) m are farther from where a body usually is than any shape of the arm brings it.
+
+    Args: distances: usual ones between bodies, m, None where they are unknown. Shape (1 + S, 1 + S).
+    """
+    if distances is None:
+        return np.zeros(positions.shape[:2], bool)
+    middle = np.full(positions.shape[1:], np.nan)
+    visible = np.isfinite(positions[..., 0]).any(axis=0)
+    middle[visible] = np.nanmedian(positions[:, visible], axis=0)
+    away = np.linalg.norm(positions - middle, axis=2)
+    return np.isfinite(away) & (away > REACH * np.nanmax(distances))

@@ -44,7 +44,7 @@ def load_raw_trials(
             if isinstance(source, InputError):
                 raise source
             record.where = f"{source.log.path}: trial {trial.name}"
-            record.log = source.log
+            record.log, record.frame_names = source.log, source.frames
             record.repairs += [f"log: {damage}" for damage in source.log.damage]
             read.append((source, read_stretch(source, trial, session, limits, record)))
         except InputError as error:

@@ -12,6 +12,7 @@ from trunkline.recordings.logs.messages import JOINTS
 from trunkline.recordings.session.session import MotorEntry, Session
 from trunkline.recordings.session.source import LogSource
 from trunkline.recordings.signals.held import OFTEN, to_and_fro, with_corners
+from trunkline.recordings.signals.steps import find_step
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_held
 
 Series = tuple[np.ndarray, np.ndarray]  # times (T,) s and numbers (T, K)
@@ -59,19 +60,21 @@ def read_motors(
         columns = _columns(stream, mapped, tendons, f"{where}: {role} topic")
         findings.repairs += stream.notes
         stamps = dated(stream, recorder, stretch)
-        if recorder and session.clock != "log":
+        if not recorder:
+            _check_step(stream, role, findings)
+        elif session.clock != "log":
             findings.repairs.append(f"{role} messages dated by the recorder's clock, as not all have stamps")
         rows = in_order(stamps, limits.disorder, f"{where}: {role} topic", findings, at_once=True)
         series = _together((stamps[rows] - stretch.epoch) * 1e-9, stream, rows, columns, role, findings)
         earlier = HISTORY if role == "command" and is_held(experiment) else 0.0
         begin, end = -limits.clock_offset - earlier, stretch.time[-1] + limits.clock_offset
-        whole = [_near(_finite(some, role, findings), begin, end, role == "command") for some in series]
+        whole = [_near(some, begin, end, role == "command") for some in series]
         if role == "command":
             scales = np.ones(len(columns)) if coupling is None else np.abs(coupling).max(axis=0)
             scales = [scales] if len(series) == 1 else scales[:, None]
             if EXPERIMENTS[experiment].needs_motors:
                 for (seconds, numbers), scale in zip(whole, scales, strict=True):
-                    _one_publisher(seconds, numbers * scale, f"{where}: {stream.topic}")
+                    _one_publisher(seconds, numbers * scale, f"{where}: {stream.topic}", findings)
                 last = max((some[0][-1] for some in whole if len(some[0])), default=0.0)
                 if is_held(experiment) and last < -NO_WORD:
                     findings.repairs.append(f"commands end {-last:.1f} s before the poses: the last holds")
@@ -126,6 +129,8 @@ def check_motors(
     both = "and" if any(within) else "or"
     expected = f"expected commands {both} tendon positions within {limits.clock_offset:g} s of the poses"
     topics = f" among: {', '.join(source.joint_topics) or 'none'} ({kind})" if not any(streams) else ""
+    if lost and not recorder and all(_logged_within(stream, stretch, limits.clock_offset) for stream in lost):
+        expected += ", as they are by log times: `clock: log` in session.yaml dates both by these"
     raise InputError(f"{where}: found {' and '.join(streams_found)}{topics}, {expected}")
 
 
@@ -138,13 +143,6 @@ def by_recorder(source: LogSource, session: Session) -> bool:
 def dated(stream: JointStream, recorder: bool, stretch: Stretch) -> np.ndarray:
     """When each message was sent, ns: by its header, or by the recorder, moved to the clock of the poses."""
     return stream.log_times + (stretch.epoch - stretch.logged) if recorder else stream.stamps
-
-
-def _finite(series: Series, role: str, findings: Findings) -> Series:
-    finite = np.isfinite(series[1]).all(axis=1)
-    if not finite.all():
-        findings.repairs.append(f"{int(np.sum(~finite))} {role} messages that are not finite dropped")
-    return series[0][finite], series[1][finite]
 
 
 def _near(series: Series, begin: float, end: float, holds: bool) -> Series:
@@ -225,17 +223,31 @@ def _unwrapped(
     return counts
 
 
-def _one_publisher(seconds: np.ndarray, pulls: np.ndarray, where: str) -> None:
-    """Refuse commands (T, K) m at times (T,) s of two publishers, which no motor could follow."""
+def _check_step(stream: JointStream, role: str, findings: Findings) -> None:
+    """Warn where the clock of a stream's messages jumps against the recorder's."""
+    stamps, logged = (1e-9 * (some - some[0]) for some in (stream.stamps, stream.log_times))
+    step = find_step(logged, stamps) if np.ptp(logged) and np.ptp(stamps) else None
+    if step is not None:
+        place = f"at message {step.at}, after {stamps[step.at - 1]:.2f} s, against log times"
+        remedy = "expected a clock that runs evenly, such as `clock: log` in session.yaml"
+        findings.warnings.append(f"{role} stamps jump by {-step.size:+.3f} s {place}: {remedy}")
+
+
+def _one_publisher(seconds: np.ndarray, pulls: np.ndarray, where: str, findings: Findings) -> None:
+    """Refuse commands (T, K) m at times (T,) s of two publishers, which no motor could follow; warn of a few jumps."""
     places = to_and_fro(seconds, pulls)
-    if len(places) < OFTEN:
+    if not places:
         return
     begin = seconds[places[0][0] + 1]
     far = 1e3 * max(size for *_, size in places)
-    raise InputError(
-        f"{where}: commands jump to and fro {len(places)} times, by up to {far:.3g} mm, first at {begin:.2f} s, and "
+    times = "once" if len(places) == 1 else f"{len(places)} times"
+    problem = (
+        f"commands jump to and fro {times}, by up to {far:.3g} mm, first at {begin:.2f} s, and "
         "are back with the next message or two: do two publishers write to the topic? expected one"
     )
+    if len(places) >= OFTEN:
+        raise InputError(f"{where}: {problem}")
+    findings.warnings.append(problem)
 
 
 def _columns(stream: JointStream, mapped: dict[str, str] | None, tendons: tuple[str, ...], where: str) -> list[int]:
@@ -252,6 +264,12 @@ def _columns(stream: JointStream, mapped: dict[str, str] | None, tendons: tuple[
             raise InputError(f"{where}: found {', '.join(names)}, expected {logged!r} as in session.yaml")
         columns.append(names.index(logged if logged in names else tendon))
     return columns
+
+
+def _logged_within(stream: JointStream, stretch: Stretch, limit: float) -> bool:
+    """Whether the recorder had messages of the stream within `limit` s of the stretch."""
+    seconds = 1e-9 * (stream.log_times - stretch.logged)
+    return bool(np.any((seconds > -limit) & (seconds < stretch.time[-1] + limit)))
 
 
 def _distance(stream: JointStream, recorder: bool, stretch: Stretch) -> str:

@@ -12,6 +12,7 @@ FITS = 1.25  # factor within which a pull is as its level says, whatever is let 
 LATEST = 0.3  # s, of a lag that is looked for
 EARLY = 0.01  # s by which what is measured may come before its command
 NOISIER = 5.0  # times the measurements' noise, that no command has
+LATE = 0.25  # s by which commands may begin after the poses
 HELD = MIN_TRAVEL  # m, to either side, by which a tendon that is held may be wound
 
 
@@ -87,6 +88,17 @@ def _pulled(raw: RawTrial, static: bool, idle: float, zeros: dict[str, float]) -
         if usual[most] > idle:
             return [f"experiment: {key}: {raw.tendons[most]!r} is drawn in by {1e3 * usual[most]:.4g} mm, {expected}"]
     return []
+
+
+def late_commands(raw: RawTrial) -> list[str]:
+    """That the commands of an arm in motion begin after its poses, by the motors' clock as it is set; else none."""
+    if EXPERIMENTS[raw.experiment].static or not EXPERIMENTS[raw.experiment].needs_motors or len(raw.command_time) < 2:
+        return []
+    begin = float(raw.command_time[0]) + raw.clock_offset
+    if begin <= LATE:
+        return []
+    problem = f"the first comes {begin:.2f} s after the first pose, and no log tells what was sent before"
+    return [f"commands: {problem}: expected one from before the motion, or a `window` from then on"]
 
 
 def _fixed_commands(raw: RawTrial) -> list[str]:
@@ -166,7 +178,8 @@ def _exchanged(raw: RawTrial, commanded: np.ndarray) -> list[str]:
     problem = f"commands are noisier, by {1e3 * noise[0]:.2g} mm, than what is measured, by {1e3 * noise[1]:.2g} mm"
     if lag < -EARLY:
         problem = f"what is measured comes {-1e3 * lag:.0f} ms before its command"
-    return [f"topics: {problem}: are `commands` and `tendon_positions` exchanged in session.yaml?"]
+    causes = "are `commands` and `tendon_positions` exchanged in session.yaml, or dated by clocks that differ?"
+    return [f"topics: {problem}: {causes}"]
 
 
 def _commanded(raw: RawTrial) -> np.ndarray:

@@ -5,6 +5,7 @@ check compares a trial with that, with the session's other trials, or with what 
 """
 
 import re
+from collections import Counter
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Literal
@@ -13,9 +14,9 @@ import numpy as np
 from pydantic import Field
 
 from trunkline.frames import rotation_from_wxyz
-from trunkline.recordings.cleaning.attitudes import contradictions, turned_bases
+from trunkline.recordings.cleaning.attitudes import contradictions, displaced_bases, turned_bases
 from trunkline.recordings.cleaning.checks import Findings, deciding
-from trunkline.recordings.cleaning.described_arm import Places, against_arm
+from trunkline.recordings.cleaning.described_arm import Places, against_arm, doubtful_size
 from trunkline.recordings.cleaning.pulls import check_pulls, encoder_zeros
 from trunkline.recordings.cleaning.usual_distances import usual_distances
 from trunkline.recordings.signals.smoothing import fill_gaps
@@ -73,12 +74,32 @@ def check_sanity(
         record.faults += _misplaced(raw, usual, names, settings.distance * length)
         record.faults += _motion(raw, length, settings.still)
         record.faults += check_pulls(raw, length, idle, settings.pull, zeros)
+    for record, sentences in zip(findings, _other_frames(findings), strict=True):
+        record.faults += sentences
     if base is not None:
-        for record, turned in zip(findings, turned_bases(raw_trials, base), strict=True):
-            record.faults += turned
+        for check in (turned_bases, displaced_bases):
+            for record, sentences in zip(findings, check(raw_trials, base), strict=True):
+                record.faults += sentences
     faults = contradictions(chosen) or ([] if arm is None else against_arm(chosen, arm, base, unit))
+    if arm is not None and (doubtful := doubtful_size(chosen, arm)):
+        for record in findings:
+            record.warnings.append(doubtful)
     faults += _order(raw_trials[0].markers, usual) + _loose(chosen, usual, settings, length)
     return faults if base is None else faults + _base_at_rest(chosen, base)
+
+
+def _other_frames(findings: list[Findings]) -> list[list[str]]:
+    """For each trial that its poses are in another frame than most of the session's, by its messages, in a sentence."""
+    counts = Counter(record.frame_names for record in findings if record.frame_names)
+    if len(counts) < 2:
+        return [[] for _ in findings]
+    usual = counts.most_common(1)[0][0]
+    expected = f"expected {', '.join(map(repr, usual))} as in most trials: a session for each, with its own `frame.up`"
+    return [
+        [f"header.frame_id: found poses in the frame {', '.join(map(repr, record.frame_names))}, {expected}"]
+        if record.frame_names and record.frame_names != usual else []
+        for record in findings
+    ]  # fmt: skip
 
 
 def _bodies(raw: RawTrial) -> np.ndarray:

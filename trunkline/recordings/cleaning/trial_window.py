@@ -16,6 +16,7 @@ from trunkline.recordings.signals.clock import FrameFit, fit_frames
 from trunkline.recordings.signals.even_times import even_times, is_uneven
 from trunkline.recordings.trials.experiments import is_stepwise
 
+COARSE = 0.1  # share of frames that have the stamp of another pose, from which on stamps do not tell when poses were
 WHOLE = 0.9  # share of bodies that are in a frame, below which frames are of different bodies, at times of their own
 
 
@@ -55,6 +56,8 @@ def read_stretch(
     stamps, findings.frames = _stamps(poses, session.clock, where, source.pose_topic)
     at_once = session.clock == "log"  # a recorder that stalled may log several in one instant
     rows = in_order(stamps, limits.disorder, f"{where}: {source.pose_topic}", findings, at_once)
+    if session.clock == "stamp":
+        _require_fine(poses, f"{where}: {source.pose_topic}")
     check_clocks(poses, session.clock, limits, f"{where}: {source.pose_topic}", findings)
     if not is_stepwise(trial.experiment):
         stamps = _evened(stamps, rows, poses, session.clock, findings)
@@ -71,8 +74,22 @@ def read_stretch(
     if time[-1] < limits.duration:
         lost = f" (damaged: {'; '.join(source.log.damage)})" if source.log.damage else ""
         expected = f"expected at least {limits.duration:g} s"
+        passed = 1e-9 * float(np.ptp(poses.log_times))
+        if session.clock != "log" and trial.window is None and passed >= limits.duration:
+            expected += f": {passed:.2f} s pass by log times: are stamps in another unit? `clock: log` does without"
         raise InputError(f"{where}: found {time[-1]:.2f} s of poses in {len(time)} frames{lost}, {expected}")
     return Stretch(rows, time, epoch, int(poses.log_times[rows[0]]))
+
+
+def _require_fine(poses: PoseStream, where: str) -> None:
+    """Refuse stamps that several poses share, as those of a clock that ticks too seldom."""
+    order = np.argsort(poses.stamps, kind="stable")
+    positions = poses.positions[order]
+    fresh = (positions[1:] != positions[:-1]) & np.isfinite(positions[1:]) & np.isfinite(positions[:-1])
+    shared = (np.diff(poses.stamps[order]) == 0) & fresh.any(axis=(1, 2))
+    if np.mean(shared) > COARSE:
+        problem = f"found {len(np.unique(poses.stamps))} different stamps of {len(order)} different poses"
+        raise InputError(f"{where}: {problem}, expected one for each: `clock: log` or `frame` does without stamps")
 
 
 def _evened(stamps: np.ndarray, rows: np.ndarray, poses: PoseStream, clock: str, findings: Findings) -> np.ndarray:

@@ -15,7 +15,7 @@ from trunkline.recordings.logs.samples import union
 class JointStream:
     """T messages, K joints. stamps, log_times: (T,) ns. positions: (T, K) m, NaN where absent.
 
-    sent: (T, K), which of them a message holds. topic: for people to read, of several.
+    sent: (T, K), which of them a message holds, as a finite number. topic: for people to read, of several.
     timed: whether the messages have stamps; without, stamps are the log times. unnamed, notes: as for poses.
     """
 
@@ -66,13 +66,16 @@ def joint_stream(topic: Topic, name: str | None = None) -> JointStream:
     names = union([(rows, names) for rows, names, *_ in batches])
     positions = np.full((len(topic.messages), len(names)), np.nan)
     sent = np.zeros(positions.shape, bool)
-    stamps, readable = topic.log_times.copy(), np.zeros(len(topic.messages), bool)
+    stamps, readable, lacking = topic.log_times.copy(), np.zeros(len(topic.messages), bool), 0
     for rows, some, values, time in batches:
         readable[rows] = True
         columns = np.ix_(rows, [names.index(name) for name in some])
-        positions[columns], sent[columns] = values, True
+        positions[columns], sent[columns] = values, np.isfinite(values)
+        lacking += int(np.sum(~np.isfinite(values).all(axis=1)))
         if timed:
             stamps[rows] = time
+    if lacking:
+        notes.append(f"{topic.name}: {lacking} messages hold numbers that are not finite: taken for motors not told")
     return JointStream(
         topic=topic.name,
         stamps=stamps[readable],

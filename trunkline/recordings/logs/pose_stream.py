@@ -254,7 +254,8 @@ def without_repeats(stream: PoseStream) -> PoseStream:
     order = np.argsort(stream.stamps if stream.stamps.any() else stream.log_times, kind="stable")
     values = stream.positions[order]
     if stream.quaternions is not None:
-        values = np.concatenate([values, stream.quaternions[order]], axis=2)
+        turns = stream.quaternions[order]
+        values = np.concatenate([values, np.where(turns[..., :1] < 0, -turns, turns)], axis=2)  # q and -q are one
     equal = values[:-1] == values[1:]
     alike = equal | (np.isnan(values[:-1]) & np.isnan(values[1:]))
     moving = ~alike.all(axis=(0, 2))  # a body that stands for a constant tells nothing

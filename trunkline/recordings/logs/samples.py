@@ -4,6 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from trunkline.recordings.signals.even_times import even_times, is_uneven
+
+WHOLE = 0.9  # share of bodies that are in a frame, below which they may not have been put together rightly
 FRAMES_OPEN = 16  # frames back to which a body's late sample may still belong
 
 
@@ -44,24 +47,47 @@ class PoseSamples(NamedTuple):
     def frames(self, body: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Each sample's frame (M,), and the index of each frame's first sample.
 
-        Samples of different bodies (M,) at most half a frame's interval apart belong together.
+        Samples of different bodies (M,) at most half a frame's interval apart belong together; where few do, as each
+        came late by itself, those at evened times.
         """
-        clock = self.clock
-        steps = np.concatenate([[0], *(np.diff(np.sort(clock[body == i])) for i in np.unique(body))])
-        steps = steps[steps > 0]
-        apart = 0.5 * float(np.median(steps)) if len(steps) else 0.0
-        frame, first, taken = np.empty(len(clock), int), [], []
-        for sample, (time, who) in enumerate(zip(clock.tolist(), body.tolist(), strict=True)):
-            for place in range(len(first) - 1, max(-1, len(first) - 1 - FRAMES_OPEN), -1):
-                if abs(time - clock[first[place]]) <= apart and who not in taken[place]:
-                    break
-            else:
-                place = len(first)
-                first.append(sample)
-                taken.append(set())
-            frame[sample] = place
-            taken[place].add(who)
-        return frame, np.array(first, int)
+        frames = _grouped(self.clock, body)
+        bodies = len(np.unique(body))
+        if len(body) < WHOLE * bodies * len(frames[1]) and (even := _evened(self.clock, body)) is not None:
+            frames = min(frames, _grouped(even, body), key=lambda grouped: len(grouped[1]))
+        return frames
+
+
+def _evened(clock: np.ndarray, body: np.ndarray) -> np.ndarray | None:
+    """Times (M,) ns of the samples of bodies (M,), without what each came late; None where a body's cannot tell."""
+    even = clock.copy()
+    for which in np.unique(body):
+        rows = np.flatnonzero(body == which)
+        rows = rows[np.argsort(clock[rows], kind="stable")]
+        time = 1e-9 * (clock[rows] - clock[rows[0]])
+        times = even_times(time, None) if is_uneven(time) else None
+        if times is None:
+            return None
+        even[rows] = clock[rows[0]] + np.round(1e9 * times.time).astype(np.int64)
+    return even
+
+
+def _grouped(clock: np.ndarray, body: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Each sample's frame (M,) by times (M,) ns and bodies (M,), and the index of each frame's first sample."""
+    steps = np.concatenate([[0], *(np.diff(np.sort(clock[body == i])) for i in np.unique(body))])
+    steps = steps[steps > 0]
+    apart = 0.5 * float(np.median(steps)) if len(steps) else 0.0
+    frame, first, taken = np.empty(len(clock), int), [], []
+    for sample, (time, who) in enumerate(zip(clock.tolist(), body.tolist(), strict=True)):
+        for place in range(len(first) - 1, max(-1, len(first) - 1 - FRAMES_OPEN), -1):
+            if abs(time - clock[first[place]]) <= apart and who not in taken[place]:
+                break
+        else:
+            place = len(first)
+            first.append(sample)
+            taken.append(set())
+        frame[sample] = place
+        taken[place].add(who)
+    return frame, np.array(first, int)
 
 
 def union(batches: list[tuple[np.ndarray, list[str]]]) -> tuple[str, ...]:

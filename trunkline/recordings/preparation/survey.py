@@ -20,8 +20,10 @@ from trunkline.recordings.session.source import (
     pose_topics,
     several_frames,
     static_topics,
+    topics_in_frames,
     without_unset,
 )
+from trunkline.recordings.signals.even_times import is_uneven
 
 LIVE = "/core/input"  # a topic of a live session alone
 OTHERS = re.compile(r"/headset/|/joint_states$|/joints/command$")  # of people and of the rigid robot
@@ -55,7 +57,7 @@ def survey(path: Path) -> LogSurvey:
         if result.pose_topics:
             result.poses = without_unset(pose_stream(result.pose_topics, statics=static_topics(result.log)))
             result.notes += result.poses.notes
-            if clash := several_frames(result.poses, result.pose_topics):
+            if clash := several_frames(topics_in_frames(result.poses, result.pose_topics)):
                 result.notes.append(f"poses: {clash}")
     except (InputError, ValueError) as error:
         result.notes.append(f"poses: {error}")
@@ -114,12 +116,18 @@ def _bodies(poses: PoseStream) -> list[str]:
     order = np.argsort(clock, kind="stable")
     time = (clock[order] - clock[order[0]]) * 1e-9
     interval = np.median(np.diff(time)) if len(time) > 1 else np.inf
-    missing = int(np.sum(np.maximum(np.round(np.diff(time) / interval) - 1, 0))) if interval > 0 else 0
+    steps = np.diff(time) / interval if interval > 0 else np.ones(0)
+    numbers = np.diff(poses.frames[order]) if poses.frames is not None else np.zeros(len(time) - 1)
+    if len(numbers) and np.all(numbers > 0):
+        steps = numbers / np.median(numbers)
+    missing = f"{int(np.sum(np.maximum(np.round(steps) - 1, 0)))} frames missing in between"
+    if is_uneven(time) and not np.all(numbers > 0):
+        missing = "they come at uneven times"
     oriented = "with" if poses.quaternions is not None else "without"
     numbers = "" if poses.frames is None else ", with frame numbers"
     lines = [
         f"  {len(time)} frames of {len(poses.names)} bodies, {oriented} orientations{numbers}; "
-        f"{missing} frames missing in between; {poses.undecodable} messages unreadable"
+        f"{missing}; {poses.undecodable} messages unreadable"
     ]
     width = max(map(len, poses.names), default=0)
     for index, name in enumerate(poses.names):

@@ -79,8 +79,9 @@ def pulled(survey: LogSurvey) -> bool:
     motors = survey.commands or survey.tendon_positions  # encoders may start anywhere
     if motors is None or not motors.positions.size:
         return False
-    drawn = survey.commands is not None and np.nan_to_num(motors.positions).max(initial=0.0) > MIN_TRAVEL
-    return bool(drawn or np.nanmax(np.ptp(motors.positions, axis=0)) > MIN_TRAVEL)
+    pulls = np.ma.masked_invalid(motors.positions)
+    drawn = survey.commands is not None and pulls.max() > MIN_TRAVEL
+    return bool(drawn or np.ptp(pulls, axis=0).max() > MIN_TRAVEL)
 
 
 def _shape(poses: PoseStream, base: str | None, ends: slice) -> AtRest | None:

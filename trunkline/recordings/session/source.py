@@ -27,7 +27,7 @@ COMMAND_WORDS, POSITION_WORDS = ("command", "cmd", "target"), ("state", "positio
 class LogSource:
     """One log, decoded. log: without its messages, which are decoded. pose_topic: for people to read.
 
-    joint_topics: all whose schema is in `JOINTS`.
+    joint_topics: all whose schema is in `JOINTS`. frames: that the poses are in, as messages name them.
     """
 
     log: Log
@@ -36,6 +36,7 @@ class LogSource:
     commands: JointStream | None
     tendon_positions: JointStream | None
     joint_topics: tuple[str, ...]
+    frames: tuple[str, ...]
 
 
 def open_log(path: Path, session: Session) -> LogSource:
@@ -68,7 +69,8 @@ def open_log(path: Path, session: Session) -> LogSource:
     if len(poses.parents) > 1 and session.frame.name is None:
         problem = f"found poses in the frames {', '.join(poses.parents)}, which nothing connects"
         raise InputError(f"{where}: {problem}, expected one, or its name in session.yaml: frame.name")
-    if clash := several_frames(poses, topics, session):
+    in_frame = topics_in_frames(poses, topics, session)
+    if clash := several_frames(in_frame):
         raise InputError(f"{path}: {clash}")
     declared = session.tendons or session.motors
     names = None if declared is None else {*declared, *(session.tendons or {}).values()}
@@ -83,11 +85,13 @@ def open_log(path: Path, session: Session) -> LogSource:
         commands, tendon_positions = (some and without_unset(some) for some in (commands, tendon_positions))
     joint_topics = tuple(name for name, t in log.topics.items() if short_name(t.schema) in JOINTS)
     log.topics = {}  # decoded: the raw messages can go
-    return LogSource(log, name, poses, commands, tendon_positions, joint_topics)
+    return LogSource(log, name, poses, commands, tendon_positions, joint_topics, (*in_frame, *poses.parents))
 
 
-def several_frames(poses: PoseStream, topics: dict[str | None, Topic], session: Session | None = None) -> str:
-    """That poses of the session, or any, are in several frames by their headers, with topics and frames; else empty.
+def topics_in_frames(
+    poses: PoseStream, topics: dict[str | None, Topic], session: Session | None = None
+) -> dict[str, list[str]]:
+    """The frames that poses of the session, or any, are in by their headers, each with its topics.
 
     A frame that is called as the topic's own body is none that it could be in: some drivers write that name.
     """
@@ -100,6 +104,11 @@ def several_frames(poses: PoseStream, topics: dict[str | None, Topic], session: 
             for frame in poses.header_frames.get(topic.name, ()):
                 if frame != body:
                     in_frame.setdefault(frame, []).append(topic.name)
+    return in_frame
+
+
+def several_frames(in_frame: dict[str, list[str]]) -> str:
+    """That topics are in several frames, where they are, with topics and frames; else empty."""
     if len(in_frame) < 2:
         return ""
     frames = ", ".join(f"{frame!r} ({', '.join(names)})" for frame, names in in_frame.items())

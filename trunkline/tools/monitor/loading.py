@@ -11,6 +11,7 @@ from omegaconf import OmegaConf
 
 from trunkline.errors import InputError
 from trunkline.pipeline.config import settings_of
+from trunkline.recordings.cleaning.described_arm import Places
 from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.cleaning.session_checks import check_session
 from trunkline.recordings.filtering.filter import filter_raw_trial
@@ -27,22 +28,23 @@ class LoadedTrials:
     refused: dict[str, str] = field(default_factory=dict)
 
 
-def load_logs(session: Path, files: set[str], root: Path) -> LoadedTrials:
+def load_logs(session: Path, files: set[str], root: Path, arm: Places | None = None) -> LoadedTrials:
     """The trials of those of a session's logs that are there; what a motors' clock or a vertical is, all of them say.
 
     Args:
         files: names of the logs. root: holds the params.yaml that says how to take logs in and to filter them.
+        arm: the described one, by which logs are checked; None where nobody describes it.
 
     Raises:
-        InputError: session.yaml has a mistake.
+        InputError: session.yaml has a mistake, or the logs cannot be of the arm.
     """
     with _so_far(session, files) as (folder, read):
         ingest, settings = settings_of("ingest", root), settings_of("filter", root)
-        taken = list(load_raw_trials(folder, read, ingest.limits))
+        taken = list(load_raw_trials(folder, read, ingest.limits, arm))
         unreadable = {trial.name: str(result) for trial, result, _ in taken if isinstance(result, InputError)}
         loaded = LoadedTrials(refused=unreadable)
         if len(loaded.refused) < len(taken):
-            gathered = check_session(taken, read, ingest.plausible, "leave_out", f"{session}")
+            gathered = check_session(taken, read, ingest.plausible, "leave_out", f"{session}", arm)
             loaded.refused |= gathered.refused
             for raw, findings in zip(gathered.raw_trials, gathered.findings, strict=True):
                 raw.repairs = len(findings.repairs)

@@ -120,7 +120,7 @@ class DriftMonitor:
         entries = {name_of(trial): str(trial["file"]) for trial in planned(session)}
         there = {file for file in entries.values() if (state := state_of(session / file)) is not None
                  and self.pending.ready(session / file, state)}  # fmt: skip
-        taken, scored, unusable = load_logs(session, there, self.settings), False, 0
+        taken, scored, unusable = load_logs(session, there, self.settings, marker_places(self.scorer.model)), False, 0
         for name, mark in new.items():
             row = {"session": session.name, "trial": name, "mark": mark, "log": digest(session / entries[name])}
             where = f"{session.name}/{name}"
