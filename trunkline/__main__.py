@@ -29,6 +29,8 @@ VERBS = {
     "suggest": Verb("trunkline.tools.design.__main__", "which experiments to record next"),
     "evaluate": Verb("trunkline.tools.evaluate.__main__", "how far a model is from a session, without a fit"),
     "report": Verb("trunkline.pipeline.report", "the certificate: one page on how far the twin can be trusted"),
+    "export": Verb("trunkline.tools.export.__main__", "a session beside its simulation, for Foxglove and Rerun"),
+    "promote": Verb("trunkline.tools.promote.__main__", "a new twin in an old one's place, where it replays both"),
     "monitor": Verb("trunkline.tools.monitor.__main__", "whether the arm has changed since it was identified"),
     "batch": Verb("trunkline.tools.batch.__main__", "the pipeline for several arms, and one table over all of them"),
     "randomize": Verb("trunkline.tools.randomize.__main__", "domain randomization from the identified parameters"),
