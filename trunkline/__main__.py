@@ -36,6 +36,7 @@ VERBS = {
     "randomize": Verb("trunkline.tools.randomize.__main__", "domain randomization from the identified parameters"),
     "live": Verb("trunkline.ar.session.__main__", "a session in a browser or a headset", "live,hybrid,teleop"),
     "export-dataset": Verb("trunkline.ar.dataset.__main__", "live sessions as a dataset for LeRobot", "live,teleop"),
+    "export-trials": Verb("trunkline.ar.dataset.trials", "any session's trials, likewise", "live,teleop"),
     "worker": Verb("trunkline.compute.worker", "a worker for a Dask scheduler", "cluster"),
 }  # in the order in which a lab comes to them
 RENAMED = {
