@@ -2,7 +2,8 @@
 
 SESSION is what `trunkline evaluate` takes, such as one that a twin was identified from. An episode is a trial: its
 state is where the markers are and what the motors measured, its environment gravity and the load at the tip, its
-action what was commanded. Trials of the split `test` are left out. `LeRobotDataset("any/name", root="FOLDER")` opens it.
+action what was commanded; a session that lacks one of the two has the other in its place. Trials of the split `test`
+are left out. `LeRobotDataset("any/name", root="FOLDER")` opens it.
 """
 
 import argparse
