@@ -41,8 +41,8 @@ class Recording:
     def add(self, track: Track) -> None:
         """The trial's line, its frames, and its metadata."""
         trial, errors, begin = track.trial, track.errors, self._stamp
-        place, tip = f"{trial.session}/{trial.name}".lstrip("/"), _mean(errors[:, self._tip])
-        self._write(TRIAL, line(begin, f"{place}: {trial.experiment}, {trial.split}, tip {tip:.1f} mm"))
+        tip = _mean(errors[:, self._tip])
+        self._write(TRIAL, line(begin, f"{trial.name}: {trial.experiment}, {trial.split}, tip {tip:.1f} mm"))
         every = max(1, round(1 / (FASTEST * np.diff(track.time).mean()))) if len(track.time) > 1 else 1
         for frame, time in enumerate(track.time):
             self._stamp = begin + round(1e9 * time)
@@ -52,7 +52,7 @@ class Recording:
                 self._shape(SIMULATED, tuple(self._arm.markers), track.bodies[frame])
         numbers = {"begin_ns": begin, "end_ns": self._stamp, "load_kg": trial.load, "error_mm": _mean(errors),
                    "tip_error_mm": tip} | dict(zip(GRAVITY, trial.gravity, strict=True))  # fmt: skip
-        words = {"trial": place, "experiment": trial.experiment, "split": trial.split}
+        words = {"trial": trial.name, "experiment": trial.experiment, "split": trial.split}
         self._writer.add_metadata("trial", words | {name: f"{value:.12g}" for name, value in numbers.items()})
         self._stamp += PAUSE
 
