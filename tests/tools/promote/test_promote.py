@@ -150,7 +150,7 @@ def test_where_the_exchange_itself_fails_the_old_twin_is_where_it_was(step, lab,
 def test_what_is_no_pair_of_twins_is_one_line_and_nothing_is_written(lab, capsys):
     os.symlink("stiff", "link")
     (lab / "arm.tgz").write_bytes(b"")
-    for arguments, found in (
+    for arguments, expected in (
         (["nowhere", "right"], "nowhere, right: found nothing and a folder"),
         (["link", "right"], "link, right: found a link"),
         (["stiff", "arm.tgz"], "stiff, arm.tgz: found a folder and .tgz"),
@@ -158,7 +158,7 @@ def test_what_is_no_pair_of_twins_is_one_line_and_nothing_is_written(lab, capsys
     ):
         assert main([*arguments, "of_right", "of_right"]) == 1
         (line,) = capsys.readouterr().err.splitlines()
-        assert found in line
+        assert expected in line
         assert "expected two folders of artifacts, or two .tgz" in line
     (lab / "stiff.promotion.json").write_text("{")
     assert main(["stiff", "right", "of_right", "of_right"]) == 1

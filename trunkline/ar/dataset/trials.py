@@ -35,9 +35,9 @@ def episode_of(trial: Trial, tendons: tuple[str, ...], fps: int) -> Episode:
         tendons: of all trials; those that this one does not command are slack. Without any there is no action.
     """
     still = is_static(trial.experiment)
-    own = np.arange(len(trial.time)) / fps if still else trial.time - trial.time[0]
-    times = np.arange(len(own) if still else int(own[-1] * fps + 1e-6) + 1) * 1_000_000_000 // fps
-    stamps = np.round(own * 1e9).astype(np.int64)
+    recorded = np.arange(len(trial.time)) / fps if still else trial.time - trial.time[0]
+    times = np.arange(len(recorded) if still else int(recorded[-1] * fps + 1e-6) + 1) * 1_000_000_000 // fps
+    stamps = np.round(recorded * 1e9).astype(np.int64)
     axes = tuple(f"{marker}.{axis}" for marker in trial.markers for axis in XYZ)
     ahead = 0 if still else 1_000_000_000 // fps
 
@@ -47,7 +47,7 @@ def episode_of(trial: Trial, tendons: tuple[str, ...], fps: int) -> Episode:
     pulls, commands = (_of_all(trial, values, tendons) for values in (trial.tendon_positions, trial.commands))
     count = len(times)
     frames = {
-        STATE: at(times, np.concatenate([trial.positions.reshape(len(own), -1), pulls], axis=1)),
+        STATE: at(times, np.concatenate([trial.positions.reshape(len(recorded), -1), pulls], axis=1)),
         MEASURED: at(times, trial.measured.astype(float)),
         ENVIRONMENT: np.tile([*trial.gravity, trial.load], (count, 1)),
         DONE: np.arange(count) == count - 1,
