@@ -29,11 +29,14 @@ VERBS = {
     "suggest": Verb("trunkline.tools.design.__main__", "which experiments to record next"),
     "evaluate": Verb("trunkline.tools.evaluate.__main__", "how far a model is from a session, without a fit"),
     "report": Verb("trunkline.pipeline.report", "the certificate: one page on how far the twin can be trusted"),
+    "export": Verb("trunkline.tools.export.__main__", "a session beside its simulation, for Foxglove and Rerun"),
+    "promote": Verb("trunkline.tools.promote.__main__", "a new twin in an old one's place, where it replays both"),
     "monitor": Verb("trunkline.tools.monitor.__main__", "whether the arm has changed since it was identified"),
     "batch": Verb("trunkline.tools.batch.__main__", "the pipeline for several arms, and one table over all of them"),
     "randomize": Verb("trunkline.tools.randomize.__main__", "domain randomization from the identified parameters"),
     "live": Verb("trunkline.ar.session.__main__", "a session in a browser or a headset", "live,hybrid,teleop"),
     "export-dataset": Verb("trunkline.ar.dataset.__main__", "live sessions as a dataset for LeRobot", "live,teleop"),
+    "export-trials": Verb("trunkline.ar.dataset.trials", "any session's trials, likewise", "live,teleop"),
     "worker": Verb("trunkline.compute.worker", "a worker for a Dask scheduler", "cluster"),
 }  # in the order in which a lab comes to them
 RENAMED = {

@@ -26,7 +26,8 @@ NEEDS_EXTRA = (
     "trunkline/compute/cluster.py", "trunkline/compute/worker.py", "trunkline/kinematics/ik/learn.py",
     "trunkline/kinematics/ik/network.py", "trunkline/kinematics/ik/onnx.py", "trunkline/kinematics/ik/tip_loss.py",
     "trunkline/kinematics/ik/training.py", "trunkline/report/figures", "trunkline/pipeline", "trunkline/tools/evaluate",
-    "trunkline/tools/monitor", "trunkline/ar/teleop", "trunkline/ar/drivers", "trunkline/ar/session",
+    "trunkline/tools/export", "trunkline/tools/monitor", "trunkline/tools/promote", "trunkline/ar/teleop",
+    "trunkline/ar/drivers", "trunkline/ar/session",
 )  # fmt: skip
 
 

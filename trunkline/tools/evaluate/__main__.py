@@ -7,7 +7,6 @@ metrics.json, trials.csv, markers.csv and two pictures. With --reference, how th
 
 import argparse
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
@@ -19,7 +18,6 @@ from trunkline.identification.simulate.checks import check_trials
 from trunkline.model.places import marker_places
 from trunkline.pipeline.stage import output_folder, write_metrics
 from trunkline.program import program_name
-from trunkline.recordings.trials.trial import sessions_of
 from trunkline.tools.evaluate.model import written_beside
 from trunkline.tools.evaluate.report import change_lines, kind_lines, read_reference, trial_lines
 from trunkline.tools.evaluate.session import trials_of
@@ -61,9 +59,10 @@ def _run(args: argparse.Namespace) -> int:
     models = {"model": twin.arm.model} | ({} if args.cad is None else {"cad": Twin.load(args.cad).arm.model})
     written = written_beside(twin, args.settings)
     trials = trials_of(args.session, args.settings, "evaluate", marker_places(models["model"]))
-    if len(sessions_of(trials)) == 1 and (session := written.session_of(trials)):
-        print(f"evaluate: the session {session} of those that the model was fitted to")
-        trials = [replace(trial, session=session, name=f"{session}/{trial.name}") for trial in trials]
+    renamed = written.as_fitted(trials)
+    if renamed is not trials:
+        print(f"evaluate: the session {renamed[0].session} of those that the model was fitted to")
+        trials = renamed
     for session in written.namesakes(models["model"], trials):
         doubt = "the model has numbers for a session of that name, and was fitted to no trial of this one"
         print(f"evaluate: warning: session {session}: {doubt}", file=sys.stderr)

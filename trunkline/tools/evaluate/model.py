@@ -1,6 +1,6 @@
 """The model that is evaluated: how the stage that wrote it compared it, and with what."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import mujoco
@@ -37,6 +37,11 @@ class Written:
                 if fitted == digest and name != trial.name and name.endswith(f"/{trial.name}"):
                     return name.removesuffix(f"/{trial.name}")
         return ""
+
+    def as_fitted(self, trials: list[Trial]) -> list[Trial]:
+        """`trials` of a session without a name, as of the one that it was fitted to, where they are of that."""
+        session = self.session_of(trials) if len(sessions_of(trials)) == 1 else ""
+        return [replace(t, session=session, name=f"{session}/{t.name}") for t in trials] if session else trials
 
     def namesakes(self, model: mujoco.MjModel, trials: list[Trial]) -> list[str]:
         """Sessions of `trials` of whose names `model` has numbers, though it was fitted to none of their trials."""

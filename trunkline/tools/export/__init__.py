@@ -1,0 +1,1 @@
+"""Sessions beside their simulation, as files that other viewers open: `trunkline export`."""
