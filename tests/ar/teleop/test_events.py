@@ -222,6 +222,7 @@ EVENTS = [
     ("follow", {"mode": "aim", "right": replace(OPEN, pressed=("stick_pressed",))} | LET_GO, {}, False),
     ("ask", {"mode": "aim", "right": trigger(), "stamp": 100.0, "history": ((99.0, TARGETS),)} | GRIPPED, {}, True),
     ("ask", {"mode": "aim", "right": trigger(), "stamp": 100.0} | GRIPPED, {}, False),
+    ("void", {"mode": "plan"}, {}, False),
 ]
 
 

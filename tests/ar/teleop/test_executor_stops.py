@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from tests.ar.teleop.test_events import GRIPPED, LET_GO, OPEN, SETTINGS, TARGETS, event, heard, state
+from tests.ar.teleop.test_events import GRIPPED, OPEN, SETTINGS, TARGETS, event, heard, state
 from tests.ar.teleop.test_executor import plan_of, robot, still
 from trunkline.ar.teleop import executor
-from trunkline.ar.teleop.messages import ExecutorReport, PlanReport
+from trunkline.ar.teleop.messages import ExecutorReport
 
 
 class Follower:
@@ -74,23 +74,6 @@ def test_an_event_of_a_button_is_of_that_button_as_it_goes_down(name, button):
     hand = replace(OPEN, pressed=(button,) if button else (), buttons=(wanted,))
     before = state(mode, right=hand, stamp=100.0, history=((99.0, TARGETS),), **GRIPPED)
     assert event(name, before, heard()) == (button == wanted)
-
-
-@pytest.mark.parametrize(
-    ("name", "before", "fields", "happens"),
-    [
-        ("planned", {"mode": "plan"}, {}, True),
-        ("planned", {"mode": "plan"}, {"plan": None}, False),
-        ("planned", {"mode": "plan"}, {"plan": PlanReport(3, "", "no path")}, False),  # it is a refusal
-        ("refused", {"mode": "plan"}, {}, False),
-        ("refused", {"mode": "plan"}, {"plan": PlanReport(3, "", "no path")}, True),
-        ("void", {"mode": "plan"}, {}, False),
-        ("settled", {"mode": "hold", "sound_for": 0.0} | LET_GO, {}, False),
-    ],
-)
-def test_a_plan_that_is_there_is_planned_or_refused(name, before, fields, happens):
-    before = dict(before)
-    assert event(name, state(before.pop("mode"), **before), heard(**fields)) == happens
 
 
 BACK = SETTINGS.look_back
