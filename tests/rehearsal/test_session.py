@@ -133,16 +133,6 @@ def test_following_moves_the_robot_until_the_path_is_over():
     assert len(made.refusals) < 0.1 * len(views)
 
 
-def test_an_operator_who_does_not_judge_confirms_the_first_plan():
-    made, operator = session([0.2, 0.2])
-    operator.judged = False
-    ending, _, views = rehearse(made, operator.reach())
-    assert ending.done
-    assert ending.plans == 1
-    assert ending.previewed > 0.15
-    assert any(view.intent.mode == "execute" for view in views)
-
-
 @pytest.fixture(scope="module")
 def ran() -> tuple[RehearsedSession, list, list]:
     """A reach whose client takes another frame for the base, with previews that count what is rolled out."""
