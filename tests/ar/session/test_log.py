@@ -20,6 +20,7 @@ from mcap_ros2.decoder import DecoderFactory
 
 from tests.ar.session.test_robot_process import simulation
 from tests.ar.session.test_serving import asked, executing, grips
+from tests.ar.session.written import JOINTS, NAMES, REAL, SUBJECT, ZERO, Written
 from tests.ar.teleop.test_plan import MOUNT, OFFSET, START, STRAIGHT, TIP
 from tests.support.disks import filling, full, stuck
 from tests.support.live import BODIES, RATE, controlling, hand, laid, patient
@@ -33,7 +34,7 @@ from trunkline.ar.session import replay
 from trunkline.ar.session.binary import HANDS
 from trunkline.ar.session.composition import subject_of
 from trunkline.ar.session.hardware import hardware_of
-from trunkline.ar.session.log_format import EVENTS, POSES, TWIN, LogFormat, Subject
+from trunkline.ar.session.log_format import EVENTS, POSES, TWIN, Subject
 from trunkline.ar.session.log_reader import read_session_log
 from trunkline.ar.session.log_writer import LogWriter, LogWriterProcess, new_path
 from trunkline.ar.session.robot_process import RobotState
@@ -47,30 +48,7 @@ from trunkline.recordings.preparation.inspect import main as inspect
 from trunkline.recordings.session.session import read_session
 from trunkline.recordings.session.source import open_log
 
-NAMES = ("link_7", "base", "unit_01")
-JOINTS = tuple(f"joint_{n}" for n in range(1, 8))
-SUBJECT = Subject(NAMES, JOINTS, ("tendon_1", "tendon_2", "tendon_3"), STRAIGHT, ("unit_01", (0.0, 0.0, -0.1)))
-ZERO = 1_700_000_000 * 10**9
 PERIOD = 0.2
-REAL = "the robot fr3 at 192.168.1.11, no real motors"
-
-
-class Written(LogWriter):
-    """One that writes here and now; `time` is its clock where it is set."""
-
-    def __init__(self, path, subject=SUBJECT):
-        super().__init__(subject, lambda: time.monotonic() if self.time is None else self.time)
-        self.time = None
-        self.file = open(path, "wb")  # noqa: SIM115
-        self.book = LogFormat(self.file, subject, ZERO)
-
-    def keep(self, record):
-        self.book.write(record)
-
-    def close(self):
-        self.settle()
-        self.book.finish()
-        self.file.close()
 
 
 UNHURRIED = patient(silence=5.0, plan_wait=30.0, start_wait=30.0)
@@ -559,21 +537,6 @@ def test_where_the_log_ends_nothing_new_is_executed_and_all_are_told():
             assert log_writer.fault in (await watcher.hears("state", mode="stopped"))["notice"]
             assert here.log.count(log_writer.fault) == 1
             np.testing.assert_array_equal(here.robot.robot.joints, joints)
-
-    asyncio.run(session())
-
-
-@pytest.mark.realtime
-def test_where_the_log_ends_a_robot_under_way_holds():
-    async def session():
-        log_writer = Failing()
-        async with laid(log_writer=log_writer) as here:
-            guest = await controlling(here)
-            await executing(here, guest)
-            await asyncio.sleep(0.2)
-            log_writer.fault = "log: run.mcap: no space left on device; nothing is executed"
-            await guest.hears("state", mode="stopped", robot="idle")
-            assert here.robot.stops
 
     asyncio.run(session())
 
