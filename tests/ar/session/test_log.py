@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from functools import partial
 from itertools import count, groupby
 
 import numpy as np
@@ -22,6 +23,7 @@ from tests.ar.session.test_robot_process import simulation
 from tests.ar.session.test_serving import asked, executing, grips
 from tests.ar.session.written import JOINTS, NAMES, REAL, SUBJECT, ZERO, Written
 from tests.ar.teleop.test_plan import MOUNT, OFFSET, START, STRAIGHT, TIP
+from tests.support import waiting
 from tests.support.disks import filling, full, stuck
 from tests.support.live import BODIES, RATE, controlling, hand, laid, patient
 from tests.support.operator import PACKAGE, Everywhere, Operator
@@ -321,11 +323,7 @@ def test_what_is_sent_and_what_is_measured_are_told_apart_and_what_is_not_measur
 # --- the process
 
 
-def until(happens, seconds=20.0):
-    end = time.monotonic() + seconds
-    while not happens():
-        assert time.monotonic() < end, "it did not happen"
-        time.sleep(0.01)
+until = partial(waiting.until, seconds=20.0)
 
 
 @pytest.mark.realtime
