@@ -84,6 +84,10 @@ NEVER = "stopped: the path was never begun"
     (Ending(True), [], [], NEVER),
     (Ending(True), views(until=BEGUN - STEP), [], NEVER),
     (Ending(True), views(until=BEGUN), [], ""),
+    # anybody who saw it, within its time
+    (Ending(True), views(until=BEGUN)[-1:], [], ""),
+    (Ending(True), views(until=BEGUN + SECONDS)[-1:], [], ""),
+    (Ending(True), views(until=BEGUN + SECONDS + STEP)[-1:], [], NEVER),
 ])  # fmt: skip
 def test_a_path_is_followed_where_the_script_ended_well_and_nothing_interrupted(ending, shown, refusals, cause):
     assert failure(ending, shown, refusals, path(), LONGEST) == cause

@@ -25,13 +25,15 @@ MOVED = "slip: it moved by {:.0f} mm in the arm as it was held"
 MORE = "slip: it touched more than the arm as it was held"
 
 
-def run(lifted=2 * S.lifted, moved=0.0, touched=HOLD, grasped=HOLD, hanging=False, lies=((), (), ()), carried=0.0):
+def run(
+    lifted=2 * S.lifted, moved=0.0, touched=HOLD, grasped=HOLD, hanging=False, lies=((), (), ()), carried=0.0, low=0.0
+):
     """Frames of a grasp: before it, at its end, and some later, in which the object has `moved` in the arm, which has
-    `carried` it somewhere."""
+    `carried` it somewhere. `low`: its height at first, m."""
     arm = np.zeros((UNITS, 3))
-    up, off, away = np.array([0.0, 0.0, lifted]), np.array([moved, 0.0, 0.0]), np.array([0.0, carried, 0.0])
+    up, off, away = np.array([0.0, 0.0, low + lifted]), np.array([moved, 0.0, 0.0]), np.array([0.0, carried, 0.0])
     return [
-        frame(0.0, "execute", touched),
+        frame(0.0, "execute", touched, place=(0.0, 0.0, low)),
         frame(1.0, "aim", grasped, lies=lies[0], place=up, units=arm, hanging=hanging),
         frame(2.0, "aim", grasped, lies=lies[1], place=up, units=arm),
         frame(3.0, "aim", grasped, lies=lies[2], place=up + off + away, units=arm + away),
@@ -59,6 +61,8 @@ def lying(force=FORCE) -> tuple:
     (DONE, run(lifted=S.lifted), ""),
     (DONE, run(lifted=np.nextafter(S.lifted, 0)), LIFTED.format(1e3 * S.lifted)),
     (DONE, run(lifted=0.0), LIFTED.format(0)),
+    *((DONE, run(lifted=S.lifted + 1e-3, low=low), "") for low in (-0.4, 0.7)),
+    *((DONE, run(lifted=S.lifted - 1e-3, low=low), LIFTED.format(1e3 * S.lifted - 1)) for low in (-0.4, 0.7)),
     (DONE, run(lifted=np.nan), "slip: it was lifted by nan mm"),
     (DONE, run(hanging=True), LIFTED.format(2e3 * S.lifted) + ", and hangs"),
     (DONE, run(lifted=0.0, hanging=True), LIFTED.format(0) + ", and hangs"),
@@ -183,6 +187,10 @@ NOWHERE = "slip: it was dropped before it was brought anywhere"
     (DONE, handed(borne(-2 * HALF)), STAYED),
     (DONE, handed(borne(0, by_floor=2 * HALF)), STAYED),
     (DONE, handed(borne(np.nan)), STAYED),
+    # half its weight, and less than 3 cm in a second
+    (DONE, handed(borne(0.51 * MASS * STANDARD_GRAVITY), speed=(0.029, 0.0, 0.0)), ""),
+    (DONE, handed(borne(0.49 * MASS * STANDARD_GRAVITY), speed=(0.029, 0.0, 0.0)), STAYED),
+    (DONE, handed(borne(0.51 * MASS * STANDARD_GRAVITY), speed=(0.031, 0.0, 0.0)), STAYED),
     # at rest, from both sides of the border
     (DONE, handed(speed=(0.0, 0.0, np.nextafter(STILL, 0))), ""),
     (DONE, handed(speed=(0.0, 0.0, STILL)), STAYED),

@@ -5,6 +5,7 @@ import pytest
 
 from rehearsal.experiments.follow import Path as Way
 from rehearsal.experiments.result import COLUMNS, Result, append_result, causes, rate, read_results, summary
+from trunkline.ar.hybrid.rates import wilson
 from trunkline.errors import InputError
 from upkeep.rehearsal_table import rehearsal_table
 
@@ -15,13 +16,7 @@ def runs(successes: int, failures: int) -> list[Result]:
 
 
 def test_the_interval_is_wilsons():
-    share, low, high = rate(runs(18, 2))
-    z, n, p = 1.959964, 20, 0.9
-    middle, half = p + z * z / (2 * n), z * np.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
-    assert share == p
-    assert (low, high) == pytest.approx(
-        ((middle - half) / (1 + z * z / n), (middle + half) / (1 + z * z / n)), abs=1e-6
-    )
+    assert rate(runs(18, 2)) == (0.9, *wilson(18, 20))
 
 
 def test_causes_are_counted_by_their_kind():

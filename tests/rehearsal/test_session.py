@@ -108,16 +108,6 @@ def test_the_robot_moves_only_after_a_preview_on_the_object_was_confirmed(off):
     assert np.linalg.norm(np.array(views[-1].intent.targets.tip.position) + [0.0, 0.0, beside] - OBJECT) < 0.05
 
 
-def test_an_operator_without_a_preview_on_the_object_never_moves_the_robot():
-    made, operator = session([0.2, -0.2, 0.2])
-    ending, frames, _ = rehearse(made, operator.reach())
-    assert not ending.done
-    assert ending.why.startswith("aim")
-    assert ending.plans == 3
-    assert frames == []
-    assert made.robot.sent == []
-
-
 def test_following_moves_the_robot_until_the_path_is_over():
     made, operator = session([])
     begun = []
@@ -131,16 +121,6 @@ def test_following_moves_the_robot_until_the_path_is_over():
     # a hand that trembles at the edge of this arm's reach is refused now and then, and the robot holds meanwhile
     assert {why.partition(":")[0] for _, why in made.refusals} <= {"out of reach"}
     assert len(made.refusals) < 0.1 * len(views)
-
-
-def test_an_operator_who_does_not_judge_confirms_the_first_plan():
-    made, operator = session([0.2, 0.2])
-    operator.judged = False
-    ending, _, views = rehearse(made, operator.reach())
-    assert ending.done
-    assert ending.plans == 1
-    assert ending.previewed > 0.15
-    assert any(view.intent.mode == "execute" for view in views)
 
 
 @pytest.fixture(scope="module")

@@ -87,8 +87,6 @@ def test_what_is_seen_is_the_truth_of_some_time_ago_in_a_frame_that_is_off():
         assert read[n].pose_time == pytest.approx(true[n - 2].time)
         back = stand_in.instruments.turn.inv().apply(read[n].tip - stand_in.instruments.shift)
         np.testing.assert_allclose(back, true[n - 2].tip, atol=1e-12)
-    assert np.linalg.norm(stand_in.instruments.shift) == pytest.approx(0.01)
-    assert np.degrees(stand_in.instruments.turn.magnitude()) == pytest.approx(2.0)
 
 
 def test_half_the_step_moves_tip_and_object_by_little():

@@ -96,6 +96,12 @@ def test_how_many_radii_the_tip_is_off_is_told_at_each_time():
     assert metrics["radius_mm"]["median"] == 2.0
 
 
+def test_radii_are_of_the_runs_for_which_one_was_stated():
+    metrics = scores([reach(2.0, 1.0), reach(NAN, 0.0), reach(4.0, 5.0)])
+    assert metrics["radius_mm"] == {"median": 3.0, "p95": pytest.approx(3.9)}
+    assert metrics["tip_error_radii"]["at_end"]["median"] == np.median([0.5, 1.25])
+
+
 def test_how_far_off_the_tip_was_beside_the_object_is_of_reaches_that_have_it():
     rows = [reach(2.0, 1.0, touching_mm=off) for off in (3.0, NAN, 5.0, 10.0)]
     assert scores(rows)["touching_mm"] == {"median": 5.0}

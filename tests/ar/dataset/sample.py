@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from tests.ar.session.written import JOINTS, TENDONS, Written
 from tests.ar.teleop.test_plan import START, STRAIGHT
 from tests.support.operator import PACKAGE, Operator
-from trunkline.ar.session.log_format import SIMULATED, LogFormat, Subject
-from trunkline.ar.session.log_writer import LogWriter
+from trunkline.ar.session.log_format import SIMULATED, Subject
 from trunkline.ar.session.robot_process import RobotState
 from trunkline.ar.teleop.messages import (
     ExecutorReport,
@@ -20,11 +20,8 @@ from trunkline.ar.teleop.messages import (
     WorldObject,
 )
 
-ZERO = 1_700_000_000 * 10**9
 RATE, LAG = 120.0, 0.02  # Hz, of steps; s by which what is measured is later than what is sent
 PLACE = (0.0, 0.0, -0.1)  # m, of the tip in the arm's last body
-JOINTS = tuple(f"joint_{n}" for n in range(1, 8))
-TENDONS = ("tendon_1", "tendon_2", "tendon_3")
 SUBJECT = Subject(("base", "unit_01"), JOINTS, TENDONS, STRAIGHT, ("unit_01", PLACE))
 CUP = WorldObject("cup", "cylinder", 0.05, 0.1, 0.1, (0.7, 0.1, 0.2))
 
@@ -38,28 +35,17 @@ def sent(at: float) -> tuple[np.ndarray, np.ndarray]:
     return START + 0.1 * np.sin(at), np.array([0.02 + 0.01 * np.sin(at), 0.0, 0.01 * at / 100])
 
 
-class Session(LogWriter):
-    """Writes here and now, by a clock that its steps move on."""
+class Session(Written):
+    """By a clock that its steps move on."""
 
     def __init__(self, path, measured: bool, names=TENDONS, hardware: str = SIMULATED):
-        subject = replace(SUBJECT, tendons=names, hardware=hardware)
-        super().__init__(subject, lambda: self.time)
+        super().__init__(path, replace(SUBJECT, tendons=names, hardware=hardware))
         self.time, self.measured, self.world = 100.0, measured, World("w", (), (CUP,))
-        self.file = open(path, "wb")  # noqa: SIM115
-        self.book = LogFormat(self.file, subject, ZERO)
         message = Operator().message
         self.message = replace(message, world=self.world)
         tip = {"body": "unit_01", "place": PLACE}
         self.event("begin", package=PACKAGE, hardware=hardware, mount_offset=0.1, tip=tip)
         self.event("world", world=self.world)
-
-    def keep(self, record):
-        self.book.write(record)
-
-    def close(self):
-        self.settle()
-        self.book.finish()
-        self.file.close()
 
     def pass_by(self, seconds: float, mode: str, motion: str = "hold", **wanted) -> None:
         """Steps of the core in one mode; `aim` (Targets) moves by 0.1 m/s along x where it is followed."""

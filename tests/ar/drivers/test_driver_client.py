@@ -4,6 +4,7 @@ of it, from both sides of each border, and what is none."""
 import os
 import socket
 import subprocess
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -129,10 +130,12 @@ def test_a_joint_that_is_nowhere_is_a_fault(driver, value, joint):
     assert driver.fault.startswith(f"joint {joint + 1}: found ")
 
 
-def test_the_fault_that_a_driver_process_tells_is_the_drivers(ready):
-    ready.process.tell(BEGUN, fault="reflex: too fast")
+@pytest.mark.parametrize("fault", ["", "reflex: too fast"])
+def test_where_it_was_last_is_known_also_of_a_driver_process_with_a_fault(ready, fault):
+    ready.process.tell(BEGUN, READY + 0.01, READY + 0.01, fault)
     ready.turn(BEGUN)
-    assert ready.fault == "reflex: too fast"
+    assert ready.measured.tolist() == (READY + 0.01).tolist()
+    assert ready.fault == fault
 
 
 def test_a_driver_process_that_fails_before_it_is_ready_never_is(driver):
@@ -195,6 +198,13 @@ def test_a_driver_process_that_does_not_end_is_killed_after_a_while(clock, ends)
     assert driver.process.waited[0] == CLOSING
     assert driver.process.killed == (not ends)
     assert len(driver.process.waited) == (1 if ends else 2)  # none is left behind that has ended
+
+
+def test_nobody_else_has_the_driver_process_end(driver):
+    """Or its end would not show, as long as somebody still has it."""
+    number, adapters = int(driver.process.command[-1]), os.fstat(driver.process.socket.fileno())
+    with suppress(OSError):  # it is closed
+        assert os.fstat(number).st_ino != adapters.st_ino
 
 
 def test_ctrl_c_is_for_whoever_sends_and_not_for_the_driver_process(driver):

@@ -9,13 +9,12 @@ import pytest
 from tests.support.motors import TICK, homed, motor_settings
 from trunkline.ar.drivers import hardware_robot, ros_panda
 from trunkline.ar.drivers.driver import CONNECTING
-from trunkline.ar.drivers.gm6020 import MOST_AMPERES, Feedback, command_frames, commanded
+from trunkline.ar.drivers.gm6020 import Feedback
 from trunkline.ar.drivers.hardware_robot import LEAD, HardwareRobot
 from trunkline.ar.drivers.motors import FEEDBACK_TIMEOUT, PRESENT, MotorGroup
 from trunkline.ar.drivers.ros_panda import JOINT_STATE_TIMEOUT, RosPanda
 from trunkline.ar.drivers.setpoint_filter import ROUNDING
 from trunkline.ar.drivers.settings import ExecutionConfig
-from trunkline.ar.drivers.watchdog import SETPOINT_TIMEOUT, Watchdog
 from trunkline.ar.drivers.winch import Winch
 from trunkline.errors import InputError
 from trunkline.kinematics.panda.limits import VELOCITY
@@ -99,31 +98,12 @@ def test_a_cable_may_be_so_loose_as_homing_begins(beyond):
     assert not (winch.fault and current)
 
 
-@pytest.mark.parametrize("sign", [-1, 1])
-@pytest.mark.parametrize(("asked", "sent"), [(0.5, 0.5), (MOST_AMPERES, MOST_AMPERES), (9.0, MOST_AMPERES)])
-def test_no_command_asks_a_motor_for_more_than_it_may_have(asked, sent, sign):
-    ((identifier, data),) = command_frames({2: sign * asked})
-    assert commanded(identifier, data)[2] == pytest.approx(sign * sent, abs=1e-3)
-
-
 @pytest.mark.parametrize("side", [-1, 1])
 @pytest.mark.parametrize("wanted", [-1.0, 1.0])
 def test_the_current_of_a_loop_ends_at_what_the_settings_allow_either_way(side, wanted):
     winch = Winch(motor_settings().reel, side)
     winch.read(Feedback(1, 0, 0, 0.0, 30), 0.0)
     assert winch.current(wanted, 0.0, 0.001) == pytest.approx(side * wanted * motor_settings().reel.most)
-
-
-# --- setpoints
-
-
-@pytest.mark.parametrize(("silent", "late"), [(SETPOINT_TIMEOUT - NEAR, False), (SETPOINT_TIMEOUT + NEAR, True)])
-def test_a_watchdog_barks_after_so_long_and_not_before_the_first_setpoint(silent, late):
-    dog = Watchdog()
-    assert dog.late(1e9) == ""
-    dog.feed(100.0)
-    assert dog.late(100.0 + silent) == ("heard no setpoint for 50 ms, expected one every 1 ms" if late else "")
-
 
 # --- a controller of ROS 2
 

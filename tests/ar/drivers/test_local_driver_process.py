@@ -135,14 +135,6 @@ def test_a_fault_is_told_at_once(played):
     assert played.bench.currents == [0.0, 0.0, 0.0]
 
 
-def test_a_driver_process_that_is_killed_is_a_fault(played):
-    played.play(played.send(lambda t: 0.0), 0.1)
-    assert played.client.fault == ""
-    played.theirs.close()
-    played.client.turn(played.bench.now)
-    assert played.client.fault == "its adapter has ended"
-
-
 @pytest.mark.parametrize(
     ("late", "fault"), [(DRIVER_TIMEOUT - 2 * TELL * TICK, ""), (DRIVER_TIMEOUT, "its adapter is silent for")]
 )

@@ -7,7 +7,7 @@ import pytest
 
 from tests.support.motors import PLANTS, Workbench, homed, motor_settings
 from trunkline.ar.drivers.gm6020 import Feedback
-from trunkline.ar.drivers.motors import FEEDBACK_TIMEOUT, PRESENT, MotorGroup
+from trunkline.ar.drivers.motors import MotorGroup
 from trunkline.ar.drivers.simulated_motors import WATCHDOG, MotorParameters
 from trunkline.ar.drivers.winch import Winch
 
@@ -69,17 +69,6 @@ def test_turns_are_counted_the_shorter_way(first, then, turned):
     assert winch.pull == pytest.approx(turned / 8192 * 2 * np.pi * 0.015)
 
 
-def test_the_current_keeps_its_limit():
-    winch = replace(motor_settings().reel, most=0.3)
-    bench = Workbench(settings=replace(motor_settings(), reel=winch)).home()
-    assert bench.motors.homed
-    zeros = []
-    for _ in range(300):
-        bench.tick(0.019, 0.0)
-        zeros.append(np.abs(bench.currents).max())
-    assert max(zeros) == pytest.approx(0.3, abs=1e-3)
-
-
 def test_without_commands_simulated_motors_drive_no_current():
     bench = homed()
     bench.rest(0.3, pull=0.01)
@@ -87,45 +76,6 @@ def test_without_commands_simulated_motors_drive_no_current():
     bench.rest(WATCHDOG - 0.002, commanding=False)
     assert min(np.abs(bench.currents)) > 0.05
     bench.rest(0.004, commanding=False)
-    assert bench.currents == [0.0, 0.0, 0.0]
-
-
-def test_a_motor_that_is_silent_ends_it_for_all():
-    bench = homed()
-    bench.rest(0.3, pull=0.01)
-    bench.simulated.motors[1].silent = True
-    bench.rest(FEEDBACK_TIMEOUT - 0.002, pull=0.01)
-    assert bench.motors.fault == ""
-    bench.rest(0.004, pull=0.01)
-    assert bench.currents == [0.0, 0.0, 0.0]
-    assert bench.motors.fault.startswith("motor 2: silent for 2")
-    bench.simulated.motors[1].silent = False
-    bench.rest(0.5)
-    assert bench.currents == [0.0, 0.0, 0.0]
-
-
-def test_a_motor_that_was_never_there():
-    bench = Workbench()
-    bench.simulated.motors[2].silent = True
-    bench.rest(PRESENT - 0.01)
-    assert bench.motors.fault == ""
-    assert bench.currents == [0.0, 0.0, 0.0]
-    bench.rest(0.02)
-    assert bench.motors.fault == "motor 3: found no feedback, expected it under the id 0x207"
-
-
-def test_a_cable_far_from_where_it_shall_be_ends_it():
-    bench = homed()
-    bench.tick(pull=0.03)
-    assert bench.motors.fault == "motor 1: found 30 mm from where its cable shall be, expected at most 20"
-    assert bench.currents == [0.0, 0.0, 0.0]
-
-
-def test_a_hot_motor_ends_it():
-    bench = homed()
-    bench.motors.hear(Feedback(3, 0, 0, 0.0, 95), bench.now)
-    bench.tick()
-    assert bench.motors.fault == "motor 3: found 95 °C, expected at most 80"
     assert bench.currents == [0.0, 0.0, 0.0]
 
 

@@ -11,7 +11,7 @@ import pytest
 from tests.support import waiting
 from tests.support.motors import PLANTS, TICK, Workbench, homed, motor_settings
 from trunkline.ar.drivers import on_bus
-from trunkline.ar.drivers.gm6020 import Feedback
+from trunkline.ar.drivers.gm6020 import FEEDBACK, NUMBERS, Feedback, command_frames
 from trunkline.ar.drivers.motors import FEEDBACK_TIMEOUT
 from trunkline.ar.drivers.on_bus import (
     FILTERS,
@@ -21,7 +21,6 @@ from trunkline.ar.drivers.on_bus import (
     SimulatedMotorsThread,
     open_bus,
 )
-from trunkline.ar.drivers.simulated_motors import WATCHDOG
 from trunkline.errors import InputError
 
 until = partial(waiting.until, seconds=5.0)
@@ -128,6 +127,9 @@ def test_a_bus_that_takes_nothing_is_a_fault_and_no_current_is_sent_once_it_does
     driven.turn(0.05)
     assert set(driven.bus.sent[before:]) == {(0x1FE, bytes(8))}
     assert driven.currents.max() == 0.0
+    driven.bus.hears = False
+    driven.turn()
+    assert driven.driver.fault == "bus: full", "the first"
 
 
 def test_a_motor_that_is_silent_ends_all_current(driven):
@@ -150,37 +152,10 @@ def test_a_fault_of_the_motors_ends_all_current_though_the_bus_is_well(driven):
     assert driven.currents.max() == 0.0
 
 
-def test_of_the_frames_of_a_motor_that_wait_the_newest_counts(driven):
-    for _ in range(5):
-        driven.bus.tick()
-    assert len(driven.bus.waiting) == 15
-    driven.driver.turn([0.01] * 3, [0.0] * 3)
-    np.testing.assert_allclose(driven.bench.motors.pulls, driven.bench.pulls, atol=3e-4)
-    assert {winch.last_feedback for winch in driven.bench.motors.winches} == {driven.bench.now}
-
-
-def test_an_error_frame_is_no_feedback(monkeypatch):
-    played = Played(monkeypatch, Workbench())
-    frame = can.Message(arbitration_id=0x205, data=bytes(8), is_extended_id=False, is_error_frame=True)
-    waits = [frame, None]
-    played.bus.recv = lambda timeout: waits.pop(0)
-    played.driver.turn([0.0] * 3, [0.0] * 3)
-    assert played.bench.motors.winches[0].last_feedback is None
-
-
 def test_a_closed_driver_leaves_no_current_and_no_bus(driven):
     driven.driver.close()
     assert driven.currents.max() == 0.0
     assert driven.bus.closed
-
-
-def test_a_driver_that_stops_sending_leaves_no_current(driven):
-    for _ in range(round(WATCHDOG / TICK) - 1):
-        driven.bus.tick()
-    assert driven.currents.min() > 0.0
-    for _ in range(3):
-        driven.bus.tick()
-    assert driven.currents.max() == 0.0
 
 
 def test_where_one_frame_is_not_taken_the_other_still_is(monkeypatch):
@@ -190,6 +165,41 @@ def test_where_one_frame_is_not_taken_the_other_still_is(monkeypatch):
     driver.turn([0.01] * 3, [0.0] * 3)
     assert driver.fault == "bus: full"
     assert played.bus.sent == [(0x2FE, bytes(8))]
+
+
+# --- which frames are heard and sent
+
+
+FIRST, SECOND = sorted(NUMBERS)[:2]
+
+
+def frame(number: int, angle: int = 100, size: int = 8, error: bool = False) -> can.Message:
+    data = angle.to_bytes(2, "big") + bytes(6)
+    return can.Message(arbitration_id=FEEDBACK + number, data=data[:size], is_extended_id=False, is_error_frame=error)
+
+
+@pytest.mark.parametrize(
+    ("frames", "heard"),
+    [
+        ([], []),
+        ([frame(FIRST, 100)], [(FIRST, 100)]),
+        ([frame(FIRST, 100), frame(FIRST, 200)], [(FIRST, 200)]),
+        ([frame(FIRST, 100), frame(SECOND, 300)], [(FIRST, 100), (SECOND, 300)]),
+        ([frame(max(NUMBERS) + 1), frame(-1), frame(FIRST, 100)], [(FIRST, 100)]),  # another's
+        ([frame(FIRST, 100), frame(FIRST, 200, size=7)], [(FIRST, 100)]),  # cut
+        ([frame(FIRST, 100), frame(FIRST, 200, error=True)], [(FIRST, 100)]),
+    ],
+)
+def test_the_newest_whole_frame_of_each_motor_is_heard_and_currents_go_out_in_standard_frames(frames, heard):
+    waiting, newest, sent = iter(frames), [], []
+    bus = SimpleNamespace(recv=lambda _: next(waiting, None), send=sent.append, set_filters=lambda _: None)
+    driver = BusMotors(motor_settings(), bus)  # type: ignore[arg-type]
+    hear = lambda feedback, _: newest.append((feedback.number, feedback.angle))  # noqa: E731
+    driver.motors = SimpleNamespace(fault="", hear=hear, currents=lambda *_: {FIRST: 0.5})  # type: ignore[assignment]
+    driver.turn([0.0], [0.0])
+    assert (newest, driver.fault) == (heard, "")
+    assert [(message.arbitration_id, bytes(message.data)) for message in sent] == list(command_frames({FIRST: 0.5}))
+    assert not any(message.is_extended_id for message in sent)
 
 
 # --- on a bus of python-can

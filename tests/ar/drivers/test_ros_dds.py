@@ -16,7 +16,6 @@ from cyclonedds.topic import Topic
 from rosbags.typesys import Stores, get_typestore
 
 from tests.support.waiting import SOON, until
-from trunkline.ar.drivers import ros_panda
 from trunkline.ar.drivers.ros_messages import Header, JointState, JointTrajectory, Time, trajectory
 from trunkline.ar.drivers.ros_panda import RosPanda
 from trunkline.ar.drivers.settings import ExecutionConfig
@@ -110,28 +109,6 @@ def test_a_controller_hears_where_the_joints_shall_be(joined):
     until(
         lambda: np.abs(arm.measured - target).max() < 1e-12, lambda: (controller.turn(), arm._hear(time.monotonic()))
     )
-
-
-@pytest.mark.realtime
-def test_silence_and_a_joint_astray_are_faults(joined):
-    arm, controller = joined
-    controller.turn()
-    until(lambda: arm.fault, lambda: arm.turn(time.monotonic()))
-    assert arm.fault.startswith("/joint_states: silent for ")
-    arm.fault, controller.joints, controller.stuck = "", READY + 0.2 * np.eye(7)[3], True
-    arm._sent = READY
-    until(lambda: np.abs(arm.measured - READY).max() > 0.1, lambda: (controller.turn(), arm._hear(time.monotonic())))
-    arm.turn(arm._state_time)
-    assert arm.fault == "panda_joint4: found 0.2 rad from where it is sent, expected at most 0.1"
-
-
-@pytest.mark.realtime
-def test_no_controller_is_one_line(monkeypatch):
-    monkeypatch.setenv("CYCLONEDDS_URI", f"<CycloneDDS><Domain>{LOOPBACK}</Domain></CycloneDDS>")
-    monkeypatch.setattr(ros_panda, "CONNECTING", 0.05)
-    arm = RosPanda(replace(SETTINGS, domain=78))
-    until(lambda: arm.fault, lambda: arm.turn(time.monotonic()))
-    assert arm.fault == "/joint_states: found no state of panda_joint1 and others within 0 s"
 
 
 def test_one_thread_receives_so_that_a_process_ends():

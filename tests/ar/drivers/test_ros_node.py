@@ -9,7 +9,7 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
-from trunkline.ar.drivers.ros_panda import PERIOD, RosPanda
+from trunkline.ar.drivers.ros_panda import RosPanda
 from trunkline.ar.drivers.settings import ExecutionConfig
 from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT, load_folder
@@ -138,28 +138,13 @@ def test_what_it_hears_is_the_newest(stub, arm):
     assert not arm.fault
 
 
-def test_its_faults_are_those_of_the_other_link(stub, arm):
-    now = arm._state_time
-    arm.turn(now + 0.3)
-    assert arm.fault == "/joint_states: silent for 300 ms"
-    arm.fault = ""
-    arm.send(now, READY)
-    stub.say(READY)
-    arm.turn(now)
-    stub.say(np.full(7, np.nan))
-    arm.turn(now)
-    assert arm.fault == "panda_joint1: found nan rad from where it is sent, expected at most 0.1"
-    arm.fault = ""
-    stub.say(READY + 0.2 * np.eye(7)[3])
-    arm.turn(now)
-    assert arm.fault == "panda_joint4: found 0.2 rad from where it is sent, expected at most 0.1"
-    arm.fault, stub.counts = "", 0
-    stub.say(READY)
+def test_a_topic_that_nobody_hears_and_one_that_fails_are_faults(stub, arm):
+    now, stub.counts = arm._state_time, 0
     arm.turn(now)
     assert arm.fault == f"{SETTINGS.trajectory}: nobody listens any more"
     arm.fault, stub.counts, stub.broken = "", 1, True
     arm.send(now, READY)
-    arm.turn(now + 2 * PERIOD)
+    arm.turn(now)
     assert arm.fault == f"{SETTINGS.trajectory}: publisher is not valid"
 
 

@@ -142,13 +142,6 @@ def test_a_way_that_is_too_fast_is_refused_though_its_points_are_near_each_other
     played.assert_it_stands()
 
 
-def test_a_jump_is_refused_by_name(monkeypatch):
-    played = Played(monkeypatch, lambda time: 0.1 if time > LATE else 0.0)
-    played.play(LATE)
-    assert played.arm.fault.startswith("setpoint: panda_joint1 asks for 3.")
-    np.testing.assert_array_equal(played.controller.joints, READY)
-
-
 def test_a_controller_that_leaves_is_a_fault_at_once(played):
     played.play(LATE)
     played.controller.listeners = 0

@@ -1,9 +1,7 @@
 """The settings of real machines: conf/execution, and files of the release before."""
 
-import pytest
 
 from trunkline.ar.drivers.settings import read_execution_config
-from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT
 
 TEXT = (PROJECT / "conf/execution/config.yaml").read_text(encoding="utf-8")
@@ -14,9 +12,3 @@ def test_the_key_of_the_release_before_is_read_and_named(tmp_path, capsys):
     assert read_execution_config(tmp_path) == read_execution_config()
     expected = f"{tmp_path}: `arm` is called `panda` now: please rename it, the next release reads `panda` alone\n"
     assert capsys.readouterr().out == expected
-
-
-def test_a_key_under_both_names_is_refused(tmp_path):
-    (tmp_path / "config.yaml").write_text(TEXT + "\narm: {}\n", encoding="utf-8")
-    with pytest.raises(InputError, match="`arm` beside `panda`"):
-        read_execution_config(tmp_path)

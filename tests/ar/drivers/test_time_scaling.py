@@ -56,15 +56,6 @@ def test_a_slow_plan_is_stopped_within_the_brake():
     assert moving * TICK - 0.05 < BRAKE + 0.025
 
 
-def test_a_plan_that_another_robot_could_not_run_is_refused():
-    """An FR3's joint 6 reaches less far in than a Panda's."""
-    turn = np.eye(10)[5] * (0.4 - START[5])
-    plan, still = planned(turn), lambda q, c, _: None
-    assert TimeScaledRobot(READY, START[7:], PLANNED, "package", still, PANDA).check(plan) == ""
-    reason = TimeScaledRobot(READY, START[7:], PLANNED, "package", still, FR3).start(plan, plan.digest())
-    assert reason == "plan: joint 6 leaves this robot's range at 0.400 rad"
-
-
 def test_without_a_stop_the_plan_is_run_to_its_end():
     plan = planned(np.append(np.full(7, 0.2), [-0.02, 0, 0]))
     rows = stopped(plan, 100.0)

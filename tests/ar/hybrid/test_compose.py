@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from tests.ar.hybrid.conftest import CONF, hybrid_settings
 from trunkline.ar.hybrid.compose import Placed, compose, panda_joints
 from trunkline.errors import InputError
-from trunkline.frames import gravity_in_base, wxyz_from_rotation
+from trunkline.frames import STANDARD_GRAVITY, gravity_in_base, wxyz_from_rotation
 from trunkline.kinematics.panda.kinematics import mount_pose
 from trunkline.kinematics.panda.mounts import FixedMount
 from trunkline.model.arm_model import ArmModel
@@ -75,6 +75,7 @@ def test_options_are_the_arms(arm):
     assert model.opt.integrator == arm.option.integrator
     assert (model.opt.cone, model.opt.noslip_iterations) == (mujoco.mjtCone.mjCONE_ELLIPTIC, 0)
     assert model.opt.impratio >= 10
+    np.testing.assert_array_equal(model.opt.gravity, [0, 0, -STANDARD_GRAVITY])
 
 
 def test_the_saved_model_is_the_model(arm, tmp_path):

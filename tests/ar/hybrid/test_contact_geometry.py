@@ -8,7 +8,6 @@ from scipy.spatial import ConvexHull
 from trunkline.ar.hybrid.compose import compose
 from trunkline.ar.hybrid.friction import SOLIMP, SOLREF
 from trunkline.errors import InputError
-from trunkline.frames import STANDARD_GRAVITY
 from trunkline.kinematics.panda.mounts import FixedMount
 from trunkline.model.arm.contact_geometry import TOUCH, add_touch, outline, read_geometry, unit_corners
 from trunkline.model.arm.mjcf import unit_name
@@ -83,7 +82,3 @@ def test_an_arm_without_visible_units_is_refused():
     spec.worldbody.add_body(name="unit_01")
     with pytest.raises(InputError, match="unit_01_geom"):
         add_touch(spec, (0.4, 0.002, 1e-4), SOLREF, SOLIMP)
-
-
-def test_gravity_is_the_standard(arm):
-    np.testing.assert_array_equal(compose(arm, FREE).compile().opt.gravity, [0, 0, -STANDARD_GRAVITY])

@@ -24,22 +24,6 @@ def motion(path: np.ndarray, sound: bool = True) -> Piece:
     return Piece(TIME, np.zeros((1, len(TIME), 1)), none, none, pose, none, np.zeros((1, len(TIME))), np.array([sound]))
 
 
-CASES = {
-    "set down": (SET_DOWN, True),
-    "rolls on": (SET_DOWN + 0.03 * np.outer(np.maximum(TIME - 1.0, 0), [1, 0, 0]), False),
-    "beside the board": (SET_DOWN + [0.25, 0, 0], False),
-    "fell off": (SET_DOWN - np.outer(TIME > 2.0, [0, 0, 0.5]), False),
-    "carried off": (SET_DOWN + np.outer(TIME > 2.0, [0, 0, 0.2]), False),
-    "lost": (SET_DOWN * np.nan, False),
-}
-
-
-@pytest.mark.parametrize("name", CASES)
-def test_what_rests(name):
-    path, rests = CASES[name]
-    assert RESTING.holds(motion(path))[0] == rests
-
-
 @pytest.mark.parametrize(("height", "rests"), [(0.0, True), (0.059, True), (0.061, False), (np.nan, True)])
 def test_what_the_arm_still_touches_does_not_rest(height, rests):
     motion_at_rest = motion(SET_DOWN)
@@ -86,7 +70,7 @@ BORDERS = {
 
 
 @pytest.mark.parametrize("name", BORDERS)
-def test_what_rests_from_both_sides_of_each_border(name):
+def test_what_rests(name):
     path, rests = BORDERS[name]
     assert RESTING.holds(motion(path)).tolist() == [rests]
 

@@ -6,7 +6,7 @@ import pytest
 
 from tests.ar.hybrid.conftest import rubbing_arm
 from tests.ar.hybrid.test_rollouts import SIZE, way_of
-from trunkline.ar.hybrid.assistant import surest, try_places
+from trunkline.ar.hybrid.assistant import try_places
 from trunkline.ar.hybrid.compose import Placed, compose
 from trunkline.ar.hybrid.objects import GraspObject
 from trunkline.ar.hybrid.outcomes import Holding
@@ -77,9 +77,3 @@ def test_a_place_from_which_nothing_is_touched_differs_from_one_that_pushes(besi
     offsets = np.array([[0.0, 0.0, 0.0], [-0.3, 0.0, 0.0]])  # m, of the mount
     shares = try_places(beside, way_of(beside.arm), doubts, still, offsets, 2)
     assert shares.tolist() == [0.0, 1.0]
-
-
-def test_the_best_place_is_the_surest_and_then_the_nearest():
-    offsets = np.array([[0.03, 0.0, 0.0], [0.01, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    assert surest(offsets, np.array([1.0, 1.0, 0.5]))[0] == 1
-    assert surest(offsets, np.array([0.2, 0.4, 0.9]))[0] == 2

@@ -45,21 +45,15 @@ def test_a_frame_beside_the_robots_base_moves_what_is_seen(shift, turn_deg, expe
     assert rms(offsets(alignment=BaseAlignment(shift, turn_deg))) == pytest.approx(expected, rel=0.02)
 
 
-def test_of_a_frame_that_is_shifted_a_lean_that_was_seen_in_it_takes_what_is_across_the_arm():
-    """The arm hangs straight below where it was seen, so that only the shift along it is left."""
+@pytest.mark.parametrize("turn_deg", [0.0, 0.5])
+def test_a_straight_arm_is_where_it_was_seen_in_a_frame_beside_the_base_but_for_its_length(turn_deg):
+    """It hangs straight below where it was seen, so that only what is along it is left."""
     hanging = Hanging(TIP - MOUNT, MOUNT, np.eye(3))
-    drawn = offsets(alignment=BaseAlignment(0.003, 0.0), hanging=hanging)
+    drawn = offsets(alignment=BaseAlignment(0.003, turn_deg), hanging=hanging)
     along = (TIP - MOUNT) / np.linalg.norm(TIP - MOUNT)
     np.testing.assert_allclose(drawn, (drawn @ along)[:, None] * along, atol=1e-12)
-    assert rms(drawn) == pytest.approx(0.003 / np.sqrt(3), rel=0.02)
-
-
-def test_a_straight_arm_is_where_it_was_seen_in_a_frame_that_is_turned_as_well_but_for_its_length():
-    hanging = Hanging(TIP - MOUNT, MOUNT, np.eye(3))
-    drawn = offsets(alignment=BaseAlignment(0.003, 0.5), hanging=hanging)
-    along = (TIP - MOUNT) / np.linalg.norm(TIP - MOUNT)
-    np.testing.assert_allclose(drawn, (drawn @ along)[:, None] * along, atol=1e-12)
-    assert rms(drawn) > 0.002
+    turned = np.radians(turn_deg) * np.linalg.norm(np.cross(TIP, along))
+    assert rms(drawn) == pytest.approx(np.hypot(0.003, turned) / np.sqrt(3), rel=0.02)
 
 
 def test_where_the_arm_is_turned_half_round_since_the_shift_counts_twice():

@@ -8,7 +8,6 @@ from tests.ar.hybrid.conftest import hybrid_settings
 from trunkline.ar.hybrid.compose import compose
 from trunkline.ar.hybrid.torques import joint_torques, servo_commands
 from trunkline.errors import InputError
-from trunkline.kinematics.panda.limits import TORQUE
 from trunkline.kinematics.panda.mounts import FixedMount
 
 Q = np.array([0.3, 0.5, -0.2, -1.6, 0.4, 1.9, 0.1])
@@ -84,7 +83,3 @@ def test_a_fixed_mount_bears_nothing(arm):
     model = compose(arm, FixedMount("fixed")).compile()
     with pytest.raises(InputError, match=r"robot\.kind"):
         joint_torques(model, model.qpos0[None])
-
-
-def test_the_limits_are_the_makers():
-    np.testing.assert_array_equal(TORQUE, [87] * 4 + [12] * 3)

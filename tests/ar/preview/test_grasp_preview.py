@@ -92,14 +92,6 @@ def test_only_what_holds_more_surely_is_offered(monkeypatch, probability, shares
         assert last.offer.pointing == (0.0, 0.0, -1.0)
 
 
-def test_of_places_that_hold_as_surely_the_nearest_to_the_users_is_offered(monkeypatch):
-    (_, last), _, _ = grasped(monkeypatch, 0.2, (0.8, 0.8, 0.8))
-    offsets = PLACES - (np.array(MOUNT) - CUP.position)
-    nearest = int(np.linalg.norm(offsets, axis=1).argmin())
-    assert nearest == 1  # not the first, which a sort by shares alone would take
-    assert last.offer.rigid == pytest.approx(tuple(np.array(CUP.position) + PLACES[nearest]))
-
-
 @pytest.mark.parametrize(
     ("again", "place", "probability"),
     [
@@ -117,12 +109,13 @@ def test_what_is_offered_is_as_sure_as_it_was_when_it_was_tried_once_more(monkey
         assert last.offer.rigid == pytest.approx(tuple(np.array(CUP.position) + PLACES[place]))
 
 
-def test_of_places_that_seem_as_sure_the_nearest_two_are_tried_once_more(monkeypatch):
-    _, tried, _ = grasped(monkeypatch, 0.2, (0.8, 0.8, 0.8))
+def test_of_places_that_seem_as_sure_the_nearest_two_are_tried_once_more_and_the_nearest_is_offered(monkeypatch):
+    (_, last), tried, _ = grasped(monkeypatch, 0.2, (0.8, 0.8, 0.8))
     (_, _, offsets, _, _), (_, _, few, _, _) = tried.places
-    away = np.linalg.norm(offsets, axis=1)
-    np.testing.assert_allclose(few, offsets[np.argsort(away)[:2]])
-    assert away.argmax() != 2, "a sort by shares alone would leave out the third"
+    order = np.argsort(np.linalg.norm(offsets, axis=1))
+    assert (order[0], order[-1]) == (1, 0), "a sort by shares alone would leave out the third, and offer the first"
+    np.testing.assert_allclose(few, offsets[order[:2]])
+    assert last.offer.rigid == pytest.approx(tuple(np.array(CUP.position) + PLACES[1]))
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.ar.session.test_log import SUBJECT, Written
+from tests.ar.session.written import SUBJECT, Written
 from tests.ar.teleop.test_plan import START, STRAIGHT
 from trunkline.ar.session.decimation import AFTER, BEFORE, SELDOM, STILL, LogDecimation
 from trunkline.ar.session.log_format import JOINTS_SENT, POSES

@@ -47,6 +47,7 @@ from trunkline.errors import InputError
 from trunkline.kinematics.panda.limits import ACCELERATION
 from trunkline.pipeline.config import PROJECT, load_folder
 
+EXECUTION = load_folder(ExecutionConfig, PROJECT / "conf/execution")
 READY = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])
 STRAIGHT = np.array([0.5, 0.5, 0.5])
 LATE = LEAD + (SMOOTH - 1) * TICK  # s by which limbs are behind the plan
@@ -257,8 +258,7 @@ def test_a_loop_that_is_late_by_more_is_a_fault_of_the_arm(rig):
 @pytest.fixture(scope="module")
 def robot():
     """A machine without limbs: how late its process is moves nothing."""
-    execution = load_folder(ExecutionConfig, PROJECT / "conf/execution")
-    robot = RealRobot(replace(hardware_of("fr3", "simulated", "", "", execution), robot=""), simulation())
+    robot = RealRobot(replace(hardware_of("fr3", "simulated", "", "", EXECUTION), robot=""), simulation())
     until(lambda: robot.ready or not robot.alive, 60.0)
     yield robot
     robot.close()
@@ -329,7 +329,7 @@ def test_without_its_twin_nothing_is_permitted(robot):
 
 @pytest.mark.realtime
 def test_a_machine_that_is_not_there_ends_before_it_begins():
-    named = hardware_of("simulated", "gm6020", "nowhere0", "", load_folder(ExecutionConfig, PROJECT / "conf/execution"))
+    named = hardware_of("simulated", "gm6020", "nowhere0", "", EXECUTION)
     robot = RealRobot(named, simulation())
     until(lambda: not robot.alive, 60.0)
     assert not robot.ready
@@ -340,25 +340,21 @@ def test_a_machine_that_is_not_there_ends_before_it_begins():
 
 
 def test_nothing_real_moves_unless_it_is_named():
-    execution = load_folder(ExecutionConfig, PROJECT / "conf/execution")
-    assert hardware_of("simulated", "simulated", "", "", execution) is None
-    assert not hardware_of("simulated", "gm6020", SIMULATED, "", execution).real
-    assert hardware_of("panda", "simulated", "", "", execution).real
-    assert hardware_of("simulated", "gm6020", "can0", "", execution).words() == (
+    assert hardware_of("simulated", "simulated", "", "", EXECUTION) is None
+    assert not hardware_of("simulated", "gm6020", SIMULATED, "", EXECUTION).real
+    assert hardware_of("panda", "simulated", "", "", EXECUTION).real
+    assert hardware_of("simulated", "gm6020", "can0", "", EXECUTION).words() == (
         "no real robot, motors 1, 2, 3 on the bus can0"
     )
     for motors, bus in (("gm6020", ""), ("simulated", "can0")):
         with pytest.raises(InputError, match="--motors, --bus: found one of them"):
-            hardware_of("simulated", motors, bus, "", execution)
+            hardware_of("simulated", motors, bus, "", EXECUTION)
 
 
 def test_plans_are_slow_enough_for_the_robot_that_is_named():
     """An FR3's last joints may accelerate half as much as a Panda's."""
-    execution, teleop = (
-        load_folder(ExecutionConfig, PROJECT / "conf/execution"),
-        load_folder(Teleop, PROJECT / "conf/teleop"),
-    )
-    panda, fr3 = (hardware_of(robot, "simulated", "", "", execution) for robot in ("panda", "fr3"))
+    teleop = load_folder(Teleop, PROJECT / "conf/teleop")
+    panda, fr3 = (hardware_of(robot, "simulated", "", "", EXECUTION) for robot in ("panda", "fr3"))
     assert panda.slow_enough(teleop) == teleop
     limits = limits_of(fr3.slow_enough(teleop).motors)
     assert (limits.acceleration[:7] < LIMITS["fr3"].acceleration).all()
@@ -370,9 +366,8 @@ def test_plans_are_slow_enough_for_the_robot_that_is_named():
 
 
 def test_the_base_of_a_real_robot_is_never_put_in_place_by_eye():
-    execution = load_folder(ExecutionConfig, PROJECT / "conf/execution")
     by_eye = replace(load_folder(Live, PROJECT / "conf/live").alignment, by_eye=True)
-    simulated, real = (hardware_of("simulated", "gm6020", bus, "", execution) for bus in (SIMULATED, "can0"))
+    simulated, real = (hardware_of("simulated", "gm6020", bus, "", EXECUTION) for bus in (SIMULATED, "can0"))
     assert alignment_for(None, by_eye).by_eye
     assert alignment_for(simulated, by_eye).by_eye
     assert not alignment_for(real, by_eye).by_eye
@@ -386,8 +381,7 @@ def test_a_dry_run_names_nothing_real(named):
 
 
 def test_as_many_motors_as_tendons():
-    execution = load_folder(ExecutionConfig, PROJECT / "conf/execution")
-    two = replace(execution.motors, numbers=(1, 2), sides=(1, 1))
-    named = replace(hardware_of("simulated", "gm6020", "can0", "", execution), motors=two)
+    two = replace(EXECUTION.motors, numbers=(1, 2), sides=(1, 1))
+    named = replace(hardware_of("simulated", "gm6020", "can0", "", EXECUTION), motors=two)
     with pytest.raises(InputError, match=r"motors.numbers: found 2, expected 3"):
         RealRobot(named, simulation())

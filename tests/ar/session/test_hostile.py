@@ -13,7 +13,7 @@ from tests.ar.session.test_serving import asked, executing, grips
 from tests.ar.teleop.test_plan import MOUNT, TIP
 from tests.support.live import TOKEN, Hands, Laid, controlling, hand, laid
 from trunkline.ar.session import connections
-from trunkline.ar.session.auth import CODE_SECONDS, HEADERS, Origins, PairingCode
+from trunkline.ar.session.auth import HEADERS, Origins
 from trunkline.ar.session.serving import Address, listening
 
 
@@ -76,22 +76,6 @@ def test_who_says_nothing_is_shown_out():
             assert "within 3 s" in await guest.refused("hello", 5.0)
 
     asyncio.run(session())
-
-
-def test_a_pairing_code_opens_once_and_ends_by_tries_and_time():
-    code = PairingCode()
-    assert code.fault("000000", 0.0)
-    digits = code.renew(0.0)
-    assert len(digits) == 6
-    wrong = f"{(int(digits) + 1) % 10**6:06d}"
-    assert [bool(code.fault(wrong, 1.0)) for _ in range(4)] == [True] * 4
-    assert code.fault(digits, 1.0) == ""
-    assert code.fault(digits, 1.0)
-    digits = code.renew(0.0)
-    for _ in range(5):
-        code.fault("x", 1.0)
-    assert code.fault(digits, 1.0)
-    assert code.fault(code.renew(0.0), CODE_SECONDS + 1.0)
 
 
 @pytest.mark.realtime

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from functools import partial
 from itertools import count, groupby
 
 import numpy as np
@@ -20,7 +21,9 @@ from mcap_ros2.decoder import DecoderFactory
 
 from tests.ar.session.test_robot_process import simulation
 from tests.ar.session.test_serving import asked, executing, grips
+from tests.ar.session.written import JOINTS, NAMES, REAL, SUBJECT, ZERO, Written
 from tests.ar.teleop.test_plan import MOUNT, OFFSET, START, STRAIGHT, TIP
+from tests.support import waiting
 from tests.support.disks import filling, full, stuck
 from tests.support.live import BODIES, RATE, controlling, hand, laid, patient
 from tests.support.operator import PACKAGE, Everywhere, Operator
@@ -33,7 +36,7 @@ from trunkline.ar.session import replay
 from trunkline.ar.session.binary import HANDS
 from trunkline.ar.session.composition import subject_of
 from trunkline.ar.session.hardware import hardware_of
-from trunkline.ar.session.log_format import EVENTS, POSES, TWIN, LogFormat, Subject
+from trunkline.ar.session.log_format import EVENTS, POSES, TWIN, Subject
 from trunkline.ar.session.log_reader import read_session_log
 from trunkline.ar.session.log_writer import LogWriter, LogWriterProcess, new_path
 from trunkline.ar.session.robot_process import RobotState
@@ -47,30 +50,7 @@ from trunkline.recordings.preparation.inspect import main as inspect
 from trunkline.recordings.session.session import read_session
 from trunkline.recordings.session.source import open_log
 
-NAMES = ("link_7", "base", "unit_01")
-JOINTS = tuple(f"joint_{n}" for n in range(1, 8))
-SUBJECT = Subject(NAMES, JOINTS, ("tendon_1", "tendon_2", "tendon_3"), STRAIGHT, ("unit_01", (0.0, 0.0, -0.1)))
-ZERO = 1_700_000_000 * 10**9
 PERIOD = 0.2
-REAL = "the robot fr3 at 192.168.1.11, no real motors"
-
-
-class Written(LogWriter):
-    """One that writes here and now; `time` is its clock where it is set."""
-
-    def __init__(self, path, subject=SUBJECT):
-        super().__init__(subject, lambda: time.monotonic() if self.time is None else self.time)
-        self.time = None
-        self.file = open(path, "wb")  # noqa: SIM115
-        self.book = LogFormat(self.file, subject, ZERO)
-
-    def keep(self, record):
-        self.book.write(record)
-
-    def close(self):
-        self.settle()
-        self.book.finish()
-        self.file.close()
 
 
 UNHURRIED = patient(silence=5.0, plan_wait=30.0, start_wait=30.0)
@@ -343,11 +323,7 @@ def test_what_is_sent_and_what_is_measured_are_told_apart_and_what_is_not_measur
 # --- the process
 
 
-def until(happens, seconds=20.0):
-    end = time.monotonic() + seconds
-    while not happens():
-        assert time.monotonic() < end, "it did not happen"
-        time.sleep(0.01)
+until = partial(waiting.until, seconds=20.0)
 
 
 @pytest.mark.realtime

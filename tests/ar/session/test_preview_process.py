@@ -231,11 +231,12 @@ def test_a_newer_order_ends_the_one_before_within_a_piece():
     assert sent[-1].report.serial == 2
 
 
-def test_what_breaks_a_preview_refuses_its_plan_and_not_the_next():
-    class Broken(PreviewPlanner):
-        def _pieces_of(self, *args):
-            raise ValueError("two\nlines")
+class Broken(PreviewPlanner):
+    def _pieces_of(self, *args):
+        raise ValueError("two\nlines")
 
+
+def test_what_breaks_a_preview_refuses_its_plan_and_not_the_next():
     broken, sent, waiting = Broken(made().planner, made().foresight, made().bodies), [], [(1, order(1))]
     orders = SimpleNamespace(get=lambda: waiting.pop(0))
     with pytest.raises(IndexError):
@@ -245,11 +246,6 @@ def test_what_breaks_a_preview_refuses_its_plan_and_not_the_next():
 
 def test_a_process_whose_first_preview_breaks_off_does_not_begin():
     """No plan could ever be confirmed: that is better said before anybody comes."""
-
-    class Broken(PreviewPlanner):
-        def _pieces_of(self, *args):
-            raise ValueError("two\nlines")
-
     s, asked = simulation(), order()
     plan = made().planner.plan(asked.request, asked.world, asked.joints, asked.commands)
     broken = Broken(SimpleNamespace(plan=lambda *_: plan), made().foresight, made().bodies)  # type: ignore[arg-type]

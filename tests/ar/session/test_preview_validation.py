@@ -6,14 +6,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.ar.session.test_log import NAMES, REAL, SUBJECT, ZERO
+from tests.ar.session.written import NAMES, REAL, SUBJECT, Written
 from tests.ar.teleop.test_plan import OFFSET, START, STRAIGHT
 from tests.support.operator import Operator
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import messages
-from trunkline.ar.session.log_format import LogFormat
 from trunkline.ar.session.log_reader import read_session_log
-from trunkline.ar.session.log_writer import LogWriter
 from trunkline.ar.session.preview_validation import Execution, _end, _grasped, _holds, executions, lines, main
 from trunkline.ar.session.robot_process import RobotState
 from trunkline.ar.teleop.messages import ExecutorReport, Intent, WorldObject
@@ -44,53 +42,42 @@ def wrist(time):
     return np.concatenate([frame.p.T, turns.as_quat(scalar_first=True)], axis=1)
 
 
-class Clocked(LogWriter):
-    def __init__(self, file, **hardware):
-        self.time, subject = 99.0, replace(SUBJECT, **hardware)
-        super().__init__(subject, lambda: self.time)
-        self.book = LogFormat(file, subject, ZERO)
-
-    def keep(self, record):
-        self.book.write(record)
-
-
 def recorded(path, probability=0.8, grasped=True, end=None, spread=0.01, measured=False, **hardware):
     """A log of one execution; `end`: s after which it was stopped; `measured`: whether the joints are."""
-    with open(path, "wb") as file:
-        log_writer, operator = Clocked(file, **hardware), Operator()
-        tip = {"body": SUBJECT.tip[0], "place": SUBJECT.tip[1]}
-        log_writer.event("begin", package="p", tip=tip, mount_offset=OFFSET, **hardware)
-        log_writer.event("world", world=make_world((), (CUP,)))
-        preview = messages.PreviewMessage(DIGEST, STEP, LASTS, STEP, (("approach", 0.0),))
-        log_writer.event("preview", preview=preview)
-        times = np.arange(1, round(LASTS / STEP) + 1) * STEP
-        for first in range(0, len(times), 20):
-            piece = place(times[first : first + 20])
-            rows = [wrist(times[first : first + 20]), piece, piece]
-            log_writer.piece(first, float(times[first]), np.stack(rows, axis=1))
-        tip = place(times[-1])[:3] + [0.0, 0.0, 0.1]
-        log_writer.event("foreseen", foreseen=messages.PredictionMessage(
-            DIGEST, probability, 0.6, 0.9, (LASTS,), (tuple(tip),), (spread,), 0.9, 12))  # fmt: skip
-        log_writer.time = BEGIN
-        log_writer.event("execute", digest=DIGEST, refused="")
-        log_writer.event("robot", robot=ExecutorReport("running", DIGEST))
-        for time in np.arange(0.0, LASTS + 0.5, 1 / 72):
-            log_writer.time = BEGIN + time
-            if end is not None and time >= end:
-                log_writer.event("robot", robot=ExecutorReport("idle", DIGEST))
-                break
-            poses = np.stack([place(time - DELAY)] * len(NAMES)) + [0.0, 0.0, OFF, 0.0, 0.0, 0.0, 0.0]
-            sensed = joints(time - DELAY) + OFF_JOINT if measured else None
-            log_writer.robot_state(RobotState(log_writer.time, 0.0, START, STRAIGHT, poses[0], poses, sensed))
-            intent: Intent = operator.step()
-            log_writer.step(1 / 60, operator.message, intent)
-        if end is None:
-            log_writer.event("robot", robot=ExecutorReport("done", DIGEST))
-            if grasped:
-                object = WorldObject("the cup", "cylinder", 0.05, 0.1, 0.1, (0.6, 0.0, 0.4), support="held")
-                log_writer.event("world", world=make_world((), (object,)))
-        log_writer.settle()
-        log_writer.book.finish()
+    log_writer, operator = Written(path, replace(SUBJECT, **hardware)), Operator()
+    log_writer.time = 99.0
+    tip = {"body": SUBJECT.tip[0], "place": SUBJECT.tip[1]}
+    log_writer.event("begin", package="p", tip=tip, mount_offset=OFFSET, **hardware)
+    log_writer.event("world", world=make_world((), (CUP,)))
+    preview = messages.PreviewMessage(DIGEST, STEP, LASTS, STEP, (("approach", 0.0),))
+    log_writer.event("preview", preview=preview)
+    times = np.arange(1, round(LASTS / STEP) + 1) * STEP
+    for first in range(0, len(times), 20):
+        piece = place(times[first : first + 20])
+        rows = [wrist(times[first : first + 20]), piece, piece]
+        log_writer.piece(first, float(times[first]), np.stack(rows, axis=1))
+    tip = place(times[-1])[:3] + [0.0, 0.0, 0.1]
+    log_writer.event("foreseen", foreseen=messages.PredictionMessage(
+        DIGEST, probability, 0.6, 0.9, (LASTS,), (tuple(tip),), (spread,), 0.9, 12))  # fmt: skip
+    log_writer.time = BEGIN
+    log_writer.event("execute", digest=DIGEST, refused="")
+    log_writer.event("robot", robot=ExecutorReport("running", DIGEST))
+    for time in np.arange(0.0, LASTS + 0.5, 1 / 72):
+        log_writer.time = BEGIN + time
+        if end is not None and time >= end:
+            log_writer.event("robot", robot=ExecutorReport("idle", DIGEST))
+            break
+        poses = np.stack([place(time - DELAY)] * len(NAMES)) + [0.0, 0.0, OFF, 0.0, 0.0, 0.0, 0.0]
+        sensed = joints(time - DELAY) + OFF_JOINT if measured else None
+        log_writer.robot_state(RobotState(log_writer.time, 0.0, START, STRAIGHT, poses[0], poses, sensed))
+        intent: Intent = operator.step()
+        log_writer.step(1 / 60, operator.message, intent)
+    if end is None:
+        log_writer.event("robot", robot=ExecutorReport("done", DIGEST))
+        if grasped:
+            object = WorldObject("the cup", "cylinder", 0.05, 0.1, 0.1, (0.6, 0.0, 0.4), support="held")
+            log_writer.event("world", world=make_world((), (object,)))
+    log_writer.close()
     return path
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.ar.session.test_log import NAMES, REAL, SUBJECT, Written
+from tests.ar.session.written import NAMES, REAL, SUBJECT, Written
 from tests.ar.teleop.test_plan import START, STRAIGHT
 from tests.support.operator import Operator
 from trunkline.ar.session import binary, recording

@@ -3,7 +3,6 @@
 import multiprocessing
 import queue
 import time
-from dataclasses import replace
 from functools import cache
 
 import mujoco
@@ -223,29 +222,6 @@ def test_it_follows_what_it_hears_a_delay_later_and_brakes_when_it_is_stopped(ro
     robot.hear(0.0, here)
     time.sleep(0.3)
     np.testing.assert_array_equal(robot.robot_state().joints, joints)
-
-
-@pytest.mark.realtime
-def test_a_stop_before_a_plan_has_come_counts(robot):
-    s, now = simulation(), robot.robot_state()
-    here = np.append(now.joints, now.commands)
-    rows = point_to_point(here, here + np.eye(10)[0] * 0.2, s.limits, 0.002)
-    plan = Plan(0.002, rows[:, :7], rows[:, 7:], (("approach", 0),), PACKAGE, "world")
-    assert robot.start(plan, plan.digest()) == ""
-    robot.stop()
-    until(lambda: robot.state().mode in ("fault", "idle") and robot.channel.hear()[0][2] == robot._serial)
-    np.testing.assert_allclose(robot.robot_state().joints, now.joints, atol=2e-3)
-
-
-@pytest.mark.realtime
-def test_another_digest_or_package_does_not_run(robot):
-    now = robot.robot_state()
-    rows = np.tile(now.joints, (3, 1)), np.tile(now.commands, (3, 1))
-    plan = Plan(0.002, *rows, (("approach", 0),), PACKAGE, "world")
-    assert robot.start(plan, "b" * 64).startswith("digest: found")
-    other = replace(plan, package="b" * 64)
-    assert robot.start(other, other.digest()).startswith("package: found")
-    assert robot.state().mode != "running"
 
 
 @pytest.mark.realtime

@@ -12,10 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.operator import DT, FORWARD, Everywhere, Operator, config
 from trunkline.ar.teleop.messages import Input, Intent, from_json, to_json
-from trunkline.ar.teleop.one_euro import OneEuro
-from trunkline.ar.teleop.targets import tilted
 from trunkline.ar.teleop.tracked_controller import ray_length
-from trunkline.ar.teleop.vectors import DOWN
 from trunkline.errors import InputError
 from trunkline.frames import wxyz_from_rotation
 
@@ -114,29 +111,6 @@ def test_clutch_a_target_stays_while_its_grip_is_let_go():
     np.testing.assert_allclose(intent.rays[0], intent.targets.rigid.position)
 
 
-def kick(seconds):
-    """How far the trigger has turned the ray, rad, so long before it is pressed: 0.6° over the last 80 ms."""
-    return np.radians(0.6) * min(max(1 - seconds / 0.08, 0.0), 1.0)
-
-
-def test_a_press_takes_the_pose_from_before_the_triggers_jerk():
-    still = OneEuro(1.0, 20.0, 1.0)
-    errors = {}
-    for look_back in (0.0, 0.1):
-        operator = Operator(look_back=look_back, position_filter=still, orientation_filter=still)
-        operator.wait(0.5)
-        wanted = operator.wait(0.5, left={"grip": True}, right={"grip": True}).targets.rigid.position
-        for i in range(12, -1, -1):
-            turn = Rotation.from_rotvec([kick(i * DT), 0, 0])
-            pose = {"quaternion": tuple(map(float, wxyz_from_rotation(turn)))}
-            intent = operator.step(left={**pose, "trigger": i == 0})
-        assert intent.mode == "plan"
-        errors[look_back] = np.linalg.norm(np.array(intent.request.targets.rigid.position) - wanted)
-    assert errors[0.1] < 1e-4
-    assert errors[0.0] > 5 * errors[0.1]
-    assert errors[0.0] > 1e-3
-
-
 def test_tilting_the_controller_aligns_the_end_effector_with_it():
     operator = Operator()
     operator.wait(0.5)
@@ -151,17 +125,6 @@ def test_tilting_the_controller_aligns_the_end_effector_with_it():
     np.testing.assert_allclose(intent.targets.rigid.position, before.rigid.position, atol=1e-6)
     assert not intent.targets.tilt_limited
     assert np.arccos(-intent.targets.pointing[2]) == pytest.approx(np.radians(30), abs=1e-6)
-
-
-def test_tilt_ends_at_its_limit_and_is_marked_there():
-    orientation = config().core.orientation
-    toward = (math.sin(2.0), 0.0, -math.cos(2.0))
-    pointing, limited = tilted(DOWN, toward, 100.0, orientation)
-    assert limited
-    expected = (math.sin(orientation.most_tilt), 0.0, -math.cos(orientation.most_tilt))
-    np.testing.assert_allclose(pointing, expected, atol=1e-12)
-    slow, _ = tilted(DOWN, toward, 0.1, orientation)
-    assert math.acos(-slow[2]) == pytest.approx(0.1 * orientation.rate)
 
 
 def test_outside_the_nearest_point_is_offered_and_taken_only_when_asked():

@@ -140,13 +140,6 @@ def test_targets_in_a_table_are_named_and_no_plan_is_asked_for():
     assert intent.notice == "tip target is inside the table"
 
 
-def test_no_plan_before_both_targets_are_set():
-    operator = Operator()
-    operator.wait(0.5)
-    operator.wait(0.3, left={"grip": True})
-    assert operator.step(right={"trigger": True}).notice == "both targets are needed: hold a grip to set each"
-
-
 def test_buttons_held_when_a_controller_appears_are_no_presses():
     operator = Operator()
     operator.to("stopped")

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from tests.support.operator import REFERENCE, Operator, config
+from tests.support.operator import REFERENCE, config
 from trunkline.ar.teleop.events import answered, changed_since, detect_events, refusal, takes_offer
 from trunkline.ar.teleop.messages import (
     Controller,
@@ -104,19 +104,6 @@ def test_of_several_changes_the_first_is_told():
     for first, (_, reason) in enumerate(order):
         fields = {name: value for change, _ in order[first:] for name, value in change.items()}
         assert changed_since(state("ready", left=PRESSED, right=right), heard(**fields), ends, SETTINGS) == reason
-
-
-@pytest.mark.parametrize("mode", ["ready", "delay"])
-@pytest.mark.parametrize("shown", ["e" * 64, ""])
-def test_a_plan_is_executed_by_the_preview_of_it_alone(mode, shown):
-    """At the core: another preview that was seen meanwhile, or none, leads back to aiming, and nothing moves."""
-    operator = Operator()
-    operator.to(mode)
-    intent = operator.step(shown=shown)
-    assert intent.mode == "aim"
-    assert intent.notice == "another plan was shown; the plan is void"
-    operator.wait(1.0, shown=PLAN)
-    assert all(intent.execute == "" for intent in operator.intents)
 
 
 @pytest.mark.parametrize(
@@ -222,6 +209,7 @@ EVENTS = [
     ("follow", {"mode": "aim", "right": replace(OPEN, pressed=("stick_pressed",))} | LET_GO, {}, False),
     ("ask", {"mode": "aim", "right": trigger(), "stamp": 100.0, "history": ((99.0, TARGETS),)} | GRIPPED, {}, True),
     ("ask", {"mode": "aim", "right": trigger(), "stamp": 100.0} | GRIPPED, {}, False),
+    ("void", {"mode": "plan"}, {}, False),
 ]
 
 
@@ -229,6 +217,46 @@ EVENTS = [
 def test_when_an_event_has_happened(name, before, fields, expected):
     before = dict(before)
     assert event(name, state(before.pop("mode"), **before), heard(**fields)) == expected
+
+
+BUTTONS = {
+    "reset": ("stopped", "primary"),
+    "ask": ("aim", "trigger"),
+    "confirm": ("ready", "trigger"),
+    "follow": ("aim", "stick_pressed"),
+    "unfollow": ("follow", "stick_pressed"),
+}
+
+
+@pytest.mark.parametrize("button", ["primary", "trigger", "stick_pressed", ""])
+@pytest.mark.parametrize("name", BUTTONS)
+def test_an_event_of_a_button_is_of_that_button_as_it_goes_down(name, button):
+    mode, wanted = BUTTONS[name]
+    hand = replace(OPEN, pressed=(button,) if button else (), buttons=(wanted,))
+    before = state(mode, right=hand, stamp=100.0, history=((99.0, TARGETS),), **GRIPPED)
+    assert event(name, before, heard()) == (button == wanted)
+
+
+BACK = SETTINGS.look_back
+BEYOND = replace(TARGETS, tip=replace(TARGETS.tip, reach="outside"))
+
+
+@pytest.mark.parametrize(
+    ("history", "asked"),
+    [
+        (((9.0, BEYOND), (BACK, TARGETS), (BACK / 2, BEYOND)), True),  # not the newest, and not the oldest
+        (((9.0, TARGETS), (BACK, BEYOND), (BACK / 2, TARGETS)), False),
+        (((9.0, TARGETS), (BACK / 2, BEYOND)), True),
+        (((BACK / 2, TARGETS), (BACK / 4, BEYOND)), True),  # the oldest there are where none is old enough
+        (((BACK / 2, BEYOND), (BACK / 4, TARGETS)), False),
+        ((), False),
+    ],
+)
+def test_targets_are_those_of_before_the_triggers_jerk(history, asked):
+    """Those of `history` by their age, s, the oldest first."""
+    stamped = tuple((100.0 - age, targets) for age, targets in history)
+    before = state("aim", right=replace(OPEN, pressed=("trigger",)), stamp=100.0, history=stamped, **GRIPPED)
+    assert event("ask", before, heard()) == asked
 
 
 @pytest.mark.parametrize(("reach", "turned"), [("outside", 0.0), ("blocked", 0.0), ("inside", None)])

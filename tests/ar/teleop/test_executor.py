@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from tests.support.operator import READY_JOINTS, config
+from trunkline.ar.teleop import executor
 from trunkline.ar.teleop.executor import AT_START, BRAKE, ROUNDING, PlanFollower
+from trunkline.ar.teleop.messages import ExecutorReport
 from trunkline.ar.teleop.plan import Plan
 from trunkline.ar.teleop.trajectory import JOINTS, limits_of
 from trunkline.kinematics.panda.kinematics import Q_MAX, Q_MIN
@@ -150,3 +152,54 @@ def test_a_stop_takes_as_long_as_it_may_and_counts_once(dt):
     assert made.joints[0] - before == pytest.approx(0.5 * LIMITS.velocity[0] * BRAKE / 2, rel=0.02)
     assert made.state().mode == "idle"
     assert made.state().digest == plan.digest()
+
+
+# --- what a stop does to what runs
+
+
+class Follower:
+    """That counts how often it is told to brake."""
+
+    refused, rests = "", False
+
+    def __init__(self, *_) -> None:
+        self.braked = 0
+
+    def brake(self) -> None:
+        self.braked += 1
+
+
+@pytest.fixture
+def followed(monkeypatch):
+    """A robot that follows, and its follower."""
+    follower = Follower()
+    monkeypatch.setattr(executor, "Follower", lambda *_: follower)
+    simulated = robot()
+    assert simulated.follow(None, 0.01) == ""  # type: ignore[arg-type]
+    return simulated, follower
+
+
+def test_a_stop_brakes_what_follows_and_once(followed):
+    simulated, follower = followed
+    simulated.stop()
+    assert follower.braked == 1
+    simulated.stop()
+    assert follower.braked == 1
+    assert simulated.state() == ExecutorReport("running", executor.FOLLOWS)  # until it rests
+
+
+def test_what_runs_takes_nothing_else(followed):
+    plan, simulated = plan_of(still()), robot()
+    assert simulated.start(plan, plan.digest()) == ""
+    for runs in (simulated, followed[0]):
+        assert runs.start(plan, plan.digest()) == "busy: another plan runs"
+        assert runs.follow(None, 0.01) == "busy: another plan runs"  # type: ignore[arg-type]
+
+
+def test_a_stop_of_what_does_not_run_stops_nothing_later():
+    simulated, plan = robot(), plan_of(still())
+    simulated.stop()
+    assert simulated.state() == ExecutorReport()
+    assert simulated.start(plan, plan.digest()) == ""
+    simulated.advance(1.0)
+    assert simulated.state() == ExecutorReport("done", plan.digest())

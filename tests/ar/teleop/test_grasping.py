@@ -263,15 +263,6 @@ def test_an_offer_is_shown_and_taken_only_if_the_user_does():
     assert intent.request.targets.better is None
 
 
-def test_an_offer_for_another_object_is_none():
-    operator = aiming(BALL)
-    ready(operator)
-    operator.step(offer=Offer("another", (0.5, 0.1, 0.5), (0.0, 0.0, -1.0), 0.9))
-    assert operator.intents[-1].targets.better is None
-    operator.wait(0.1, left={"grip": False})
-    assert operator.step(left={"primary": True}).mode == "ready"
-
-
 def test_with_an_object_in_the_arm_the_tip_target_is_where_it_will_be():
     operator = Operator()
     operator.wait(0.5)

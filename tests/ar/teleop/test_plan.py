@@ -170,57 +170,12 @@ def test_digest_tells_every_bit(planner):
     assert replace(plan, joints=plan.joints.copy()).digest() == plan.digest()
 
 
-def robot(plan, **changes):
-    arguments = {"joints": plan.joints[0], "commands": plan.commands[0], "limits": LIMITS, "package": PACKAGE} | changes
-    return PlanFollower(**arguments)
-
-
-def test_robot_runs_only_the_plan_of_the_digest(planner):
-    plan = planner.plan(request(MOUNT, TIP), WORLD, START, STRAIGHT)
-    simulated = robot(plan)
-    assert simulated.start(plan, "0" * 64).startswith("digest: found ")
-    assert simulated.state().mode == "idle"
-    assert simulated.start(plan, plan.digest()) == ""
-    assert simulated.start(plan, plan.digest()) == "busy: another plan runs"
-    for _ in range(round(plan.duration / 0.01) + 2):
-        simulated.advance(0.01)
-    assert simulated.state().mode == "done"
-    np.testing.assert_allclose(simulated.joints, plan.joints[-1])
-
-
-def test_robot_refuses_by_name(planner):
-    plan = planner.plan(request(MOUNT, TIP), WORLD, START, STRAIGHT)
-    fast = replace(plan, step=plan.step / 3)
-    spoilt = replace(plan, commands=np.where(plan.commands > 0.5, np.nan, plan.commands))
-    assert robot(plan).check(plan) == ""
-    assert "moves at" in robot(plan).check(fast)
-    assert robot(plan).check(spoilt) == "plan: found values that are not finite"
-    assert robot(plan).check(replace(plan, package="b" * 64)).startswith("package: found digest bbbb")
-    assert "away from where the robot is" in robot(plan, joints=START + 0.01).check(plan)
-
-
-def test_a_stop_ends_on_the_way_soon_and_for_good(planner):
-    plan = planner.plan(request(MOUNT, TIP), WORLD, START, STRAIGHT)
-    simulated = robot(plan)
-    simulated.start(plan, plan.digest())
-    for _ in range(30):
-        simulated.advance(0.01)
-    simulated.stop()
-    for _ in range(12):
-        simulated.advance(0.01)
-    assert simulated.state().mode == "idle"
-    stopped_at = simulated.joints.copy()
-    off = np.abs(plan.joints - stopped_at).max(axis=1).min()
-    assert off < 0.01  # on the way
-    simulated.advance(5.0)
-    np.testing.assert_array_equal(simulated.joints, stopped_at)
-
-
 def test_robot_moves_a_model_that_it_is_given(planner):
     plan = planner.plan(request(MOUNT, TIP), WORLD, START, STRAIGHT)
     heard = []
-    simulated = robot(plan, move=lambda joints, commands, dt: heard.append((joints.copy(), commands.copy(), dt)))
+    move = lambda joints, commands, dt: heard.append((joints.copy(), dt))  # noqa: E731
+    simulated = PlanFollower(START, STRAIGHT, LIMITS, PACKAGE, move)
     simulated.start(plan, plan.digest())
     simulated.advance(0.01)
     np.testing.assert_allclose(heard[0][0], plan.at(0.01)[0])
-    assert heard[0][2] == 0.01
+    assert heard[0][1] == 0.01

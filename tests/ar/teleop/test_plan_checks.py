@@ -79,12 +79,6 @@ def test_what_is_beside_the_arms_way_is_not_in_it():
     check_plan(curling("approach", "curl"), about(places(STRAIGHT)[-1] + [0, 0, -0.05]), OFFSET, CHAIN)
 
 
-def test_a_solid_in_a_links_way_is_named_first_of_its_kind():
-    (mount,), _ = mount_pose(READY[None], OFFSET)
-    with pytest.raises(InputError, match=r"world: (joint \d|mount) of the rigid robot would come into the table after"):
-        check_plan(curling("approach", "curl"), about(mount), OFFSET, CHAIN)
-
-
 # --- each criterion by itself, from both sides of its border
 
 
