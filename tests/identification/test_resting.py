@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from tests.support.noisy_trials import WEIGHTS, with_values
 from tests.support.small_arm import LIMIT
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
@@ -13,9 +14,7 @@ from trunkline.identification.fit.fit import CoarseSearch, Fit, Method, Refineme
 from trunkline.identification.fit.identify import identify
 from trunkline.identification.fit.optimizers import LeastSquares
 from trunkline.identification.fit.problem import Bounds
-from trunkline.identification.parameters.parameters import candidate_fields, set_fields
 from trunkline.identification.simulate.experiment import prepare
-from trunkline.identification.simulate.loss import LossWeights
 from trunkline.identification.simulate.resting import resting_shape
 from trunkline.model.arm.mjcf import Marker, Solver, Tendons, build_spec
 from trunkline.model.arm.uniform import uniform_chain, uniform_properties
@@ -25,7 +24,6 @@ ROOT = Path(__file__).parents[2]
 FRAME, FRAMES = 1 / 120, 360
 MARKERS = ("1", "2", "3")
 CROOKED = np.array([0.06, -0.04, 0.02, 0.05, -0.05, 0.08, 0.03, 0.1])
-WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 
 
 def straight_arm() -> mujoco.MjSpec:
@@ -45,8 +43,7 @@ def model() -> mujoco.MjModel:
 
 @pytest.fixture(scope="module")
 def truth(model) -> mujoco.MjModel:
-    truth = model.__copy__()
-    set_fields(truth, candidate_fields(model, {"stiffness": np.array([1.7]), "damping": np.array([0.15])}))
+    truth = with_values(model, {"stiffness": 1.7, "damping": 0.15})
     truth.qpos_spring[:] = CROOKED
     return truth
 

@@ -9,12 +9,13 @@ import pytest
 
 from tests.support.folders import TABLE_OF_NOTHING
 from tests.support.matched_plant import begin_project, curl, release, tilt
+from tests.support.noisy_trials import with_values
 from trunkline.errors import InputError
 from trunkline.identification.fit.fit import CoarseSearch, Refinement
 from trunkline.identification.fit.optimizers import DifferentialEvolution, LeastSquares
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.settings import IdentificationSettings
-from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields, set_fields
+from trunkline.identification.parameters.parameters import PARAMETERS
 from trunkline.identification.simulate.loss import Loss
 from trunkline.pipeline.identify import CAD_MODEL, read_reported, run
 from trunkline.recordings.trials.splits import DECIDING
@@ -41,10 +42,7 @@ def settings(experiments, reported, parameters, per_joint=(), iterations=8, **ch
 
 
 def truth_of(model: mujoco.MjModel, **scales: float) -> mujoco.MjModel:
-    truth = model.__copy__()
-    values = {name: np.array([scale * PARAMETERS[name].read(model)]) for name, scale in scales.items()}
-    set_fields(truth, candidate_fields(model, values))
-    return truth
+    return with_values(model, {name: scale * PARAMETERS[name].read(model) for name, scale in scales.items()})
 
 
 @pytest.fixture

@@ -13,13 +13,13 @@ from tests.identification.test_stage import settings, truth_of
 from tests.model.simulation.test_capstan import rubbing_arm
 from tests.model.simulation.test_motion import delayed
 from tests.support.matched_plant import begin_project, curl, markers_of, release, small_model
+from tests.support.noisy_trials import WEIGHTS
 from tests.support.small_arm import small_spec
 from trunkline.errors import InputError
 from trunkline.identification.fit.linearisation import linearise
 from trunkline.identification.fit.problem import Bounds, Problem
 from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields
 from trunkline.identification.simulate.experiment import prepare
-from trunkline.identification.simulate.loss import LossWeights
 from trunkline.identification.simulate.population import Population
 from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement
 from trunkline.model.arm_model import ArmModel
@@ -31,7 +31,6 @@ from trunkline.recordings.trials.trial import write_trials
 
 SECONDS = 0.5
 BOUND = 5e-6  # m, of any site in that time, as docs/speed.md states it
-WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 
 
 @pytest.fixture
