@@ -2,6 +2,7 @@
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from tests.support.small_arm import LIMIT
 from trunkline.model.arm.geometry import ChainGeometry
@@ -41,8 +42,9 @@ def hardening_stump() -> mujoco.MjModel:
         joint.range = [-0.3, 0.35]
         joint.margin = 0.02
         joint.solimp_limit = [0.5, 0.95, 0.05, 0.4, 3]
-        joint.axis = np.array(joint.axis) + rng.uniform(-0.1, 0.1, 3)
     for first, second in zip(spec.joints[::2], spec.joints[1::2], strict=True):
+        tilt = Rotation.from_rotvec(rng.uniform(-0.1, 0.1, 3))
+        first.axis, second.axis = tilt.apply([first.axis, second.axis])
         for number, sign in enumerate((1, -1), 1):
             name = f"{first.name}_{DIAGONAL}_{number}"
             diagonal = spec.add_tendon(name=name, stiffness=[0, 0, number * first.stiffness[0]])
