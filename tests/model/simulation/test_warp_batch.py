@@ -108,23 +108,29 @@ def test_a_missing_library_is_told(no_library):
         batch_of(small_model(), 2, rough=True)
 
 
-def test_a_model_whose_parts_may_touch_is_refused(warp):
+def touching():
     model = small_model()
     model.geom_contype[1:] = model.geom_conaffinity[1:] = 1
-    with pytest.raises(InputError, match="found a model of which parts may touch.*leave TRUNKLINE_BATCHES empty"):
-        batch_of(model, 2, rough=True)
+    return model
 
 
-def test_a_dead_time_that_takes_samples_as_they_are_is_refused(warp):
-    with pytest.raises(InputError, match="found a dead time without interpolation"):
-        batch_of(delayed(), 2, rough=True)
-
-
-def test_cables_cut_down_to_a_point_are_refused(warp):
+def cut_down():
     model = small_model()
     ArmModel(model).switch_off_cables()
-    with pytest.raises(InputError, match="found a cable cut down to a point"):
-        batch_of(model, 2, rough=True)
+    return model
+
+
+@pytest.mark.parametrize(
+    ("model_of", "message"),
+    [
+        (touching, "found a model of which parts may touch.*leave TRUNKLINE_BATCHES empty"),
+        (delayed, "found a dead time without interpolation"),
+        (cut_down, "found a cable cut down to a point"),
+    ],
+)
+def test_what_warp_cannot_move_is_refused(warp, model_of, message):
+    with pytest.raises(InputError, match=message):
+        batch_of(model_of(), 2, rough=True)
 
 
 def test_cables_that_rub_are_refused(library):
