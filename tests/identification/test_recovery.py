@@ -21,7 +21,7 @@ from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement
 
 def identified(trials, model, parameters, per_joint=(), optimizer=LeastSquares(5, 2, 6, 1e-3), rough=99):  # noqa: B008
     experiments = [prepare(trial, model, 437) for trial in trials]
-    bounds = {name: Bounds(*span) for name, span in parameters.items()}
+    bounds = {name: span if isinstance(span, Bounds) else Bounds(*span) for name, span in parameters.items()}
     fine = LeastSquares(0, 1, 30, 1e-9)
     method = Method(optimizer, CoarseSearch(1.0, 437, rough), Refinement(8, 1e-9), fine, 0.1, np.inf, seed=3)
     fit = Fit(markers_of(model), bounds, per_joint, "positions", WEIGHTS, method)
