@@ -157,14 +157,14 @@ def foxglove_transforms_apart(frame):
 
 def foxglove_poses(frame):
     poses = [pose(frame, body) for body in range(3)]
-    return [("/poses", {"timestamp": foxglove_time(frame), "frame_id": "mocap", "poses": poses})]
+    return [("/poses", {"timestamp": foxglove_time(STAMPS[frame]), "frame_id": "mocap", "poses": poses})]
 
 
 def foxglove_pose(frame):
     return [
         (
             f"/mocap/{BODIES[body]}",
-            {"timestamp": foxglove_time(frame), "frame_id": "mocap", "pose": pose(frame, body)},
+            {"timestamp": foxglove_time(STAMPS[frame]), "frame_id": "mocap", "pose": pose(frame, body)},
         )
         for body in expected_poses(frame)
     ]

@@ -27,6 +27,7 @@ def write(path, measured, unit="Millimeters", rows=("Name", "ID", "Parent"), rot
     """An export as Motive writes it, with a column of errors behind each body, and the bodies' own markers too."""
     scale = {"Meters": 1.0, "Millimeters": 1e3}[unit]
     parts = [("Rotation", axis) for axis in "XYZW"] if rotation == "Quaternion" else []
+    parts += [("Rotation", axis) for axis in rotation] if rotation not in ("Quaternion", "") else []
     parts += [("Position", axis) for axis in "XYZ"] + [("Mean Marker Error", "")] * (kind == "Rigid Body")
     extra = [("Rigid Body Marker", f"{name}:Marker1", "Position", axis) for name in BODIES for axis in "XYZ"]
     columns = [(kind, name, *part) for name in BODIES for part in parts] + (extra if kind == "Rigid Body" else [])
@@ -106,7 +107,6 @@ def spoil(path, old, new):
     ("old", "new", "message"),
     [
         ("Length Units,Millimeters", "Length Units,Feet", "length units: found Feet, expected one of meters"),
-        ("Rotation Type,Quaternion", "Rotation Type,XYZ", "rotation type: found XYZ, expected Quaternion"),
         ("Coordinate Space,Global", "Coordinate Space,Local", "coordinate space: found Local, expected Global"),
         ("Frame,Time", "Bild,Zeit", "found no row that begins with Frame"),
         ("0,0.000000,", "0,0.000000,abc", "row 9: could not convert string to float: 'abc"),
@@ -122,6 +122,12 @@ def test_what_is_not_understood_is_one_line_and_writes_nothing(tmp_path, capsys,
     assert message in error
     assert error.count("\n") == 1
     assert not list((tmp_path / "session").iterdir())
+
+
+def test_angles_for_quaternions_are_refused(tmp_path, capsys, measured):
+    path = write(tmp_path / "a.csv", measured, rotation="XYZ")
+    assert main(["--session", str(tmp_path / "session"), str(path)]) == 1
+    assert "rotation type: found XYZ, expected Quaternion" in capsys.readouterr().err
 
 
 def test_other_encodings_are_named(tmp_path, measured):
