@@ -4,44 +4,18 @@ import numpy as np
 import pytest
 
 from demo.plants.at_once import LOOK, STILL, WAITS, rested, tips_at_once
-from demo.plants.bench import COMMAND_RATE, LOOSE, Bench, PlantMotion
+from demo.plants.bench import COMMAND_RATE, LOOSE, Bench
 from demo.plants.cousin import Cousin
-from demo.rig import ROOT, Config
+from tests.demo.conftest import Watched
 from tests.demo.test_laboratory import PLANT
 from trunkline.model.arm.spiral import spiral_chain
-from trunkline.pipeline.config import load_config
 
 GRAVITY = np.array([[0.0, 6.0, -7.0], [5.0, 0.0, -8.0]])
-
-
-@pytest.fixture(scope="module")
-def lab():
-    return load_config(Config, "record", ROOT)
-
-
-class Watched:
-    """A plant that notes what it is asked. Its arms rest from the first look on that is named for them."""
-
-    tendons = 3
-
-    def __init__(self, rests):
-        self.rests, self.asked = np.array(rests), []
-
-    def run(self, label, bench, tracked):
-        moving = self.rests > len(self.asked)
-        self.asked.append((bench, tracked))
-        self.rests = self.rests[moving]
-        samples = bench.commands.shape[1] // bench.stride - bench.skipped
-        way = np.linspace(0, 1.5 * STILL, samples)[None, :, None] * moving[:, None, None] * np.array([1.0, 0, 0])
-        turns = np.broadcast_to(np.eye(3), (*way.shape[:2], 1, 3, 3))
-        return PlantMotion(way[:, :, None], turns, np.zeros((len(moving), samples, 3)))
-
-    def answers(self):
-        return {}
+SWAY = [1.5 * STILL, 0.0, 0.0]  # m: more than at rest
 
 
 def test_the_arm_hangs_first_and_is_then_sent_the_commands_as_they_are(lab):
-    plant, pulls = Watched([0, 0]), np.array([[0.04, -0.02, 0.001], [0.0, -0.5, 0.06]])
+    plant, pulls = Watched(SWAY, [0, 0]), np.array([[0.04, -0.02, 0.001], [0.0, -0.5, 0.06]])
     tips_at_once(plant, lab.arm, pulls, GRAVITY)
     ((bench, tracked),) = plant.asked
     assert bench.hanging
@@ -54,7 +28,7 @@ def test_the_arm_hangs_first_and_is_then_sent_the_commands_as_they_are(lab):
 
 
 def test_an_arm_that_still_moves_is_waited_for_and_then_has_no_tip(lab):
-    plant = Watched([0, 1, 2])
+    plant = Watched(SWAY, [0, 1, 2])
     tips = tips_at_once(plant, lab.arm, np.full((3, 3), 0.01), np.tile([0.0, 0.0, -9.81], (3, 1)))
     assert [(len(bench.commands), bench.commands.shape[1] / COMMAND_RATE) for bench, _ in plant.asked] == [
         (3, WAITS[0]), (2, WAITS[1]),

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 from tests.support.folders import demo_with
-from trunkline.recordings.cleaning.checks import TrialLimits
+from tests.support.sessions import LIMITS
 from trunkline.recordings.cleaning.clock_offset import align_clocks
 from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.filtering.filter import Filter, filter_raw_trial
 from trunkline.recordings.session.session import read_session
 
 TRIALS = ("curl_1_040", "curl_2_3_060", "motion_15_20_m2", "motion_5_40_1")
-LIMITS = TrialLimits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
 FILTER = Filter(120.0, 20.0, 4, 0.06, 8.0, "onset")
 
 

@@ -4,37 +4,13 @@ import numpy as np
 import pytest
 
 from demo.plants.at_once import tips_at_once
-from demo.plants.bench import LOOSE, PlantMotion
+from demo.plants.bench import LOOSE
 from demo.plants.choice import plant_of
 from demo.plants.slowly import LOOK, SWINGING, Slow, rested, slow_tips
-from demo.rig import ROOT, Config
+from tests.demo.conftest import Watched
 from trunkline.frames import STANDARD_GRAVITY
-from trunkline.pipeline.config import load_config
 
 SLOW = Slow(0.2, 40.0, 0.1, 1.3, 0.1, 0.1, 0.1)
-
-
-@pytest.fixture(scope="module")
-def lab():
-    return load_config(Config, "record", ROOT)
-
-
-class Watched:
-    """A plant that only notes what it is asked; its last unit's centre is `way`, m from the start to the end (3,)."""
-
-    tendons = 3
-
-    def __init__(self, way=(0.0, 0.0, 0.0)):
-        self.way, self.asked = np.array(way), []
-
-    def run(self, label, bench, tracked):
-        self.asked.append((bench, tracked))
-        count = len(bench.commands)
-        samples = bench.commands.shape[1] // bench.stride - bench.skipped
-        ways = np.linspace(0, 1, samples)[:, None] * self.way
-        positions = np.broadcast_to(ways[:, None], (count, samples, 1, 3))
-        turns = np.broadcast_to(np.eye(3), (*positions.shape[:-1], 3, 3))
-        return PlantMotion(positions, turns, np.zeros((count, samples, 3)))
 
 
 def slowly(plant, lab, pulls, back):

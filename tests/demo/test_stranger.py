@@ -1,7 +1,6 @@
 """The stranger's engine: against MuJoCo, energy and closed forms; each of its effects for itself; its motors."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -23,24 +22,18 @@ from demo.plants.stranger_kernel import (
     wind,
     work_for,
 )
-from demo.record import Config
+from tests.demo.test_laboratory import ALL
 from tests.support.stranger_links import add_link
 from trunkline.model.arm.spiral import spiral_chain
-from trunkline.pipeline.config import load_config
 
-DEMO = Path(__file__).parents[2] / "demo"
 GRAVITY = np.array([1.0, -2.0, -9.0])
 UNITS, PER = 4, 3
 
 
 @pytest.fixture(scope="module")
-def settings(tmp_path_factory) -> StrangerSettings:
-    root = tmp_path_factory.mktemp("lab")
-    (root / "conf").symlink_to(DEMO / "conf")
-    (root / "params.yaml").write_text("record: {seed: 7, plant: stranger, experiments: all}\n")
-    chosen = load_config(Config, "record", root).plant
-    assert isinstance(chosen, StrangerSettings)
-    return chosen
+def settings() -> StrangerSettings:
+    assert isinstance(ALL.plant, StrangerSettings)
+    return ALL.plant
 
 
 def arm(settings: StrangerSettings, units: int = UNITS, **changes) -> Stranger:

@@ -31,14 +31,13 @@ def made(**motors) -> mujoco.MjModel:
     return arm(tendons=FOUR).build(replace(ACTUATION, **motors), SOLVER, Path(".")).spec.compile()
 
 
-def path_of(model: mujoco.MjModel, pulls: np.ndarray, load: float = 0.0, gravity: np.ndarray = DOWN) -> Experiment:
-    """A trial whose every frame is at rest with these pulls (T, 4), m."""
-    frames, hinges = len(pulls), model.nq
+def path_of(model: mujoco.MjModel, pulls: np.ndarray, kind: str = "static_path", **more) -> Experiment:
+    """A trial whose every frame is at rest with these pulls (T, K), m."""
+    frames, nothing = len(pulls), np.zeros(ArmModel(model).hinge_count)
     return Experiment(
-        name="path", kind="static_path", split="identify", gravity=gravity, start=np.zeros(hinges),
-        velocity=np.zeros(hinges), lead=0.0, controls=model.tendon_length0 - pulls,
-        positions=np.zeros((frames, 1, 3)), measured=np.ones((frames, 1), dtype=bool), frame_step=0.0,
-        fit=PoseFit(np.zeros(hinges), np.zeros(1), 0, True), load=load,
+        name="path", kind=kind, split="identify", gravity=DOWN, start=nothing, velocity=nothing, lead=0.0,
+        controls=model.tendon_length0[ArmModel(model).cables] - pulls, positions=np.zeros((frames, 1, 3)),
+        measured=np.ones((frames, 1), dtype=bool), frame_step=0.0, fit=PoseFit(nothing, np.zeros(1), 0, True), **more,
     )  # fmt: skip
 
 
@@ -54,7 +53,7 @@ PULLS = np.random.default_rng(3).uniform(-0.002, 0.006, (5, 4))
 @pytest.mark.parametrize("load", [0.0, 0.1])
 def test_it_is_where_mujoco_settles(load):
     model = made()
-    places = tips(model, path_of(model, PULLS, load))
+    places = tips(model, path_of(model, PULLS, load=load))
     heavy = arm(tendons=FOUR, tip_load=load).build(ACTUATION, SOLVER, Path(".")).spec.compile()
     heavy.actuator_gainprm[:], heavy.actuator_biasprm[:] = model.actuator_gainprm, model.actuator_biasprm
     settled = settle(heavy, model.tendon_length0 - PULLS, DOWN)
@@ -107,26 +106,15 @@ def rubbing() -> mujoco.MjModel:
     return spec.compile()
 
 
-def pull_from(model: mujoco.MjModel, pulls: np.ndarray, approach: int) -> Experiment:
-    """Motors hold `pulls` (3,), m; `approach` is the side from which they brought the arm there."""
-    hinges = ArmModel(model).hinge_count
-    return Experiment(
-        name="pull", kind="static_pull", split="identify", gravity=DOWN, start=np.zeros(hinges),
-        velocity=np.zeros(hinges), lead=0.0, controls=(model.tendon_length0[ArmModel(model).cables] - pulls)[None],
-        positions=np.zeros((1, 1, 3)), measured=np.ones((1, 1), dtype=bool), frame_step=0.0,
-        fit=PoseFit(np.zeros(hinges), np.zeros(1), 0, True), approach=approach,
-    )  # fmt: skip
-
-
 def test_cables_rub_to_the_side_from_which_the_arm_came():
     """Drawn in, it bends less than in mid-band, and more where it was let come back; each as the statics have it."""
-    model, pulls = rubbing(), np.array([0.01, -0.3, -0.3])
+    model, pulls = rubbing(), np.array([[0.01, -0.3, -0.3]])
     fields = candidate_fields(model, {"capstan_friction": np.array([0.2])})
     sites = ArmModel(model).marker_sites(markers_of(model))
     chain = read_chain(model)
     bends = []
     for approach in (1, 0, -1):
-        experiment = pull_from(model, pulls, approach)
+        experiment = path_of(model, pulls, "static_pull", approach=approach)
         shape = shapes_at_rest(model, fields, [experiment], sites, None)
         followed = actuated(chain._replace(capstan=0.2 * approach), experiment.controls, DOWN)
         assert followed.converged.all()

@@ -91,9 +91,8 @@ def test_motions_pass_and_show_exchanged_tendons(model, seed):
     check_trials([replace(trial, **late)], model)
     message = f"tendons: trial motion_{seed}_0_identify: found the path of 'tendon_.' .* mm longer than commanded"
     for columns in ([1, 2, 0], [1, 0, 2], [2, 1, 0]):
-        with pytest.raises(InputError, match=message) as caught:
+        with pytest.raises(InputError, match=message):
             check_trials([with_columns(trial, columns)], model)
-        assert "\n" not in str(caught.value)
 
 
 @pytest.fixture(scope="module")
@@ -118,7 +117,6 @@ def test_pulls_that_are_commanded_too_small_show(model, driven, factor):
         with pytest.raises(InputError, match=message) as caught:
             check_trials([with_scale(trial, factor)], model)
         assert "expected 0.4 to 1.5 times: are signs reversed, are commands in another unit than m" in str(caught.value)
-        assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("factor", [-1, 4, 10, 100])
@@ -160,9 +158,8 @@ def test_weak_motors_and_soft_cables_are_let_alone(model):
 
 def test_what_is_said_names_key_trial_and_both_tendons(model, curls):
     text = "tendons: trial curl_40_0_identify: found 'tendon_2' wound by 40 mm .* to the side of 'tendon_1', expected"
-    with pytest.raises(InputError, match=text) as caught:
+    with pytest.raises(InputError, match=text):
         check_trials([with_columns(curls[0], [1, 0, 2])], model)
-    assert "\n" not in str(caught.value)
 
 
 def test_reversed_signs_show_where_the_other_tendons_are_let_out(model, curls):

@@ -62,31 +62,6 @@ def valleys_of(problem: Valleys, result) -> set[int]:
     return set(problem._valley(np.array([result.vector, *result.others]))[0].tolist())
 
 
-class Progress:
-    """Counts steps against a total that follows what is expected."""
-
-    def __init__(self, total: int) -> None:
-        self.total, self.steps = total, 0
-
-    def report(self, best: float) -> None:
-        self.steps += 1
-        assert self.steps <= self.total
-
-    def expect(self, more: int) -> None:
-        self.total += more
-
-
-@pytest.mark.parametrize(
-    "optimizer",
-    [LeastSquares(12, 3, PATIENT, 1e-6), LeastSquares(12, 1, SHORT, 1e-6), DifferentialEvolution(12, 0, 60, 1e-2)],
-    ids=lambda o: o.method,
-)
-def test_progress_never_counts_beyond_its_total_and_ends_at_it(optimizer):
-    progress = Progress(optimizer.steps())
-    search(Valleys(2.0, 2.0, 9.0), optimizer, 0, progress.report, progress.expect)
-    assert progress.steps == progress.total > 0
-
-
 AGREEMENTS = [
     ((2.0, 2.0, 2.0), 3, True),
     ((2.0, 2.0, 9.0), 2, True),

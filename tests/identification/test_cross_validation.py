@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from tests.support.matched_plant import markers_of, small_model, tilt
+from tests.support.noisy_trials import WEIGHTS
 from trunkline.identification.diagnostics.cross_validation import ERRORS, cross_validate
 from trunkline.identification.evaluation.evaluation import replay, scores
 from trunkline.identification.fit.fit import CoarseSearch, Fit, Method, Refinement
@@ -13,9 +14,7 @@ from trunkline.identification.fit.optimizers import LeastSquares
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields, set_fields
 from trunkline.identification.simulate.experiment import prepare
-from trunkline.identification.simulate.loss import LossWeights
 
-WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 METHOD = Method(
     LeastSquares(0, 1, 3, 1e-2), CoarseSearch(1.0, 1, 99), Refinement(4, 1e-4),
     LeastSquares(0, 1, 3, 1e-2), 0.2, np.inf, seed=1,

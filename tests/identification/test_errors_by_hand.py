@@ -5,11 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.support.noisy_trials import WEIGHTS
 from tests.support.swings import LIKE, STEP, STRAIGHT, experiment
 from trunkline.identification.evaluation.evaluation import _mean, errors_of
-from trunkline.identification.simulate.loss import LossWeights
-
-WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 
 
 def still(frames: int) -> np.ndarray:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.support.matched_plant import FRAME, curl, markers_of, release, small_model, tilt
+from tests.support.noisy_trials import WEIGHTS, with_values
 from tests.support.small_arm import small_spec
 from tests.support.swings import FRAMES, LIKE, STEP, TIME, TIP, experiment, swing
 from trunkline.identification.evaluation.evaluation import (
@@ -15,24 +16,10 @@ from trunkline.identification.evaluation.evaluation import (
     replay,
     scores,
 )
-from trunkline.identification.parameters.parameters import candidate_fields, set_fields
 from trunkline.identification.simulate.experiment import own_starts, prepare
-from trunkline.identification.simulate.loss import LossWeights
 from trunkline.model.arm.guide_holes import GuideHoles, add_holes
 from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement, add_elements
 from trunkline.model.arm_model import ArmModel
-
-WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
-
-
-def test_only_trials_in_motion_have_a_velocity():
-    model = small_model(4)
-    experiments = [prepare(trial, model, 20) for trial in (release(model, 0.2, frames=30), tilt(model, 30))]
-    for order in (experiments, experiments[::-1]):
-        table = scores(replay(model, order, markers_of(model)), order, "positions", WEIGHTS)["identify"]
-        kinds = table["by_experiment"]
-        assert "e_velocity_mm_s" not in kinds["static_tilt"]
-        assert table["e_velocity_mm_s"] == kinds["release"]["e_velocity_mm_s"]
 
 
 def test_half_the_step_moves_little_with_every_option_on():
@@ -66,8 +53,8 @@ def test_trials_that_a_model_does_not_survive_are_counted():
 
 
 def test_every_model_starts_where_its_own_geometry_puts_the_arm():
-    cad, bent = small_model(4), small_model(4)
-    set_fields(bent, candidate_fields(cad, {"joint_place": np.array([0.5])}))
+    cad = small_model(4)
+    bent = with_values(cad, {"joint_place": 0.5})
     trials = [release(bent, 0.2, frames=20), tilt(bent, 30)]
     experiments = [prepare(trial, bent, 20) for trial in trials]
     started = own_starts(experiments, trials, bent, cad)
@@ -211,9 +198,6 @@ def test_where_a_simulation_is_lost_it_is_the_arm_s_length_away(bad):
 
 
 def test_an_arm_that_hangs_still_has_no_period():
-    model = small_model(4)
-    experiments = [prepare(release(model, 0.2, frames=60), model, 60)]
-    replayed = replay(model, experiments, markers_of(model))
-    assert "e_swing_period_pct" in scores(replayed, experiments)["identify"]
-    replayed.positions[0][:] = replayed.positions[0][:1]
-    assert "e_swing_period_pct" not in scores(replayed, experiments)["identify"]
+    still = np.repeat(swing()[:1], FRAMES, axis=0)
+    assert "e_swing_period_pct" not in errors_of(still, experiment(swing()), LIKE, None, None)
+    assert "e_swing_period_pct" in errors_of(swing(), experiment(swing()), LIKE, None, None)

@@ -7,17 +7,14 @@ import pytest
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from tests.support.matched_plant import curl, markers_of, small_model
-from trunkline.identification.fit.fit import CoarseSearch, Fit, Method, Refinement
-from trunkline.identification.fit.identify import identify
+from tests.identification.test_recovery import identified
+from tests.support.matched_plant import curl, small_model
 from trunkline.identification.fit.intervals import bootstrap, certainty, weakest_in_words
 from trunkline.identification.fit.linearisation import Linearisation
 from trunkline.identification.fit.optimizers import LeastSquares
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.parameters.parameters import PARAMETERS
 from trunkline.identification.results.parameter_table import parameter_table, undetermined
-from trunkline.identification.simulate.experiment import prepare
-from trunkline.identification.simulate.loss import LossWeights
 from trunkline.pipeline.stage import write_json
 
 SHARED, OWN = 0.6, 0.3  # standard deviations of what a cluster's residuals have in common, and of each
@@ -53,7 +50,10 @@ def test_errors_are_those_of_fits_without_each_trial():
         others = [t for t in range(7) if t != left_out]
         fits.append(np.linalg.lstsq(designs[others].reshape(-1, 2), target[others].ravel(), rcond=None)[0])
     expected = np.sqrt(6 / 7 * ((fits - np.mean(fits, axis=0)) ** 2).sum(axis=0))
-    np.testing.assert_allclose(certainty(linear).standard_error, expected, rtol=1e-9)
+    result = certainty(linear)
+    np.testing.assert_allclose(result.standard_error, expected, rtol=1e-9)
+    columns = designs.reshape(-1, 2)
+    assert result.condition == pytest.approx(np.linalg.cond(columns / np.linalg.norm(columns, axis=0)))
 
 
 def test_few_trials_that_tell_unequally_much_do_not_promise_too_much():
@@ -68,15 +68,6 @@ def test_few_trials_that_tell_unequally_much_do_not_promise_too_much():
         estimates.append(estimate)
         errors.append(result.standard_error[0])
     assert 0.85 < np.mean(errors) / np.std(estimates) < 1.4
-
-
-def test_what_one_trial_alone_determines_has_no_interval():
-    designs = [np.array([[1.0, 0.0], [0.5, 0.0]])] * 3 + [np.array([[1.0, 0.0], [0.0, 1.0]])]
-    residuals = [np.array([0.1, -0.2]), np.array([-0.1, 0.2]), np.array([0.2, -0.4]), np.array([-0.2, 0.0])]
-    linear = Linearisation(np.zeros(2), residuals, designs)
-    for width in (certainty(linear).standard_error, np.diff(bootstrap(linear, seed=1), axis=0)[0]):
-        assert np.isfinite(width[0])
-        assert width[1] == np.inf
 
 
 def test_the_bootstrap_agrees_with_the_exact_errors():
@@ -97,19 +88,6 @@ def test_the_bootstrap_of_equal_designs_is_students_interval_of_a_mean(trials):
     assert (high + low) / 2 == pytest.approx(3.0, abs=0.05 * expected)
 
 
-def test_independent_residuals_of_a_straight_line():
-    """Slope and intercept with clusters of one residual: the textbook's errors, nearly."""
-    rng = np.random.default_rng(0)
-    x = np.linspace(-1, 1, 400)
-    design = np.stack([x, np.ones_like(x)], axis=1)
-    residual = rng.normal(0, 0.5, len(x))
-    residual -= design @ np.linalg.lstsq(design, residual, rcond=None)[0]
-    result = certainty(Linearisation(np.zeros(2), list(residual[:, None]), list(design[:, None])))
-    expected = 0.5 * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
-    np.testing.assert_allclose(result.standard_error, expected, rtol=0.12)
-    assert result.condition == pytest.approx(1, abs=0.01)
-
-
 def test_the_weakest_direction_is_named():
     assert weakest_in_words(["a", "b", "c"], np.array([0.7, -0.7, 0.1])) == "a and b trade off"
     assert weakest_in_words(["a", "b"], np.array([0.05, 0.99])) == "b is determined least"
@@ -120,15 +98,7 @@ def test_a_force_range_that_no_pull_reaches_is_undetermined():
     names = ("kp", "force_range")
     bounds = {name: Bounds(0.8 * PARAMETERS[name].read(model), 2 * PARAMETERS[name].read(model)) for name in names}
     trials = [curl(model, level, frames=60, noise=3e-4, seed=k, tendon=k) for k, level in enumerate((4, 6, 8))]
-    experiments = [prepare(trial, model, 437) for trial in trials]
-    method = Method(
-        LeastSquares(0, 1, 4, 1e-3), CoarseSearch(1.0, 437, 99), Refinement(4, 1e-6),
-        LeastSquares(0, 1, 1, 1.0), 0.1, np.inf, seed=1,
-    )
-    weights = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
-    result = identify(
-        "test", model, experiments, Fit(markers_of(model), bounds, (), "positions", weights, method)
-    )
+    result = identified(trials, model, bounds, optimizer=LeastSquares(0, 1, 4, 1e-3))
     assert result.certainty.standard_error[1] == result.certainty.half_width[1] == np.inf
     assert undetermined(result, bounds) == ["force_range"]
     rows = parameter_table(result, bounds)["parameters"]
@@ -142,17 +112,9 @@ def test_a_force_range_that_no_pull_reaches_is_undetermined():
 
 def test_factors_that_one_trial_alone_determines_have_no_width(tmp_path):
     model = small_model(3)
-    experiments = [prepare(curl(model, 6, frames=5), model, 5)]
     stiffness = PARAMETERS["stiffness"].read(model)
     bounds = {"stiffness": Bounds(0.5 * stiffness, 2 * stiffness)}
-    method = Method(
-        LeastSquares(0, 1, 1, 1.0), CoarseSearch(1.0, 5, 1), Refinement(1, 1.0),
-        LeastSquares(0, 1, 1, 1.0), 0.1, np.inf, seed=1,
-    )
-    weights = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
-    result = identify(
-        "test", model, experiments, Fit(markers_of(model), bounds, ("stiffness",), "positions", weights, method)
-    )
+    result = identified([curl(model, 6, frames=5)], model, bounds, ("stiffness",), LeastSquares(0, 1, 1, 1.0))
     write_json(tmp_path / "parameters.json", parameter_table(result, bounds))
     table = json.loads((tmp_path / "parameters.json").read_text())
     assert table["per_joint"]["stiffness"]["half_width_95_given_model"] == [None] * 3

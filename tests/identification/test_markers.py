@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.identification.test_recovery import changed, identified
+from tests.identification.test_recovery import identified
 from tests.support.matched_plant import curl, markers_of, release, small_model, tilt
+from tests.support.noisy_trials import with_values
 from tests.support.small_arm import small_spec
-from trunkline.identification.parameters.parameters import candidate_fields, set_fields
 from trunkline.identification.simulate.experiment import prepare
 from trunkline.identification.simulate.markers import with_measured_markers
 
@@ -66,22 +66,19 @@ def test_only_trials_to_identify_from_tell_of_markers(model):
 
 def test_a_tilted_mount_shows_in_shapes_at_rest(model):
     true = {"mount_tilt_x": 0.02, "mount_tilt_y": -0.03}
-    result = identified(
-        [tilt(changed(model, **true), angle) for angle in (0, 45, 90)], model, dict.fromkeys(true, (-0.1, 0.1))
-    )
+    truth = with_values(model, true)
+    result = identified([tilt(truth, angle) for angle in (0, 45, 90)], model, dict.fromkeys(true, (-0.1, 0.1)))
     for name, value in true.items():
         assert result.values[name] == pytest.approx(value, abs=1e-4), name
 
 
 def test_a_twisted_mount_shows_in_curls(model):
-    truth = changed(model, mount_twist=0.05)
+    truth = with_values(model, {"mount_twist": 0.05})
     trials = [curl(truth, level, frames=40, tendon=tendon) for tendon, level in enumerate((8, 6, 7))]
     result = identified(trials, model, {"mount_twist": (-0.1, 0.1)})
     assert result.values["mount_twist"] == pytest.approx(0.05, abs=1e-3)
 
 
 def test_a_mount_turned_about_one_axis_stays_turned_about_the_others(model):
-    once = changed(model, mount_tilt_x=0.03)
-    fields = candidate_fields(once, {"mount_twist": np.array([0.01])})
-    set_fields(once, fields)
-    np.testing.assert_allclose(once.body("base").quat[1:], [0.015, 0, 0.005], atol=1e-5)
+    twice = with_values(with_values(model, {"mount_tilt_x": 0.03}), {"mount_twist": 0.01})
+    np.testing.assert_allclose(twice.body("base").quat[1:], [0.015, 0, 0.005], atol=1e-5)

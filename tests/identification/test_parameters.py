@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from tests.support.bent_chain import HINGES, cantilever
 from tests.support.small_arm import small_spec
 from trunkline.errors import InputError
 from trunkline.identification.fit.setup import check_parameters
@@ -47,30 +48,19 @@ ELEMENTS = Joints([MaxwellElement(0.3, 0.5), MaxwellElement(0.2, 2.0), MaxwellEl
 
 def full_spec() -> mujoco.MjSpec:
     """A small arm that has every part that a parameter may belong to."""
-    spec = small_spec(dead_time=0.02, rate_limit=0.1, backlash=0.001)
+    return with_parts(small_spec(dead_time=0.02, rate_limit=0.1, backlash=0.001), [3, 5])
+
+
+def with_parts(spec: mujoco.MjSpec, sections: list[int]) -> mujoco.MjSpec:
+    """The arm with all but its motors' parts; sections: units of each."""
     add_elements(spec, ELEMENTS, 1e-5)
     add_holes(spec, GuideHoles(0.1, 2))
-    spec.add_numeric(name=WINDING, data=[1.0], size=1)
-    spec.add_numeric(name=PRELOAD, data=[0.0, 0.001, 0.0], size=3)
-    spec.add_numeric(name=SECTIONS, data=[3, 5], size=2)
+    for number, values in ((WINDING, [1.0]), (PRELOAD, [0.0, 0.001, 0.0]), (SECTIONS, sections)):
+        spec.add_numeric(name=number, data=values, size=len(values))
     return spec
 
 
-X, Y = ("x", (1, 0, 0)), ("y", (0, 1, 0))
-
-
-def cantilever_spec(units: int, stiffness: float, length: float, hinges=(X, Y)) -> mujoco.MjSpec:
-    """A chain of equal units, two hinges each at its upper end."""
-    spec = mujoco.MjSpec()
-    body = spec.worldbody.add_body(name="base")
-    for unit in range(units):
-        body = body.add_body(name=f"unit_{unit:02d}", pos=[0, 0, -length if unit else 0.0])
-        body.explicitinertial, body.mass, body.inertia = True, 1e-3, [1e-6] * 3
-        for axis, direction in hinges:
-            hinge = mujoco.mjtJoint.mjJNT_HINGE
-            body.add_joint(name=f"{body.name}_{axis}", type=hinge, axis=direction, stiffness=[stiffness, 0, 0])
-    body.add_site(name="tip", pos=[0, 0, -length])
-    return spec
+X, Y = HINGES
 
 
 def start_model() -> mujoco.MjModel:
@@ -105,7 +95,7 @@ def test_what_is_written_is_read(name):
 def test_an_arm_is_bent_about_an_axis_however_it_is_drawn(hinges, about):
     bent = {}
     for drawn in ((X, Y), hinges):
-        model = model_with({f"rest_bend_{about}": 0.1}, model=cantilever_spec(5, 1.0, 0.1, drawn).compile())
+        model = model_with({f"rest_bend_{about}": 0.1}, model=cantilever(5, 1.0, 0.1, hinges=drawn))
         data = mujoco.MjData(model)
         data.qpos[:] = model.qpos_spring
         mujoco.mj_forward(model, data)
@@ -134,8 +124,7 @@ def test_scaling_keeps_the_arm_s_proportions():
 def test_an_arm_that_bends_in_the_middle_of_its_units_is_nearer_to_a_rod(place, error):
     """Sag of a cantilever under a small force F at its end, against F L³ / (3 E I) of a rod; K = E I n / L."""
     units, stiffness, length, force = 20, 5.0, 0.4, 0.01
-    spec = cantilever_spec(units, stiffness, length / units)
-    model = model_with({"joint_place": place}, model=spec.compile())
+    model = model_with({"joint_place": place}, model=cantilever(units, stiffness, length / units))
     data = mujoco.MjData(model)
     model.opt.gravity[:] = 0
     tip = model.site("tip")
@@ -218,7 +207,7 @@ def test_a_parameter_of_what_the_arm_lacks_is_refused(name, message):
 def test_a_ratio_of_a_motor_that_the_arm_lacks_is_refused():
     config = SimpleNamespace(parameters=["kp_ratio_3"])
     with pytest.raises(InputError, match="kp_ratio_3: found it for an arm without motor 3"):
-        check_parameters("identify_control", config, cantilever_spec(2, 1.0, 0.1).compile())
+        check_parameters("identify_control", config, cantilever(2, 1.0, 0.1))
 
 
 def test_one_name_stands_for_all_tendons():
@@ -345,7 +334,10 @@ def test_a_longer_friction_time_lets_a_hook_creep_straight_sooner():
 @pytest.mark.parametrize("name", OWN)
 def test_every_parameter_survives_saving(name):
     """Also one that is declared tomorrow: what it writes has a place in MJCF, alone or beside others."""
-    spec = full_spec()
+    assert_survives(full_spec(), name)
+
+
+def assert_survives(spec: mujoco.MjSpec, name: str) -> None:
     model = spec.compile()
     value = 1.3 * parameter_named(name).read(model) or 0.02
     set_fields(model, candidate_fields(model, {name: np.array([value])}))

@@ -10,9 +10,10 @@ import pytest
 
 from tests.identification.test_stage import metrics_of, settings
 from tests.support.matched_plant import begin_project, tilt
+from tests.support.noisy_trials import with_values
 from tests.support.small_arm import small_spec
 from trunkline.errors import InputError
-from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields, set_fields
+from trunkline.identification.parameters.parameters import PARAMETERS
 from trunkline.identification.parameters.per_session import make_room, model_in, per_session_names
 from trunkline.pipeline.identify import CAD_MODEL, run
 from trunkline.recordings.trials.trial import write_trials
@@ -25,9 +26,7 @@ NAMES = ("mount_tilt_x", "mount_tilt_y")
 
 def mounted(truth: mujoco.MjModel, mount: tuple[float, float]) -> mujoco.MjModel:
     """The arm on a mount that leans by so much about x and y, rad."""
-    arm = truth.__copy__()
-    set_fields(arm, candidate_fields(truth, dict(zip(NAMES, np.array(mount)[:, None], strict=True))))
-    return arm
+    return with_values(truth, dict(zip(NAMES, mount, strict=True)))
 
 
 def session_of(truth: mujoco.MjModel, session: str, seed: int) -> list:
@@ -47,8 +46,7 @@ def identified(tmp_path_factory):
         patch.chdir(tmp_path_factory.mktemp("sessions"))
         model = begin_project(Path("."), 6)
         middle = model.jnt_stiffness[0]
-        truth = model.__copy__()
-        set_fields(truth, candidate_fields(model, {"stiffness": np.array([STIFFNESS * middle])}))
+        truth = with_values(model, {"stiffness": STIFFNESS * middle})
         days = {session: session_of(truth, session, seed) for session, seed in (("monday", 0), ("friday", 100))}
         alone = {s: [replace(t, session="") for t in trials] for s, trials in days.items()}
         cases = alone | {"together": [*days["monday"], *days["friday"]],
@@ -107,9 +105,7 @@ def test_what_a_session_has_for_itself_may_be_its_shape_at_rest():
     spec = small_spec(6)
     names = per_session_names(["stiffness", "rest_bend_x", "mount_tilt_x"], ["rest_bend_x"], ["friday"])
     make_room(spec, names)
-    model = spec.compile()
-    values = {"rest_bend_x": np.array([0.01]), "rest_bend_x@friday": np.array([0.03])}
-    set_fields(model, candidate_fields(model, values))
+    model = with_values(spec.compile(), {"rest_bend_x": 0.01, "rest_bend_x@friday": 0.03})
     read = PARAMETERS["rest_bend_x"].read
     assert names == {"rest_bend_x@friday": "rest_bend_x"}
     assert (read(model), read(model_in("friday", model))) == pytest.approx((0.01, 0.03))

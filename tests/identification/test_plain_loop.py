@@ -4,13 +4,13 @@ import mujoco
 import numpy as np
 
 from tests.support.matched_plant import markers_of, release, small_model
+from tests.support.noisy_trials import WEIGHTS, with_values
 from trunkline.identification.fit.problem import Bounds, Problem
-from trunkline.identification.parameters.parameters import candidate_fields, set_fields
+from trunkline.identification.parameters.parameters import set_fields
 from trunkline.identification.simulate.experiment import prepare
-from trunkline.identification.simulate.loss import LOSSES, LossWeights, loss_of
+from trunkline.identification.simulate.loss import LOSSES, loss_of
 
 TRUTH = np.log([0.09, 0.5])
-WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 
 
 def plain_loss(problem, model, experiments, vector):
@@ -38,8 +38,7 @@ def plain_loss(problem, model, experiments, vector):
 def test_a_plain_loop_has_the_same_losses():
     model = small_model(units=4)
     bounds = {"damping": Bounds(0.01, 1.0), "tendon_friction": Bounds(0.05, 3.0)}
-    truth = model.__copy__()
-    set_fields(truth, candidate_fields(model, dict(zip(bounds, np.exp(TRUTH)[:, None], strict=True))))
+    truth = with_values(model, dict(zip(bounds, np.exp(TRUTH), strict=True)))
     experiments = [prepare(release(truth, bend, frames=20), model, 20) for bend in (0.3, -0.25)]
     problem = Problem(model, experiments, markers_of(model), bounds, "positions", WEIGHTS)
     vectors = TRUTH + np.array([[0.0, 0.0], [0.5, -0.5]])

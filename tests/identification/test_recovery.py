@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.support.matched_plant import curl, markers_of, motion, release, small_model, tilt, with_load
+from tests.support.noisy_trials import WEIGHTS, with_values
 from trunkline.identification.fit import identify as identifying
 from trunkline.identification.fit.fit import CoarseSearch, Fit, Method, Refinement
 from trunkline.identification.fit.identify import identify
@@ -15,31 +16,22 @@ from trunkline.identification.fit.problem import DIVERGED_LOSS, Bounds, Problem
 from trunkline.identification.fit.search import search
 from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields, parameter_named, set_fields
 from trunkline.identification.simulate.experiment import prepare
-from trunkline.identification.simulate.loss import LossWeights
 from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement
-
-WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 
 
 def identified(trials, model, parameters, per_joint=(), optimizer=LeastSquares(5, 2, 6, 1e-3), rough=99):  # noqa: B008
     experiments = [prepare(trial, model, 437) for trial in trials]
-    bounds = {name: Bounds(*span) for name, span in parameters.items()}
+    bounds = {name: span if isinstance(span, Bounds) else Bounds(*span) for name, span in parameters.items()}
     fine = LeastSquares(0, 1, 30, 1e-9)
     method = Method(optimizer, CoarseSearch(1.0, 437, rough), Refinement(8, 1e-9), fine, 0.1, np.inf, seed=3)
     fit = Fit(markers_of(model), bounds, per_joint, "positions", WEIGHTS, method)
     return identify("test", model, experiments, fit)
 
 
-def changed(model, **values):
-    copy = model.__copy__()
-    set_fields(copy, candidate_fields(model, {k: np.array([v]) for k, v in values.items()}))
-    return copy
-
-
 def test_stiffness_and_hardening_come_back():
     model = small_model()
     true = {"stiffness": 0.6 * PARAMETERS["stiffness"].read(model), "hardening": 1.5}
-    truth = changed(model, **true)
+    truth = with_values(model, true)
     trials = [tilt(truth, 30), tilt(truth, 60), tilt(truth, 90), tilt(truth, 45, "validate")]
     result = identified(trials, model, {"stiffness": (0.2, 20.0), "hardening": (0.02, 20.0)})
     assert result.values["stiffness"] == pytest.approx(true["stiffness"], rel=0.02)
@@ -63,7 +55,7 @@ def test_a_maxwell_branch_comes_back():
     """From an arm that was held for long before it was let go: its branches had given way."""
     model = small_model(joints=Joints([MaxwellElement(0.3, 0.5)]))
     true = {"damping": 1.5 * PARAMETERS["damping"].read(model), "relaxation": 0.6, "relaxation_time": 0.2}
-    truth = changed(model, **true)
+    truth = with_values(model, true)
     trials = [release(truth, bend, frames=100) for bend in (0.3, -0.25, 0.15)]
     ranges = {"damping": (0.005, 1.0), "relaxation": (0.05, 3.0), "relaxation_time": (0.02, 3.0)}
     result = identified(trials, model, ranges)
@@ -75,7 +67,7 @@ def test_a_maxwell_branch_comes_back():
 def test_a_slider_comes_back():
     model = small_model(joints=Joints(sliders=[JenkinsElement(0.2, 0.05)]))
     true = {"hysteresis": 0.5, "yield_bend": 0.03}
-    truth = changed(model, **true)
+    truth = with_values(model, true)
     trials = [release(truth, bend, frames=100) for bend in (0.3, -0.25, 0.15)]
     result = identified(trials, model, {"hysteresis": (0.05, 3.0), "yield_bend": (0.005, 0.2)})
     for name, value in true.items():
@@ -85,7 +77,7 @@ def test_a_slider_comes_back():
 def test_damping_and_tendon_friction_and_its_creep_come_back():
     model = small_model()
     true = {"damping": 2.5 * PARAMETERS["damping"].read(model), "tendon_friction": 0.6, "friction_time": 0.03}
-    truth = changed(model, **true)
+    truth = with_values(model, true)
     trials = [release(truth, 0.3, frames=100), release(truth, -0.25, frames=100)]
     ranges = {"damping": (0.005, 1.0), "tendon_friction": (0.02, 3.0), "friction_time": (0.003, 0.3)}
     result = identified(trials, model, ranges)
@@ -97,7 +89,7 @@ def test_the_winches_rate_limit_and_backlash_come_back():
     """From curls faster than the limit, and from motions that turn round."""
     model = small_model(4, rate_limit=0.5, backlash=1e-3)
     true = {"rate_limit": 0.12, "backlash": 4e-3}
-    truth = changed(model, **true)
+    truth = with_values(model, true)
     trials = [curl(truth, 50, frames=110), motion(truth, 30, frames=120), motion(truth, 30, frames=120, seed=1)]
     result = identified(trials, model, {"rate_limit": (0.02, 2.0), "backlash": (2e-4, 0.02)})
     for name, value in true.items():
@@ -106,7 +98,7 @@ def test_the_winches_rate_limit_and_backlash_come_back():
 
 def weighing(model, mass, load=0.0, **values):
     """A plant whose units weigh `mass` times the model's, and that was compiled with `load` kg at its tip."""
-    plant = with_load(changed(model, **values), load) if load else changed(model, **values)
+    plant = with_load(with_values(model, values), load) if load else with_values(model, values)
     units = [body for body in range(plant.nbody) if plant.body(body).name.startswith("unit_")]
     plant.body_mass[units] *= mass
     plant.body_inertia[units] *= mass
@@ -141,7 +133,7 @@ def test_the_arm_s_mass_comes_back_from_releases_and_the_coarse_search_has_one_w
         return search(problem, *rest)
 
     monkeypatch.setattr(identifying, "search", watched)
-    plain, factor = changed(model, tendon_friction=1e-9), 0.6
+    plain, factor = with_values(model, {"tendon_friction": 1e-9}), 0.6
     true = {name: factor * PARAMETERS[name].read(model) * scale for name, scale in
             (("stiffness", 1.3), ("damping", 0.8), ("mass", 1.0))}  # fmt: skip
     forces = {"stiffness": true["stiffness"], "damping": true["damping"]}
@@ -159,7 +151,8 @@ def test_the_arm_s_mass_comes_back_from_releases_and_the_coarse_search_has_one_w
 
 def test_validate_trials_are_never_fitted():
     model = small_model()
-    truth, other = (changed(model, stiffness=f * PARAMETERS["stiffness"].read(model)) for f in (0.7, 1.6))
+    stiffness = PARAMETERS["stiffness"].read(model)
+    truth, other = (with_values(model, {"stiffness": f * stiffness}) for f in (0.7, 1.6))
     trials = [tilt(truth, 60), tilt(truth, 90), tilt(other, 60, "validate"), tilt(other, 90, "validate")]
     result = identified(trials, model, {"stiffness": (0.2, 20.0)})
     assert result.values["stiffness"] == pytest.approx(PARAMETERS["stiffness"].read(truth), rel=0.02)

@@ -1,14 +1,12 @@
 """How far trials that should end alike end apart: by hand, on a noisy rest, and on a real arm."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.support.folders import SHARED, with_recordings
+from tests.support.folders import ROOT, SHARED, with_recordings
 from tests.support.matched_plant import release, small_model, tilt
-from trunkline.frames import gravity_in_base
 from trunkline.identification.evaluation.repeatability import (
     SAME_GRAVITY,
     SAME_LOAD,
@@ -22,8 +20,6 @@ from trunkline.pipeline.config import settings_of
 from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.filtering.filter import filter_raw_trial
 from trunkline.recordings.session.session import read_session
-
-ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -61,13 +57,7 @@ def test_it_is_what_the_mean_of_many_would_be_off_however_few_there_are(still):
 def test_only_trials_that_end_alike_are_compared(still):
     three = ends(still, (0.0, 0.003, 0.006))
     assert repeatability(three[:2], tip=3) == {}
-    tilted = replace(three[2], gravity=gravity_in_base(np.radians(1.0)))
-    loaded = replace(three[2], load=0.05)
-    pulled = replace(three[2], commands=three[2].commands + [0.32, 0, 0])
-    for other in (tilted, loaded, pulled):
-        assert repeatability([*three[:2], other], tip=3) == {}
-    slack = replace(three[2], commands=three[2].commands - 0.05)  # slack is slack, by however much
-    assert "release" in repeatability([*three[:2], slack], tip=3)
+    assert repeatability([*three[:2], replace(three[2], load=0.05)], tip=3) == {}
 
 
 @pytest.mark.parametrize(
@@ -114,11 +104,7 @@ def test_a_trial_has_ended_that_was_still_for_long_enough(still, range_mm, long,
     assert (shape is not None) is ended
 
 
-def test_an_arm_that_still_moves_has_not_ended(still):
-    swing = still.positions.copy()
-    swing[:, -1, 0] += 0.0015 * np.sin(20 * still.time)
-    assert end_shape(replace(still, positions=swing)) is None
-    assert end_shape(replace(still, start=still.time[-1] - 0.2)) is None
+def test_where_a_marker_that_nobody_saw_ends_is_not_known(still):
     hidden = still.measured.copy()
     hidden[:, 1] = False
     shape = end_shape(replace(still, measured=hidden))

@@ -4,13 +4,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from tests.support.small_arm import LIMIT
+from tests.support.small_arm import plain_spec
 from trunkline.frames import gravity_in_base
 from trunkline.identification.parameters.parameters import candidate_fields, set_fields
-from trunkline.identification.parameters.saving import save_model
 from trunkline.identification.simulate.resting import rest_shape, spring_references
-from trunkline.model.arm.mjcf import Solver, Tendons, build_spec
-from trunkline.model.arm.uniform import uniform_chain, uniform_properties
 from trunkline.model.simulation.rest import longest_step
 
 POSE = np.array([0.02, -0.05, 0.01, 0.03, -0.04, 0.06, 0.0, 0.1])
@@ -18,10 +15,7 @@ POSE = np.array([0.02, -0.05, 0.01, 0.03, -0.04, 0.06, 0.0, 0.1])
 
 @pytest.fixture
 def spec():
-    chain = uniform_chain(0.3, 0.05, 4, 1.0)
-    properties = uniform_properties(chain, [0.02], 1.0, 5.0)
-    tendons = Tendons(0.1, 200, 20, 0.1, routes=[], kv=10)
-    return build_spec(chain, properties, tendons, Solver(0.002, 1e-5, *LIMIT, *LIMIT), 0.2)
+    return plain_spec(damping=5.0, timestep=0.002, load=0.2)
 
 
 @pytest.mark.parametrize("tilt", [0.0, 0.5])
@@ -63,10 +57,3 @@ def test_the_step_to_rest_is_half_the_time_constant_of_the_hardest_limit(spec):
     limited = spec.copy()
     limited.add_tendon(limited=True, range=[-1, 1], solref_limit=[0.002, 1]).wrap_joint(limited.joints[0].name, 1)
     assert longest_step(limited.compile()) == pytest.approx(0.001)
-
-
-def test_the_shape_is_saved(spec):
-    model = spec.compile()
-    model.qpos_spring[:] = POSE
-    loaded = mujoco.MjModel.from_xml_string(save_model(spec, model))
-    np.testing.assert_allclose(loaded.qpos_spring, POSE, rtol=1e-5)

@@ -1,52 +1,35 @@
 """An arm that hangs crooked and was never tilted: its shape, stiffness and damping from releases alone."""
 
-from pathlib import Path
-
 import mujoco
 import numpy as np
 import pytest
 
-from tests.support.small_arm import LIMIT
+from tests.support.noisy_trials import WEIGHTS, with_values
+from tests.support.small_arm import plain_spec
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
 from trunkline.identification.fit.fit import CoarseSearch, Fit, Method, Refinement
 from trunkline.identification.fit.identify import identify
 from trunkline.identification.fit.optimizers import LeastSquares
 from trunkline.identification.fit.problem import Bounds
-from trunkline.identification.parameters.parameters import candidate_fields, set_fields
 from trunkline.identification.simulate.experiment import prepare
-from trunkline.identification.simulate.loss import LossWeights
 from trunkline.identification.simulate.resting import resting_shape
-from trunkline.model.arm.mjcf import Marker, Solver, Tendons, build_spec
-from trunkline.model.arm.uniform import uniform_chain, uniform_properties
 from trunkline.recordings.trials.trial import Trial
 
-ROOT = Path(__file__).parents[2]
 FRAME, FRAMES = 1 / 120, 360
 MARKERS = ("1", "2", "3")
 CROOKED = np.array([0.06, -0.04, 0.02, 0.05, -0.05, 0.08, 0.03, 0.1])
-WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
-
-
-def straight_arm() -> mujoco.MjSpec:
-    """An arm without tendons, of four units."""
-    chain = uniform_chain(0.3, 0.05, 4, 1.0)
-    return build_spec(
-        chain, uniform_properties(chain, [0.02], 1.0, 2.0),
-        Tendons(0.1, 200, 20, 0.1, routes=[], kv=10), Solver(FRAME / 8, 1e-5, *LIMIT, *LIMIT),
-        0.1, {"1": Marker(0.1), "2": Marker(0.2), "3": Marker(0.3)},
-    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def model() -> mujoco.MjModel:
-    return straight_arm().compile()
+    places = dict(zip(MARKERS, (0.1, 0.2, 0.3), strict=True))
+    return plain_spec(damping=2.0, timestep=FRAME / 8, load=0.1, markers=places).compile()
 
 
 @pytest.fixture(scope="module")
 def truth(model) -> mujoco.MjModel:
-    truth = model.__copy__()
-    set_fields(truth, candidate_fields(model, {"stiffness": np.array([1.7]), "damping": np.array([0.15])}))
+    truth = with_values(model, {"stiffness": 1.7, "damping": 0.15})
     truth.qpos_spring[:] = CROOKED
     return truth
 

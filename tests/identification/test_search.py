@@ -1,17 +1,19 @@
 """Both optimizers and the descent, on plants that are the model."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.support.matched_plant import markers_of, release, small_model
+from tests.support.noisy_trials import WEIGHTS, with_values
 from trunkline.identification.fit.identify import _search
 from trunkline.identification.fit.linearisation import linearise
 from trunkline.identification.fit.optimizers import DifferentialEvolution, LeastSquares
 from trunkline.identification.fit.problem import Bounds, Problem
 from trunkline.identification.fit.search import descend, search
-from trunkline.identification.parameters.parameters import candidate_fields, parameter_named, set_fields
+from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.identification.simulate.experiment import prepare
-from trunkline.identification.simulate.loss import LossWeights
 
 TRUE = {"damping": 0.07, "tendon_friction": 0.6}
 
@@ -23,13 +25,10 @@ def quiet(best: float) -> None:
 @pytest.fixture(scope="module")
 def problem():
     model = small_model(4)
-    truth = model.__copy__()
-    set_fields(truth, candidate_fields(model, {name: np.array([value]) for name, value in TRUE.items()}))
+    truth = with_values(model, TRUE)
     experiments = [prepare(release(truth, bend, frames=50), model, 50) for bend in (0.3, -0.25)]
     bounds = {"damping": Bounds(0.005, 1.0), "tendon_friction": Bounds(0.02, 3.0)}
-    return Problem(
-        model, experiments, markers_of(model), bounds, "positions", LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
-    )
+    return Problem(model, experiments, markers_of(model), bounds, "positions", WEIGHTS)
 
 
 @pytest.mark.parametrize(
@@ -49,9 +48,7 @@ def test_an_optimizer_finds_the_plant(problem, optimizer, tolerance):
 
 def test_least_squares_takes_the_best_of_its_starts(problem):
     """With the model far off, a start of the hypercube is better, and the descent goes on from there."""
-    far = Problem(
-        *(getattr(problem, name) for name in ("model", "experiments", "markers", "parameters", "loss", "weights"))
-    )
+    far = replace(problem)
     far.start = lambda: far.bounds()[1]
     single = search(far, LeastSquares(0, 1, 1, 1e-6), seed=2, report=quiet)
     several = search(far, LeastSquares(8, 1, 1, 1e-6), seed=2, report=quiet)
@@ -82,9 +79,7 @@ def test_the_linearisation_where_a_descent_ends_is_that_of_central_differences(p
 def test_differences_stay_within_the_bounds(problem):
     low, high = problem.bounds()
     vectors_tried = []
-    watched = Problem(
-        *(getattr(problem, name) for name in ("model", "experiments", "markers", "parameters", "loss", "weights"))
-    )
+    watched = replace(problem)
     residuals = watched.residuals
     watched.residuals = lambda vectors, near=None: vectors_tried.append(vectors) or residuals(vectors)
     edge = linearise(watched, high)
@@ -97,10 +92,7 @@ def test_differences_stay_within_the_bounds(problem):
 def test_a_problem_starts_at_the_model_s_own_values(problem):
     expected = [np.log(parameter_named(name).read(problem.model)) for name in TRUE]
     np.testing.assert_allclose(problem.start(), expected)
-    hardening = Problem(
-        problem.model, problem.experiments, problem.markers, {"hardening": Bounds(0.02, 20.0)}, "positions",
-        problem.weights,
-    )  # fmt: skip
+    hardening = replace(problem, parameters={"hardening": Bounds(0.02, 20.0)})
     assert np.exp(hardening.start()[0]) == pytest.approx(np.sqrt(0.02 * 20.0))  # it has none: mid-range
 
 

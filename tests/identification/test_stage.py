@@ -9,12 +9,13 @@ import pytest
 
 from tests.support.folders import TABLE_OF_NOTHING
 from tests.support.matched_plant import begin_project, curl, release, tilt
+from tests.support.noisy_trials import with_values
 from trunkline.errors import InputError
 from trunkline.identification.fit.fit import CoarseSearch, Refinement
 from trunkline.identification.fit.optimizers import DifferentialEvolution, LeastSquares
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.settings import IdentificationSettings
-from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields, set_fields
+from trunkline.identification.parameters.parameters import PARAMETERS
 from trunkline.identification.simulate.loss import Loss
 from trunkline.pipeline.identify import CAD_MODEL, read_reported, run
 from trunkline.recordings.trials.splits import DECIDING
@@ -41,10 +42,7 @@ def settings(experiments, reported, parameters, per_joint=(), iterations=8, **ch
 
 
 def truth_of(model: mujoco.MjModel, **scales: float) -> mujoco.MjModel:
-    truth = model.__copy__()
-    values = {name: np.array([scale * PARAMETERS[name].read(model)]) for name, scale in scales.items()}
-    set_fields(truth, candidate_fields(model, values))
-    return truth
+    return with_values(model, {name: scale * PARAMETERS[name].read(model) for name, scale in scales.items()})
 
 
 @pytest.fixture
@@ -113,12 +111,46 @@ def test_control_stage_finds_the_actuators_and_scores_the_cad_model(project):
     assert (root / "artifacts/identify_control/errors.png").stat().st_size > 10_000
 
 
-def test_a_missing_split_is_named(project):
+def exchanged(trial):
+    columns = [1, 0, 2]
+    return replace(trial, commands=trial.commands[:, columns], tendon_positions=trial.tendon_positions[:, columns])
+
+
+@pytest.mark.parametrize(
+    ("trials_of", "changes", "message"),
+    [
+        (lambda model: [tilt(model, 30), tilt(model, 60)], {}, "no static_tilt trial with split validate"),
+        (
+            lambda model: [tilt(model, 30), tilt(model, 60), replace(tilt(model, 75, "validate"), load=0.05)],
+            {"parameters": {"stiffness": Bounds(0.3, 12.0), "mass": Bounds(0.05, 5.0)}},
+            "^identify_stiffness.parameters.mass: found no static_tilt with split identify that carries a load, "
+            "expected one with its `load`",
+        ),
+        (
+            lambda model: [tilt(model, 30), tilt(model, 60), tilt(model, 75, "validate")],
+            {"cross_validation_folds": 3},
+            "cross_validation_folds: found 3, expected at most 2",
+        ),
+        (
+            lambda model: [tilt(model, 30), tilt(model, 75, "validate"), exchanged(curl(model, 40, frames=60))],
+            {"markers": "measured"},
+            "session.yaml: tendons: trial curl_40_0_identify: found 'tendon_2' wound",
+        ),
+        (
+            lambda model: [replace(trial, markers=("link_1", *trial.markers[1:]))
+                           for trial in (tilt(model, 30), tilt(model, 75, "validate"))],
+            {"markers": "measured"},  # it is named before they are looked for
+            "session.yaml: markers: trial tilt_30_identify: found 'link_1', .*unit_01",
+        ),
+    ],
+    ids=["no split", "mass without load", "folds", "exchanged tendons", "unknown marker"],
+)  # fmt: skip
+def test_what_cannot_be_fitted_is_refused_before_any_fit(project, trials_of, changes, message):
     root, model, write = project
-    write([tilt(model, 30), tilt(model, 60)])
+    write(trials_of(model))
     config = settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.3, 12.0)})
-    with pytest.raises(InputError, match="no static_tilt trial with split validate"):
-        run("identify_stiffness", config, root / "artifacts/build_mjcf/arm.xml")
+    with pytest.raises(InputError, match=message):
+        run("identify_stiffness", replace(config, **changes), CAD_MODEL)
     assert not (root / "artifacts/identify_stiffness").exists()
 
 
@@ -144,27 +176,10 @@ def test_a_missing_model_is_named(project):
         run("identify_stiffness", config, root / "nowhere.xml")
 
 
-def test_a_mass_that_no_load_tells_is_refused(project):
-    _, model, write = project
-    write([tilt(model, 30), tilt(model, 60), replace(tilt(model, 75, "validate"), load=0.05)])
-    config = settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.3, 12.0), "mass": (0.05, 5.0)})
-    expected = "found no static_tilt with split identify that carries a load, expected one with its `load`"
-    with pytest.raises(InputError, match=f"^identify_stiffness.parameters.mass: {expected}"):
-        run("identify_stiffness", config, CAD_MODEL)
-
-
 def test_a_mass_beside_a_measured_rest_shape_is_refused():
     """What springs bear in it follows from the masses that are described."""
     with pytest.raises(ValueError, match="parameters.mass: found it beside rest_shape: measured, expected one"):
         settings(["release"], ["release"], {"mass": (0.05, 5.0)}, rest_shape="measured")
-
-
-def test_more_folds_than_trials_are_refused(project):
-    root, model, write = project
-    write([tilt(model, 30), tilt(model, 60), tilt(model, 75, "validate")])
-    config = settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.3, 12.0)}, cross_validation_folds=3)
-    with pytest.raises(InputError, match="cross_validation_folds: found 3, expected at most 2"):
-        run("identify_stiffness", config, root / "artifacts/build_mjcf/arm.xml")
 
 
 def test_tendon_parameters_of_an_arm_without_tendons_are_refused(project):
@@ -176,25 +191,3 @@ def test_tendon_parameters_of_an_arm_without_tendons_are_refused(project):
     config = settings(["release"], ["release"], {"damping": (0.01, 1.0), "tendon_friction": (0.1, 1.0)})
     with pytest.raises(InputError, match="identify_damping.parameters.tendon_friction: found it for an arm without"):
         run("identify_damping", config, root / "artifacts/build_mjcf/arm.xml")
-
-
-def test_exchanged_tendons_are_refused_before_the_first_stage_fits_anything(project):
-    root, model, write = project
-    pulled = curl(model, 40, frames=60)
-    columns = [1, 0, 2]
-    wrong = replace(
-        pulled, commands=pulled.commands[:, columns], tendon_positions=pulled.tendon_positions[:, columns]
-    )
-    write([tilt(model, 30), tilt(model, 75, "validate"), wrong])
-    config = settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.3, 12.0)}, markers="measured")
-    with pytest.raises(InputError, match="session.yaml: tendons: trial curl_40_0_identify: found 'tendon_2' wound"):
-        run("identify_stiffness", config, root / "artifacts/build_mjcf/arm.xml")
-
-
-def test_a_marker_that_the_model_lacks_is_named_before_markers_are_looked_for(project):
-    root, model, write = project
-    trials = [tilt(model, 30), tilt(model, 75, "validate")]
-    write([replace(trial, markers=("link_1", *trial.markers[1:])) for trial in trials])
-    config = settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.3, 12.0)}, markers="measured")
-    with pytest.raises(InputError, match="session.yaml: markers: trial tilt_30_identify: found 'link_1', .*unit_01"):
-        run("identify_stiffness", config, root / "artifacts/build_mjcf/arm.xml")

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.support.noisy_trials import WEIGHTS
 from tests.support.swings import FRAMES, LIKE, MARKERS, TIME, TIP, experiment, swing, trial
 from trunkline.identification.diagnostics.trial_diagnostics import exchanged_labels, moving_start, started_off
 from trunkline.identification.evaluation.baselines import hanging_still
@@ -16,14 +17,12 @@ from trunkline.identification.fit.identify import _few
 from trunkline.identification.results.scoring import fingerprint
 from trunkline.identification.simulate.loss import (
     LOSSES,
-    LossWeights,
     internal_error,
     loss_of,
     position_error,
     velocity_error,
 )
 
-WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 FIT = Fit(MARKERS, {}, (), "positions", WEIGHTS, None)  # type: ignore[arg-type]
 SIMULATED = swing(0.04, 3.5, 12.3)
 

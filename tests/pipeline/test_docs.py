@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 from omegaconf import OmegaConf
 
+from tests.support.folders import ROOT
 from trunkline.recordings.logs.cdr import short_name
 from trunkline.recordings.logs.messages import JOINTS, POSES
 from trunkline.recordings.session.session import FixedBase, MocapFrame, Session, Topics, TrialEntry
 from upkeep.results import kept_results
 
-ROOT = Path(__file__).parents[2]
 DOCS = sorted(
     path
     for pattern in ("*.md", "docs/*.md", "docs/*/*.md", "data/*/README.md", "examples/*/README.md")

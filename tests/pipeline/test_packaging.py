@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from omegaconf import OmegaConf
 
+from tests.support.folders import ROOT
 from trunkline.version import __version__
 
-ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 OWN = {"trunkline", "upkeep", "stages", "demo", "benchmarks", "studies", "qualification", "examples", "rehearsal"}
 OWN |= {"tests"}

@@ -1,17 +1,16 @@
 """The model that is shipped is scored on every kind of trial that its session has."""
 
 import json
-from pathlib import Path
 
 import pytest
 import yaml
 
+from tests.support.folders import ROOT
 from trunkline.identification.fit.settings import IdentificationSettings
 from trunkline.identification.stages import STAGES, model_name
 from trunkline.pipeline.config import load_config
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_static
 
-ROOT = Path(__file__).parents[2]
 PIPELINES = [ROOT, *sorted(file.parent for file in ROOT.glob("examples/*/dvc.yaml"))]
 
 

@@ -3,7 +3,6 @@
 import ast
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -13,11 +12,9 @@ import yaml
 from stages import filter as filter_stage
 from stages import score as score_stage
 from tests.identification.test_stage import settings
-from tests.support.folders import TABLE_OF_NOTHING
-from tests.support.matched_plant import begin_project, curl, release, small_model, tilt
+from tests.support.folders import ROOT, TABLE_OF_NOTHING
+from tests.support.matched_plant import begin_project, curl, mjcf_of, release, small_model, tilt
 from tests.support.sessions import all_truths, instruments, record, static_truth
-from tests.support.small_arm import small_spec
-from trunkline.identification.parameters.saving import save_model
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.identify import run
 from trunkline.recordings.cleaning.loading import load_raw_trials
@@ -27,7 +24,6 @@ from trunkline.recordings.trials.raw_trial import write_raw_trials
 from trunkline.recordings.trials.splits import DECIDING, IDENTIFY, SPLITS, TEST, VALIDATE
 from trunkline.recordings.trials.trial import Trial, read_trials, write_trials
 
-ROOT = Path(__file__).parents[2]
 FOLDERS = ("trunkline", "stages", "studies", "benchmarks", "qualification", "examples", "demo")
 READERS = {"filter", "identify_stiffness", "identify_damping", "identify_control", "score", "report", "train_ik"}
 # who may name the split test, or all splits, and for what
@@ -182,16 +178,13 @@ def scored(project):
     root, truth = project
     wrong = truth.__copy__()
     wrong.jnt_stiffness[:] *= 0.5
-    spec = small_spec(4)
-    spec.option.timestep = truth.opt.timestep
-    spec.compile()
     trials = [replace(t, repairs=int(t.split == TEST and t.experiment == "release")) for t in trials_of(truth)]
     write_trials(root / "data/processed/filter", trials)
     compared = {"identify_stiffness": ["static_tilt"], "identify_damping": ["release", "static_tilt"]}
     for stage, model in (("identify_stiffness", wrong), ("identify_damping", truth)):
         folder = root / "artifacts" / stage
         folder.mkdir()
-        (folder / "arm.xml").write_text(save_model(spec, model))
+        (folder / "arm.xml").write_text(mjcf_of(model))
         settings = {"experiments": compared[stage], "frames": 40, "command_delay": 0.0}
         table = TABLE_OF_NOTHING | {"compared": settings}
         (folder / "parameters.json").write_text(json.dumps(table))

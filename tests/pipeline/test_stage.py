@@ -3,19 +3,17 @@
 import json
 import subprocess
 import sys
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
+from tests.support.folders import ROOT
 from trunkline.compute.progress import progress
 from trunkline.compute.threads import thread_count
 from trunkline.errors import InputError
 from trunkline.pipeline.stage import output_folder, write_json, write_metrics
 from trunkline.report.figures.style import save_figure
-
-ROOT = Path(__file__).parents[2]
 
 STAGE = """
 import numpy as np

@@ -5,16 +5,15 @@ import re
 import shlex
 import subprocess
 from importlib import import_module
-from pathlib import Path
 
 import pytest
 import yaml
 from omegaconf import OmegaConf
 
+from tests.support.folders import ROOT
 from trunkline.__main__ import HELP, VERBS
 from trunkline.recordings.trials.splits import DECIDING, TEST
 
-ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/tutorial.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```sh\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
 COMMANDS = [line for block in BLOCKS for line in block.splitlines()]
@@ -53,12 +52,8 @@ def test_its_verbs_and_options_are_the_command_s(monkeypatch, tmp_path):
             import_module(VERBS[verb].module).main(arguments)
 
 
-def test_its_modules_targets_and_files_exist():
-    for words in words_of("python"):
-        assert words[0] == "-m"
-        assert (ROOT / f"{words[1].replace('.', '/')}.py").is_file(), words
-    targets = set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
-    assert {words[0] for words in words_of("make")} <= targets
+def test_its_files_exist():
+    """As modules and targets do, of all pages: test_docs.py."""
     copied = [words[0].replace("{spiral,mine}", "spiral") for words in words_of("cp") if words[0].startswith("conf/")]
     assert copied
     assert all((ROOT / name).is_file() for name in copied)
@@ -68,9 +63,6 @@ def test_its_modules_targets_and_files_exist():
     )
     for name in re.findall(r"artifacts/[\w/]+\.\w+", PAGE):
         assert name in pipeline, name
-    for words in words_of("dvc"):
-        files = [word for word in words if word.endswith("dvc.yaml")]
-        assert all((ROOT / file).is_file() for file in files)
 
 
 def test_its_edit_of_the_settings_chooses_session_and_arm_and_no_rig(tmp_path):

@@ -55,11 +55,20 @@ def hardening_stump() -> mujoco.MjModel:
     return spec.compile()
 
 
-def cantilever(units: int, stiffness: float, length: float, mass: float) -> mujoco.MjModel:
+def rubbing(chain, friction: float):
+    """The chain with cables that rub on its holes."""
+    return chain._replace(capstan=friction, slip=0.01 * chain.length / chain.units)
+
+
+HINGES = ("x", (1, 0, 0)), ("y", (0, 1, 0))
+
+
+def cantilever(units: int, stiffness: float, length: float, mass: float = 1e-3, hinges=HINGES) -> mujoco.MjModel:
     """A straight chain of equal units along -z without tendons: a rod clamped at its base.
 
     Args:
         stiffness: of each hinge, N m/rad. length: of each unit, m. mass: of each unit, kg, at its middle.
+        hinges: names and axes of those at the upper end of each unit.
     """
     spec = mujoco.MjSpec()
     body = spec.worldbody.add_body(name="base")
@@ -67,7 +76,8 @@ def cantilever(units: int, stiffness: float, length: float, mass: float) -> mujo
         body = body.add_body(name=f"unit_{index + 1:02d}", pos=[0, 0, -length if index else 0])
         body.explicitinertial, body.mass, body.inertia = True, mass, [1e-6] * 3
         body.ipos = [0, 0, -length / 2]
-        for axis in ([1, 0, 0], [0, 1, 0]):
-            body.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis, stiffness=[stiffness, 0, 0])
+        for name, axis in hinges:
+            kind = mujoco.mjtJoint.mjJNT_HINGE
+            body.add_joint(name=f"{body.name}_{name}", type=kind, axis=axis, stiffness=[stiffness, 0, 0])
     body.add_site(name="tip", pos=[0, 0, -length])
     return spec.compile()

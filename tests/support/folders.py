@@ -31,3 +31,11 @@ def package() -> Path:
     pattern = "artifacts/package_unity/*.tgz"
     (path,) = demo_with(pattern).glob(pattern)
     return path
+
+
+def unpack(files: dict[str, bytes], folder: Path) -> Path:
+    """A package's files in a folder."""
+    for path, data in files.items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_bytes(data)
+    return folder

@@ -31,13 +31,19 @@ def small_model(units: int = 6, joints: Joints | None = None, **motors: float) -
     return model
 
 
-def begin_project(folder: Path, units: int) -> mujoco.MjModel:
-    """Write `small_model` where `build_mjcf` writes the CAD model, and make room for trials; the model."""
-    spec, model = small_spec(units), small_model(units)
+def mjcf_of(model: mujoco.MjModel) -> str:
+    """The file of a model like `small_model`, whatever its parameters are."""
+    spec = small_spec(model.nq // 2)
     spec.option.timestep = model.opt.timestep
     spec.compile()
+    return save_model(spec, model)
+
+
+def begin_project(folder: Path, units: int) -> mujoco.MjModel:
+    """Write `small_model` where `build_mjcf` writes the CAD model, and make room for trials; the model."""
+    model = small_model(units)
     (folder / "artifacts/build_mjcf").mkdir(parents=True)
-    (folder / "artifacts/build_mjcf/arm.xml").write_text(save_model(spec, model))
+    (folder / "artifacts/build_mjcf/arm.xml").write_text(mjcf_of(model))
     (folder / "data/processed/filter").mkdir(parents=True)
     return model
 

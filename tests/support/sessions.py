@@ -9,11 +9,15 @@ from scipy.spatial.transform import Rotation
 from demo.instruments import InstrumentSettings, Measurement, measure
 from demo.recorder import write_log, write_session
 from demo.truth import Truth
+from trunkline.recordings.cleaning.checks import TrialLimits
+from trunkline.recordings.cleaning.sanity_checks import SanityLimits
 
 MARKERS = ("unit_02", "unit_04", "unit_06", "unit_08")
 TENDONS = ("tendon_1", "tendon_2", "tendon_3")
 RELEASE, CURL_BEGIN = 0.4, 0.3  # s
 RATE = 480.0  # Hz
+LIMITS = TrialLimits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
+PLAUSIBLE = SanityLimits(still=0.02, distance=0.1, pull=3.0, clock=0.1, otherwise="refuse")
 
 
 def instruments(**changes) -> InstrumentSettings:

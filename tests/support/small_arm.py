@@ -4,9 +4,10 @@ import mujoco
 import numpy as np
 
 from trunkline.model.arm.material import TPU_95A_DENSITY, TPU_95A_MODULUS, unit_properties
-from trunkline.model.arm.mjcf import Solver, Tendons, build_spec
+from trunkline.model.arm.mjcf import Marker, Solver, Tendons, build_spec
 from trunkline.model.arm.spiral import spiral_chain
 from trunkline.model.arm.tendons import even_routes
+from trunkline.model.arm.uniform import uniform_chain, uniform_properties
 
 LIMIT = ([0.01, 1.0], [0.9, 0.95, 0.001, 0.5, 2.0])  # solref, solimp
 
@@ -18,6 +19,13 @@ def small_spec(units: int = 8, **motors: float) -> mujoco.MjSpec:
     gains = {"kp": 2000, "kv": 85, "max_force": 80, "time_constant": 0.05}
     tendons = Tendons(routes=even_routes(chain, 3, 0.85), friction=0.5, **gains | motors)
     return build_spec(chain, properties, tendons, Solver(0.001, 1e-5, *LIMIT, *LIMIT))
+
+
+def plain_spec(damping: float, timestep: float, load: float, markers: dict[str, float] | None = None) -> mujoco.MjSpec:
+    """Four equal units without tendons, 0.3 m in all. load: kg at the tip. markers: how far from the mount, m."""
+    chain, places = uniform_chain(0.3, 0.05, 4, 1.0), {name: Marker(away) for name, away in (markers or {}).items()}
+    tendons, solver = Tendons(0.1, 200, 20, 0.1, routes=[], kv=10), Solver(timestep, 1e-5, *LIMIT, *LIMIT)
+    return build_spec(chain, uniform_properties(chain, [0.02], 1.0, damping), tendons, solver, load, places)
 
 
 def hinges_about(model: mujoco.MjModel, axis: int) -> np.ndarray:

@@ -27,7 +27,9 @@ def plain(tmp_path_factory):
     """Of sheets, under gravity from any side."""
     sources = sources_in(tmp_path_factory.mktemp("balls"))
     np.savez(sources.grids, **grids(), **sheets_of_a_ball().arrays())
-    return assemble(LABEL, sources, TRAJECTORY, ROBOT)[0]
+    files, violations = assemble(LABEL, sources, TRAJECTORY, ROBOT)
+    assert violations == []
+    return files
 
 
 @pytest.fixture(scope="session")

@@ -19,7 +19,7 @@ import trimesh
 import yaml
 from onnx import TensorProto, helper
 
-from tests.support.folders import TABLE_OF_NOTHING
+from tests.support.folders import ROOT, TABLE_OF_NOTHING
 from tests.support.small_arm import small_mjcf
 from trunkline.errors import InputError
 from trunkline.frames import downwards
@@ -40,7 +40,6 @@ from trunkline.unity.roundtrip import curl, simulate
 from trunkline.unity.sources import read_sources
 from trunkline.unity.upm_package import MODEL, NETWORK, package_json, write_tarball
 
-ROOT = Path(__file__).parents[2]
 LABEL = Label("org.trunkline.twin", "1.2.3", "Twin", "A twin.", "6000.0")
 TRAJECTORY = Trajectory(duration=0.4, pull=0.04, tilts_deg=[0.0, 57.3])
 ROBOT = PandaRobot("panda", 0.05, 0.6, 0.1, [0.0, -0.2, 0.0, -1.9, 0.0, 1.7, 0.785398])
@@ -188,13 +187,6 @@ def test_the_manifest_is_valid_and_true(files, sources):
         Manifest.model_validate(json.loads(files[MANIFEST]) | {"surprise": 1})
 
 
-def test_meshes_stay_closed_and_outwards(files):
-    for mesh in Manifest.model_validate_json(files[MANIFEST]).meshes.values():
-        loaded = trimesh.load_mesh(io.BytesIO(files[mesh.file]), file_type="obj")
-        assert loaded.is_watertight
-        assert (len(loaded.faces), loaded.volume > 0) == (mesh.triangles, True)
-
-
 def test_meshes_and_grids_say_how_true_they_are(files, sources):
     """A ball's mesh of 80 triangles lies inside of it; a grid of one spacing tells by how much."""
     axis = np.linspace(-0.5, 0.5, 21)
@@ -204,19 +196,12 @@ def test_meshes_and_grids_say_how_true_they_are(files, sources):
     np.savez(sources.grids, **maps | lattice)
     described = Manifest.model_validate_json(assemble(LABEL, sources, TRAJECTORY, ROBOT)[0][MANIFEST])
     mesh = trimesh.load_mesh(io.BytesIO(files[described.meshes["soft_030"].file]), file_type="obj")
+    assert len(mesh.faces) == described.meshes["soft_030"].triangles
     sag = 0.3 - np.linalg.norm(mesh.triangles_center, axis=1).min()
     assert described.meshes["soft_030"].deviation == pytest.approx(sag, rel=0.3)
     assert 0.98 < described.grids["soft_030"].overlap < 1
     uneven = Manifest.model_validate_json(files[MANIFEST])
     assert uneven.meshes["soft_030"].deviation is None  # of a lattice that is not the same along all axes
-
-
-def test_a_grid_is_found_again_at_its_place(files):
-    grid = Manifest.model_validate_json(files[MANIFEST]).grids["soft_030"]
-    texture = np.frombuffer(files[grid.file], "<f2").reshape(grid.shape[::-1])  # z, y, x
-    for x, y, z in ((0, 0, 0), (4, 8, 6), (2, 3, 5)):
-        place = np.array(grid.origin) + np.array(grid.spacing) * (x, y, z)
-        assert texture[z, y, x] == pytest.approx(np.linalg.norm(place) - 0.3, abs=1e-3)
 
 
 def headset_signal(files: dict[str, bytes], base: np.ndarray, angle: float) -> float:
@@ -249,13 +234,6 @@ def test_the_headset_tells_what_is_out_of_reach(files):
             signal = headset_signal(files, (radius + gap) * direction, np.radians(angle_deg))
             assert signal == pytest.approx(gap, abs=0.04)  # the grid is coarse
             assert (signal > reach.threshold) == (gap > 0)
-
-
-@pytest.mark.parametrize("missing", ["soft_angles", "soft_threshold", "soft_tolerance"])
-def test_maps_that_do_not_say_what_is_out_of_reach_are_one_line(sources, missing):
-    np.savez(sources.grids, **{name: values for name, values in grids().items() if name != missing})
-    with pytest.raises(InputError, match=f"grids.npz: found no {missing}, expected"):
-        assemble(LABEL, sources, TRAJECTORY, ROBOT)
 
 
 def harden(mjcf: str) -> str:
@@ -374,31 +352,39 @@ def test_models_of_which_one_diverges_are_not_called_alike(sources, monkeypatch)
         compare(model, model, TRAJECTORY)
 
 
-def test_a_network_of_another_shape_is_one_line(sources):
-    sources.network.write_bytes(network(inputs=7))
-    with pytest.raises(
-        InputError, match=r"ik.onnx: found inputs of width \[7\].*expected one input \(theta_g"
-    ):
-        assemble(LABEL, sources, TRAJECTORY, ROBOT)
-    sources.network.write_bytes(b"not a network")
-    with pytest.raises(InputError, match="expected an ONNX file"):
-        assemble(LABEL, sources, TRAJECTORY, ROBOT)
+def silent_network() -> bytes:
+    network_without = onnx.load_model_from_string(network())
+    del network_without.metadata_props[:]
+    return network_without.SerializeToString()
 
 
-def test_a_network_that_does_not_say_what_it_gives_or_gives_other_tendons_is_one_line(sources):
-    sources.network.write_bytes(network(outputs=["tendon_2", "tendon_1", "tendon_3"]))
-    with pytest.raises(InputError, match=r"ik.onnx: found outputs \['tendon_2', .* expected .* \['tendon_1', "):
-        assemble(LABEL, sources, TRAJECTORY, ROBOT)
-    silent = onnx.load_model_from_string(network())
-    del silent.metadata_props[:]
-    sources.network.write_bytes(silent.SerializeToString())
-    with pytest.raises(InputError, match="ik.onnx: found no 'inputs' in the file's metadata"):
-        assemble(LABEL, sources, TRAJECTORY, ROBOT)
+def grids_without(name: str) -> dict[str, np.ndarray]:
+    return {key: values for key, values in grids().items() if key != name}
 
 
-def test_a_grid_without_a_lattice_is_one_line(sources):
-    np.savez(sources.grids, soft_030=np.zeros((2, 2, 2)))
-    with pytest.raises(InputError, match="grids.npz: soft_030: found no origin"):
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"grids": lambda: grids_without("soft_angles")}, "grids.npz: found no soft_angles, expected"),
+        ({"grids": lambda: grids_without("soft_threshold")}, "grids.npz: found no soft_threshold, expected"),
+        ({"grids": lambda: grids_without("soft_tolerance")}, "grids.npz: found no soft_tolerance, expected"),
+        ({"grids": lambda: {"soft_030": np.zeros((2, 2, 2))}}, "grids.npz: soft_030: found no origin"),
+        ({"grids": lambda: grids() | sheets_of_a_ball().arrays() | {"sheets_downs": np.zeros((3, 3))}},
+         r"sheets_points of shape \(20, 12, 8, 3\), sheets_downs of shape \(3, 3\)"),
+        ({"network": lambda: network(inputs=7)},
+         r"ik.onnx: found inputs of width \[7\].*expected one input \(theta_g"),
+        ({"network": lambda: b"not a network"}, "expected an ONNX file"),
+        ({"network": lambda: network(outputs=["tendon_2", "tendon_1", "tendon_3"])},
+         r"ik.onnx: found outputs \['tendon_2', .* expected .* \['tendon_1', "),
+        ({"network": silent_network}, "ik.onnx: found no 'inputs' in the file's metadata"),
+    ],
+)  # fmt: skip
+def test_maps_and_networks_that_do_not_say_what_they_are_are_one_line(sources, change, message):
+    if "grids" in change:
+        np.savez(sources.grids, **change["grids"]())
+    else:
+        sources.network.write_bytes(change["network"]())
+    with pytest.raises(InputError, match=message):
         assemble(LABEL, sources, TRAJECTORY, ROBOT)
 
 
@@ -499,15 +485,6 @@ def sheets_of_a_ball() -> WorkspaceSurfaces:
     return WorkspaceSurfaces(downs, (half + 0.3 * downs[:, None, None]).astype(np.float16), 0.02)
 
 
-@pytest.fixture
-def files_with_sheets(sources) -> dict[str, bytes]:
-    sheets = sheets_of_a_ball()
-    np.savez(sources.grids, **grids(), **sheets.arrays())
-    files, violations = assemble(LABEL, sources, TRAJECTORY, ROBOT)
-    assert violations == []
-    return files
-
-
 def headset_surface(files: dict[str, bytes], down: np.ndarray) -> np.ndarray:
     """The surface of tips in Unity's axes, (around, along, 3) m, under gravity in Unity's direction `down`, from the
     package's files and the manifest's words alone."""
@@ -519,29 +496,23 @@ def headset_surface(files: dict[str, bytes], down: np.ndarray) -> np.ndarray:
     return np.einsum("d,drsk->rsk", weights, points.astype(float))
 
 
-def test_the_headset_blends_the_surface_of_tips_under_gravity_from_any_side(files_with_sheets):
+def test_the_headset_blends_the_surface_of_tips_under_gravity_from_any_side(plain):
     sheets, down = sheets_of_a_ball(), downwards(0.9, 2.0)
-    surface = headset_surface(files_with_sheets, down[[0, 2, 1]])
+    surface = headset_surface(plain, down[[0, 2, 1]])
     np.testing.assert_allclose(surface[..., [0, 2, 1]], sheets.at(down), atol=1e-6)
     radius = np.linalg.norm(surface - 0.3 * down[[0, 2, 1]], axis=2)
     np.testing.assert_allclose(radius, 0.2, atol=2e-3)
-    reach = Manifest.model_validate_json(files_with_sheets[MANIFEST]).reach
+    reach = Manifest.model_validate_json(plain[MANIFEST]).reach
     assert "triangles" in reach.signal
     assert reach.sheets.directions[1] < -0.99  # the hanging arm's gravity, along Unity's -y
 
 
-def test_sheets_are_read_by_the_manifest_and_damaged_ones_refused(files_with_sheets):
-    assert refusals(files_with_sheets) == {}
-    weights = json.loads(files_with_sheets[MANIFEST])["reach"]["sheets"]["weights"]
-    other = np.frombuffer(files_with_sheets[weights]) * 1.01
-    refused = set(refusals(files_with_sheets | {weights: other.tobytes()}))
+def test_sheets_are_read_by_the_manifest_and_damaged_ones_refused(plain):
+    assert refusals(plain) == {}
+    weights = json.loads(plain[MANIFEST])["reach"]["sheets"]["weights"]
+    other = np.frombuffer(plain[weights]) * 1.01
+    refused = set(refusals(plain | {weights: other.tobytes()}))
     assert refused == {weights, weights.replace("sheet_weights", "sheets")}
-
-
-def test_sheets_of_other_shapes_are_one_line(sources):
-    np.savez(sources.grids, **grids(), **sheets_of_a_ball().arrays() | {"sheets_downs": np.zeros((3, 3))})
-    with pytest.raises(InputError, match=r"sheets_points of shape \(20, 12, 8, 3\), sheets_downs of shape \(3, 3\)"):
-        assemble(LABEL, sources, TRAJECTORY, ROBOT)
 
 
 def test_the_package_s_changelog_names_its_version(project):

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.support.folders import unpack
 from tests.support.operator import config
 from tests.unity.mono import compiled
 from tests.unity.test_assemble import network
@@ -62,10 +63,8 @@ def test_all_that_the_core_shows_has_a_comment(tmp_path):
 
 def run(program: Path, files: dict[str, bytes], folder: Path, *options: str) -> subprocess.CompletedProcess:
     """The program's answer to a package of these `files`."""
-    for path, data in files.items():
-        (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        (folder / path).write_bytes(data)
-    return subprocess.run(["mono", str(program), str(folder), *options], capture_output=True, text=True)
+    command = ["mono", str(program), str(unpack(files, folder)), *options]
+    return subprocess.run(command, capture_output=True, text=True)
 
 
 def test_the_core_answers_the_shared_vectors_and_what_they_leave_out(program, files, tmp_path):
@@ -151,30 +150,25 @@ BAD = ["another byte", "no grid", "no manifest", "a short grid", "origin [0.1,0.
        "shape [5,9,8]", *NO_MANIFESTS]  # fmt: skip
 
 
-@pytest.mark.parametrize("name", BAD)
-def test_a_package_that_is_not_sound_is_refused_in_the_same_words(
-    program, of_one_tilt, of_one_tilt_answered, tmp_path, name
-):
-    files = damaged(of_one_tilt, name)
-    refused = said_by(lambda: (package_digest(files), maps_of(files)))
-    steps = of_one_tilt_answered["Tests/Vectors/steps.json"]
-    done = run(program, files | {"Tests/Vectors/steps.json": steps}, tmp_path)
-    assert (done.returncode, done.stdout) == (1, f"error: {refused}\n")
-
-
 SHEETS = "Runtime/Reachability/sheets.bytes"
 BAD_SHEETS = {"no sheets": None, "short sheets": -2, "long sheets": 6}  # bytes that are cut off or put on
 
 
-@pytest.mark.parametrize("name", BAD_SHEETS)
-def test_sheets_that_are_not_sound_are_refused_in_the_same_words(program, plain, plain_answered, tmp_path, name):
-    cut = BAD_SHEETS[name]
-    files = {path: data for path, data in plain.items() if path != SHEETS}
-    if cut is not None:
-        files[SHEETS] = (plain[SHEETS] + bytes(6))[: len(plain[SHEETS]) + cut]
-    refused = said_by(lambda: maps_of(files))
-    steps = plain_answered["Tests/Vectors/steps.json"]
-    done = run(program, rehashed(files | {"Tests/Vectors/steps.json": steps}), tmp_path)
+def with_other_sheets(files: dict[str, bytes], name: str) -> dict[str, bytes]:
+    cut, sheets = BAD_SHEETS[name], files[SHEETS]
+    others = {path: data for path, data in files.items() if path != SHEETS}
+    return rehashed(others if cut is None else others | {SHEETS: (sheets + bytes(6))[: len(sheets) + cut]})
+
+
+@pytest.mark.parametrize(
+    ("package", "spoil", "name"),
+    [*(("of_one_tilt", damaged, name) for name in BAD), *(("plain", with_other_sheets, name) for name in BAD_SHEETS)],
+)
+def test_a_package_that_is_not_sound_is_refused_in_the_same_words(program, request, tmp_path, package, spoil, name):
+    files = spoil(request.getfixturevalue(package), name)
+    refused = said_by(lambda: (package_digest(files), maps_of(files)))
+    steps = request.getfixturevalue(f"{package}_answered")["Tests/Vectors/steps.json"]
+    done = run(program, files | {"Tests/Vectors/steps.json": steps}, tmp_path)
     assert (done.returncode, done.stdout) == (1, f"error: {refused}\n")
 
 

@@ -122,17 +122,11 @@ def test_another_arm_that_comes_rests_and_the_first_goes_on(files):
         assert np.linalg.norm(scene.site("other_tip") - expected) < 0.1 * MM
 
 
-def test_an_arm_that_rests_already_is_soon_left(files, monkeypatch):
-    """Upright and even it hangs straight: its energy has no peak."""
-    monkeypatch.setattr(start, "MOST_STEPS", start.PEAKS * start.LONGEST_RISE)
-    scene = scene_of(files, UPRIGHT, STEP)
-    scene.start()
-    assert not scene.data.qpos.any()
-
-
-def test_an_arm_that_finds_no_rest_starts_straight(files, monkeypatch):
-    monkeypatch.setattr(start, "MOST_STEPS", 20)
-    scene = scene_of(files, turns([1.0])[0], STEP)
+@pytest.mark.parametrize(("turn", "most"), [(UPRIGHT, start.PEAKS * start.LONGEST_RISE), (turns([1.0])[0], 20)])
+def test_an_arm_that_rests_already_and_one_that_finds_no_rest_start_straight(files, monkeypatch, turn, most):
+    """Upright and even an arm hangs straight: its energy has no peak, so it is soon left."""
+    monkeypatch.setattr(start, "MOST_STEPS", most)
+    scene = scene_of(files, turn, STEP)
     scene.start()
     assert not scene.data.qpos.any()
 

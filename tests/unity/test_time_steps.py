@@ -1,13 +1,13 @@
 """The time step in Unity: whole steps a frame, none too long, in Python and C#; what they cost; who falls behind."""
 
 import math
-import shutil
 import subprocess
 
 import mujoco
 import pytest
 
 from tests.support.small_arm import small_spec
+from tests.unity.mono import compiled
 from tests.unity.test_csharp import TESTS
 from trunkline.unity.assemble import CSHARP
 from trunkline.unity.manifest import StepError
@@ -28,15 +28,8 @@ CURL = {"duration": 0.4, "pull": 0.03, "tilts": [0.0, 1.0]}
 
 @pytest.fixture(scope="module")
 def program(tmp_path_factory):
-    for name in ("mcs", "mono"):
-        if shutil.which(name) is None:
-            pytest.fail(f"{name}: no such program; `make mono` installs Debian's Mono", pytrace=False)
-    out = tmp_path_factory.mktemp("pace") / "pace.exe"
-    sources = [str(CSHARP / "Pace.cs"), *map(str, (TESTS / "pace").glob("*.cs"))]
-    command = ["mcs", "-langversion:7.2", "-warnaserror+", "-nologo", f"-out:{out}", *sources]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return out
+    sources = [CSHARP / "Pace.cs", *(TESTS / "pace").glob("*.cs")]
+    return compiled(tmp_path_factory.mktemp("pace") / "pace.exe", sources)
 
 
 def output_of(program, what: str, numbers) -> list[str]:

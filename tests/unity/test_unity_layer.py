@@ -20,6 +20,7 @@ import yaml
 from pydantic import TypeAdapter
 from scipy.spatial.transform import Rotation
 
+from tests.support.folders import unpack
 from tests.support.operator import config
 from tests.unity.mono import compiled
 from tests.unity.test_csharp import SHARED, bends, case, moved_a_little, said_by
@@ -163,11 +164,9 @@ def layer(project):
 
 
 def run(program: Path, files: dict[str, bytes], cases: dict, folder: Path) -> subprocess.CompletedProcess:
-    for path, data in files.items():
-        (folder / "package" / path).parent.mkdir(parents=True, exist_ok=True)
-        (folder / "package" / path).write_bytes(data)
+    package = unpack(files, folder / "package")
     (folder / "cases.json").write_text(json.dumps(cases).replace("NaN", "null"))
-    command = ["mono", str(program), str(folder / "package"), str(folder / "cases.json")]
+    command = ["mono", str(program), str(package), str(folder / "cases.json")]
     return subprocess.run(command, capture_output=True, text=True)
 
 

@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 
+from tests.support.folders import unpack
 from trunkline.ar.teleop.reach import MapReach
 from trunkline.errors import InputError
 from trunkline.kinematics.dataset.gravities import spread
@@ -74,10 +75,7 @@ def test_reach_by_the_package_is_that_by_the_stage(files, arrays):
 
 def test_a_package_is_read_from_its_folder_as_from_its_tarball(files, tmp_path):
     write_tarball(tmp_path / "twin.tgz", files)
-    for path, data in files.items():
-        (tmp_path / "folder" / path).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / "folder" / path).write_bytes(data)
-    assert read_package(tmp_path / "folder") == read_package(tmp_path / "twin.tgz") == files
+    assert read_package(unpack(files, tmp_path / "folder")) == read_package(tmp_path / "twin.tgz") == files
     with pytest.raises(InputError, match=r"found no .*manifest\.json, expected a package's folder"):
         read_package(tmp_path / "folder/Runtime")
 

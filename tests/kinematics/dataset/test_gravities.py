@@ -16,16 +16,6 @@ from trunkline.model.statics.equilibria import equilibrium
 THIRD = 2 * np.pi / 3  # rad, between two tendons
 
 
-@pytest.fixture(scope="module")
-def model():
-    return stump()
-
-
-@pytest.fixture(scope="module")
-def chain(model):
-    return read_chain(model)
-
-
 def test_a_direction_is_told_by_its_angle_and_azimuth():
     np.testing.assert_allclose(STANDARD_GRAVITY * downwards(0.7, 0.0), gravity_in_base(0.7), atol=1e-12)
     turned = downwards(0.7, np.array([0.0, THIRD]))

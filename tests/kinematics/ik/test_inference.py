@@ -61,9 +61,8 @@ def test_it_answers_as_the_file_does_for_either_sign_and_rounded_quaternions(net
     ],
 )
 def test_what_is_no_pose_is_an_error(network, poses, problem):
-    with pytest.raises(InputError, match=problem) as caught:
+    with pytest.raises(InputError, match=problem):
         ask(network, poses)
-    assert "\n" not in str(caught.value)
 
 
 def test_an_answer_that_is_not_finite_is_an_error(model):

@@ -6,10 +6,11 @@ import pandas as pd
 import pytest
 import torch
 
+from tests.kinematics.ik.test_as_controls import exact
+from tests.kinematics.ik.test_network import data_of, loss_of
 from trunkline.errors import InputError
 from trunkline.frames import downwards
-from trunkline.kinematics.dataset.columns import command_columns, length_columns, tension_columns
-from trunkline.kinematics.dataset.table import command_by_tension, sample_table, tip_by_tension
+from trunkline.kinematics.dataset.table import sample_table
 from trunkline.kinematics.ik.as_controls import draw_targets, settled
 from trunkline.kinematics.ik.inference import ask
 from trunkline.kinematics.ik.inputs import (
@@ -23,9 +24,7 @@ from trunkline.kinematics.ik.inputs import (
     quaternion_of,
 )
 from trunkline.kinematics.ik.onnx import to_onnx
-from trunkline.kinematics.ik.refine import refine
 from trunkline.kinematics.ik.score import outside_targets, tip_errors
-from trunkline.kinematics.ik.tip_loss import tip_loss
 from trunkline.kinematics.ik.training import Training, train
 
 UNITY_OPS = {"Gather", "Mul", "Add", "Sub", "Concat", "Gemm", "Relu", "Clip"}
@@ -40,11 +39,8 @@ def table(chain):
 
 @pytest.fixture(scope="module")
 def network(chain, table):
-    loss = tip_loss(
-        table[tension_columns(3)].to_numpy(), tip_by_tension(table, 3), command_by_tension(table, chain.gain)
-    )
-    data = [table[columns].to_numpy() for columns in (DIRECTION, command_columns(3), length_columns(3))]
-    return train(*data, loss, np.arange(len(table)) % 5 > 0, Training(48, 40, 64, 5e-3, 1), lambda *_: None)
+    trains, training = np.arange(len(table)) % 5 > 0, Training(48, 40, 64, 5e-3, 1)
+    return train(*data_of(table), loss_of(chain, table), trains, training, lambda *_: None)
 
 
 def test_both_forms_tell_the_same_gravity_and_pose(table):
@@ -114,12 +110,7 @@ def test_exact_commands_settle_on_targets_under_gravity_from_any_side(model, cha
     assert drawn.shape[1] == len(DIRECTION)
     assert len(drawn) >= 3
     assert np.abs(gravity_columns(drawn)[:, 1]).max() > 0.1
-
-    def exact(poses):
-        refined = refine(chain, poses, np.tile(chain.straight_lengths, (len(poses), 1)), steps=30)
-        return {"commands": refined.commands, "tip": position_of(poses), "doubtful": refined.steps < 0}
-
-    assert settled(model, exact, drawn).position.max() < 2e-5
+    assert settled(model, exact(chain), drawn).position.max() < 2e-5
 
 
 def test_far_targets_have_any_gravity():

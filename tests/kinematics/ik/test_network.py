@@ -37,12 +37,14 @@ def samples(chain):
 
 
 def loss_of(chain, samples):
-    tensions = samples[tension_columns(3)].to_numpy()
-    return tip_loss(tensions, tip_by_tension(samples, 3), command_by_tension(samples, chain.gain))
+    count = chain.tendons
+    tensions = samples[tension_columns(count)].to_numpy()
+    return tip_loss(tensions, tip_by_tension(samples, count), command_by_tension(samples, chain.gain))
 
 
-def data_of(samples):
-    return [samples[columns].to_numpy() for columns in (inputs_of(samples), command_columns(3), length_columns(3))]
+def data_of(samples, tendons=3):
+    columns = inputs_of(samples), command_columns(tendons), length_columns(tendons)
+    return [samples[names].to_numpy() for names in columns]
 
 
 def test_samples_rest_with_a_slack_tendon_and_name_the_planar_sets(chain, samples):

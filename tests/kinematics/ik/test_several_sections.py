@@ -7,6 +7,7 @@ import onnxruntime
 import pytest
 import torch
 
+from tests.kinematics.ik.test_network import data_of, loss_of
 from tests.model.arm.test_sections import ACTUATION, SOLVER
 from trunkline.errors import InputError
 from trunkline.kinematics.dataset.columns import DOWN, POSE, command_columns, length_columns, tension_columns
@@ -14,14 +15,12 @@ from trunkline.kinematics.dataset.gather import Sampling, gather
 from trunkline.kinematics.dataset.gravities import Weightless
 from trunkline.kinematics.dataset.samples import from_any_side, read_samples
 from trunkline.kinematics.dataset.sampling import in_sections, sections
-from trunkline.kinematics.dataset.table import command_by_tension, tip_by_tension
 from trunkline.kinematics.ik.as_controls import DOUBT, draw_targets, settled
 from trunkline.kinematics.ik.inference import ask
 from trunkline.kinematics.ik.inputs import draw_gravity, gravity_of, inputs_of
 from trunkline.kinematics.ik.learn import Unseen, doubt_beyond, sampled_gravities, unseen_targets
 from trunkline.kinematics.ik.onnx import to_onnx
 from trunkline.kinematics.ik.refine import refine
-from trunkline.kinematics.ik.tip_loss import tip_loss
 from trunkline.kinematics.ik.training import Training, train
 from trunkline.kinematics.reachability.sampled import read_tips
 from trunkline.kinematics.reachability.soft import SoftSettings, SurfaceSettings
@@ -141,12 +140,9 @@ def test_one_map_of_the_samples_that_train_stands_for_every_tilt(chain, table, t
 
 
 def test_a_network_of_poses_alone_is_exported_as_it_is_and_beats_the_straight_arm(model, chain, table):
-    loss = tip_loss(
-        table[tension_columns(6)].to_numpy(), tip_by_tension(table, 6), command_by_tension(table, chain.gain)
-    )
-    data = [table[columns].to_numpy() for columns in (POSE, command_columns(6), length_columns(6))]
     training = Training(width=48, epochs=60, batch=64, learning_rate=5e-3, seed=1)
-    network = train(*data, loss, (table["split"] == "train").to_numpy(), training, lambda *_: None)
+    trains = (table["split"] == "train").to_numpy()
+    network = train(*data_of(table, 6), loss_of(chain, table), trains, training, lambda *_: None)
     names = [f"tendon_{k + 1}" for k in range(6)]
     runtime = onnxruntime.InferenceSession(to_onnx(network, names, 0.01).SerializeToString())
     asked = table[POSE].to_numpy()[:50]

@@ -13,17 +13,21 @@ DEEPEST = np.array([0.01, 0.02, 0.03])  # m
 MANY = 600
 
 
+def at_rest(count, tensions=0.0, rested=True):
+    """Of so many poses at the mount: what `settle` says."""
+    return SimpleNamespace(
+        position=np.zeros((count, 3)), quaternion=np.tile([1.0, 0, 0, 0], (count, 1)),
+        tensions=np.resize(tensions, (count, 3)).astype(float), rested=np.resize(rested, count),
+    )  # fmt: skip
+
+
 @pytest.fixture
 def rests(monkeypatch):
     """Makes every drawn pose come to rest with these tensions (B, K), N, after so many seconds (B,)."""
 
     def say(tensions, seconds):
         def settle(model, commands, gravity, patience=20.0, tip_site="tip"):
-            count = len(commands)
-            return SimpleNamespace(
-                position=np.zeros((count, 3)), quaternion=np.tile([1.0, 0, 0, 0], (count, 1)),
-                tensions=np.resize(tensions, (count, 3)).astype(float), rested=np.resize(seconds, count) <= patience,
-            )  # fmt: skip
+            return at_rest(len(commands), tensions, np.asarray(seconds) <= patience)
 
         monkeypatch.setattr(as_controls, "settle", settle)
 
@@ -109,11 +113,7 @@ def test_the_score_asks_for_nearly_all_that_the_samples_reach(model, chain, monk
 
     def settle(model, commands, *rest):
         asked.append((chain.straight_lengths - commands) / DEEPEST)
-        count = len(commands)
-        return SimpleNamespace(
-            position=np.zeros((count, 3)), quaternion=np.tile([1.0, 0, 0, 0], (count, 1)),
-            tensions=np.zeros((count, 3)), rested=np.ones(count, bool),
-        )  # fmt: skip
+        return at_rest(len(commands))
 
     def drive(model, commands, *rest, **more):
         count = len(commands)

@@ -6,7 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from trunkline.kinematics.panda.kinematics import Q_MAX, Q_MIN, mount_pose
+from tests.kinematics.panda.mounts import assert_mounts
+from trunkline.kinematics.panda.kinematics import Q_MAX, Q_MIN
 from trunkline.kinematics.panda.limits import TORQUE
 from trunkline.kinematics.panda.maker_model import shipped_panda
 
@@ -19,12 +20,7 @@ def model():
 
 
 def test_kinematics_agree(model):
-    data, q = mujoco.MjData(model), np.random.default_rng(0).uniform(Q_MIN, Q_MAX, (200, 7))
-    for pose, position, rotation in zip(q, *mount_pose(q, OFFSET), strict=True):
-        data.qpos[:] = pose
-        mujoco.mj_kinematics(model, data)
-        np.testing.assert_allclose(data.site("mount").xpos, position, atol=1e-6)
-        np.testing.assert_allclose(data.site("mount").xmat.reshape(3, 3), rotation, atol=1e-6)
+    assert_mounts(model, np.random.default_rng(0).uniform(Q_MIN, Q_MAX, (200, 7)), OFFSET, 1e-6)
 
 
 def test_limits_are_this_rooms_and_nearly_the_wheels(model):

@@ -4,10 +4,11 @@ import mujoco
 import numpy as np
 import pytest
 
+from tests.kinematics.panda.mounts import assert_mounts
 from tests.support.franka_panda import panda
 from tests.support.mink_solver import Mink
 from trunkline.kinematics.panda.collision import clearance
-from trunkline.kinematics.panda.kinematics import Q_MAX, Q_MIN, mount_pose
+from trunkline.kinematics.panda.kinematics import Q_MAX, Q_MIN
 from trunkline.kinematics.panda.labels import draw_points, label
 
 OFFSET = 0.05  # m
@@ -20,12 +21,7 @@ def model():
 
 def test_frames_and_limits_are_the_makers(model):
     np.testing.assert_array_equal(model.jnt_range, np.column_stack([Q_MIN, Q_MAX]))
-    data, q = mujoco.MjData(model), np.random.default_rng(0).uniform(Q_MIN, Q_MAX, (500, 7))
-    for pose, position, rotation in zip(q, *mount_pose(q, OFFSET), strict=True):
-        data.qpos[:] = pose
-        mujoco.mj_kinematics(model, data)
-        np.testing.assert_allclose(data.site("mount").xpos, position, atol=1e-12)
-        np.testing.assert_allclose(data.site("mount").xmat.reshape(3, 3), rotation, atol=1e-12)
+    assert_mounts(model, np.random.default_rng(0).uniform(Q_MIN, Q_MAX, (500, 7)), OFFSET, 1e-12)
 
 
 def test_collisions_are_the_makers_but_for_what_the_map_simplifies(model):

@@ -2,9 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 
-from tests.support.bent_chain import stump
 from trunkline.errors import InputError
 from trunkline.kinematics.panda.downward import sample_downward
 from trunkline.kinematics.panda.kinematics import Q_MAX, mount_pose
@@ -19,7 +17,6 @@ from trunkline.kinematics.reachability.soft import SoftShape, soft_field, soft_l
 from trunkline.kinematics.reachability.tips import ArmTips, Tips
 from trunkline.kinematics.sdf.grid import Lattice, overlap
 from trunkline.kinematics.sdf.mesh import contains
-from trunkline.model.statics.chain import read_chain
 
 OFFSET = 0.05  # m
 LENGTH = 0.5  # m, of the arm of constant curvature below
@@ -82,15 +79,6 @@ def test_a_profile_of_specks_is_refused_by_its_key(poses):
         rigid_field(specks, 0.02, 0.5)
 
 
-def test_further_starts_go_to_every_point_not_reached(poses):
-    """One start reaches some points; with further ones all that can be reached are, wherever a map puts them."""
-    position, _ = mount_pose(poses[5::8000], OFFSET)
-    where = {"seed": 0, "starts": 1, "mount_offset": OFFSET, "avoid_collisions": True}
-    once, more = (label(position, starts_in_doubt=n, **where) for n in (1, 100))
-    assert once.mean() < 0.9 <= more.mean()
-    assert more[once].all()
-
-
 def test_samples_lie_inside_the_rigid_map(rigid):
     position, _ = mount_pose(sample_downward(4000, seed=9, mount_offset=OFFSET), OFFSET)
     depth = rigid.lattice.sample(rigid.field, position)
@@ -129,27 +117,15 @@ def test_labels_find_samples_and_refuse_the_impossible(poses):
     assert not reached[-3:].any()
 
 
-def test_agreement_counts():
-    result = agreement(np.array([1, 1, 0, 0, 1], bool), np.array([1, 1, 1, 0, 0], bool))
-    assert result == (3 / 5, 2 / 3, 1 / 2, 3, 2)
-    with pytest.raises(InputError, match="reachability.labels: found 2 reachable and 0 .*expected some of both"):
-        agreement(np.ones(2, bool), np.ones(2, bool))
-
-
-@pytest.fixture(scope="module")
-def arm():
-    return read_chain(stump())
-
-
-def test_tips_are_the_samples_where_there_are_some_and_equilibria_elsewhere(arm):
+def test_tips_are_the_samples_where_there_are_some_and_equilibria_elsewhere(chain):
     sampled = Tips(np.zeros((5, 3)), np.zeros((5, 3)))
-    tips_at = ArmTips(arm, np.array([0.0, 1.0]), [sampled, sampled], directions=12, steps=8, seed=0)
+    tips_at = ArmTips(chain, np.array([0.0, 1.0]), [sampled, sampled], directions=12, steps=8, seed=0)
     assert tips_at(1.0) is sampled
     fresh = tips_at(0.4)
     np.testing.assert_array_equal(fresh.positions, tips_at(0.4).positions)
     assert len(fresh.positions) > 100
     reach = np.linalg.norm(fresh.positions, axis=1)
-    assert 0.5 * arm.length < reach.max() < 1.1 * arm.length
+    assert 0.5 * chain.length < reach.max() < 1.1 * chain.length
 
 
 def test_soft_field_of_one_tip_is_a_ball():
@@ -199,15 +175,6 @@ def test_signal_is_the_distance_outside(soft):
     assert np.median(np.abs(signal - (0.06 - SHAPE.tolerance))) < 0.006
     far = reach_signal(packed(soft.fields), soft.angles, soft.lattice, np.array([[9.0, 9.0, 9.0]]), 0.1)
     assert far[0] > 0
-
-
-def test_points_beyond_are_as_far_as_asked():
-    tips = curved_tips(0.0).positions
-    points = points_beyond(tips, 0.03, 300, np.random.default_rng(0))
-    distance, _ = cKDTree(tips).query(points)
-    assert len(points) == 300
-    assert distance.min() >= 0.03
-    assert distance.max() <= 0.033
 
 
 def test_coarse_angles_would_not_do(soft):
@@ -277,15 +244,15 @@ def test_points_of_the_hybrid_map_are_reached_and_points_beside_it_are_not(rigid
     assert find_poses(outside, tips, rigid.field, rigid.lattice, **where).reached.mean() <= 0.03
 
 
-def test_a_pose_is_verified_by_joint_angles_and_tendon_lengths_alone(arm):
-    source = ArmTips(arm, np.zeros(0), [], directions=12, steps=8, seed=0)
+def test_a_pose_is_verified_by_joint_angles_and_tendon_lengths_alone(chain):
+    source = ArmTips(chain, np.zeros(0), [], directions=12, steps=8, seed=0)
     tips = source(0.0)
     q = sample_downward(5, seed=3, mount_offset=OFFSET)[:5]
     mount, rotation = mount_pose(q, OFFSET)
     index = np.array([40, 50, 60, 70, 80])
     points = tip_position(mount, rotation, tips.positions[index])
     reach = ReachingPoses(np.array([1, 1, 1, 1, 0], bool), q, index, np.zeros(5))
-    assert list(verified(points, reach, tips.lengths, arm, OFFSET)) == [True] * 4 + [False]
-    assert not verified(points + [0, 0, 0.005], reach, tips.lengths, arm, OFFSET).any()
+    assert list(verified(points, reach, tips.lengths, chain, OFFSET)) == [True] * 4 + [False]
+    assert not verified(points + [0, 0, 0.005], reach, tips.lengths, chain, OFFSET).any()
     q[:, 5] += 0.1  # no longer straight down: gravity pulls another way
-    assert not verified(points, reach, tips.lengths, arm, OFFSET).any()
+    assert not verified(points, reach, tips.lengths, chain, OFFSET).any()

@@ -3,22 +3,15 @@
 import numpy as np
 import pytest
 
-from tests.support.bent_chain import stump
 from trunkline.frames import gravity_in_base
 from trunkline.kinematics.panda.kinematics import mount_pose
 from trunkline.kinematics.reachability.hybrid_check import draw_inside_and_outside, verified
 from trunkline.kinematics.reachability.rigid import azimuth_from_joint_1
 from trunkline.kinematics.reachability.tilted import draw_pairs, find_tilted, soft_base, tilted_field
 from trunkline.kinematics.reachability.tips import ArmTips
-from trunkline.model.statics.chain import read_chain
 
 OFFSET, TILT = 0.05, 0.6
 HOW = {"mount_offset": OFFSET, "avoid_collisions": True}
-
-
-@pytest.fixture(scope="module")
-def chain():
-    return read_chain(stump())
 
 
 @pytest.fixture(scope="module")

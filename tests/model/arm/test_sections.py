@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from tests.support.small_arm import LIMIT
 from trunkline.errors import InputError
 from trunkline.model.arm.guide_holes import GuideHoles, add_holes
 from trunkline.model.arm.mjcf import Actuation, Marker, Solver
@@ -13,7 +14,7 @@ from trunkline.model.arm.sections import Section, Sections
 from trunkline.model.arm.tendons import Tendon
 from trunkline.model.arm_model import WINDING, ArmModel
 
-SOLVER = Solver(0.002, 1e-5, [0.01, 1.0], [0.9, 0.95, 0.001, 0.5, 2.0], [0.01, 1.0], [0.9, 0.95, 0.001, 0.5, 2.0])
+SOLVER = Solver(0.002, 1e-5, *LIMIT, *LIMIT)
 ACTUATION = Actuation(friction=0.0, kp=2000.0, max_force=50.0, time_constant=0.02)
 TWO = [
     Section(length=0.1, units=2, width=0.03, mass=0.2, bending_stiffness=0.5),

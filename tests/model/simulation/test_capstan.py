@@ -6,7 +6,6 @@ import pytest
 
 from tests.support.small_arm import hinges_about, small_spec
 from trunkline.identification.parameters.parameters import candidate_fields
-from trunkline.identification.parameters.saving import save_model
 from trunkline.model.arm.guide_holes import GuideHoles, add_holes
 from trunkline.model.arm_model import CAPSTAN_FRICTION, ArmModel
 from trunkline.model.simulation.capstan import capstan_friction_of
@@ -142,14 +141,3 @@ def test_candidates_of_a_batch_rub_each_with_its_own_coefficient():
     for row, friction in enumerate((0.1, 0.4)):
         alone = move(batch_of(rubbing_arm(4, friction), 1), controls[:1], ("qpos",))["qpos"][0]
         np.testing.assert_allclose(both[row], alone, atol=1e-12)
-
-
-def test_the_coefficient_survives_its_file():
-    spec = small_spec(UNITS)
-    add_holes(spec, GuideHoles(0.2, 4))
-    model = spec.compile()
-    assert ArmModel(model).guide_holes.shape == (3, 4)
-    model.numeric_data[:] = 0.35
-    again = mujoco.MjModel.from_xml_string(save_model(spec, model))
-    assert ArmModel(again).capstan_friction == pytest.approx(0.35)
-    assert ArmModel(spec.compile()).capstan_friction == pytest.approx(0.35), "the spec holds it too"

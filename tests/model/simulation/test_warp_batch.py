@@ -13,13 +13,13 @@ from tests.identification.test_stage import settings, truth_of
 from tests.model.simulation.test_capstan import rubbing_arm
 from tests.model.simulation.test_motion import delayed
 from tests.support.matched_plant import begin_project, curl, markers_of, release, small_model
+from tests.support.noisy_trials import WEIGHTS
 from tests.support.small_arm import small_spec
 from trunkline.errors import InputError
 from trunkline.identification.fit.linearisation import linearise
 from trunkline.identification.fit.problem import Bounds, Problem
 from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields
 from trunkline.identification.simulate.experiment import prepare
-from trunkline.identification.simulate.loss import LossWeights
 from trunkline.identification.simulate.population import Population
 from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement
 from trunkline.model.arm_model import ArmModel
@@ -31,7 +31,6 @@ from trunkline.recordings.trials.trial import write_trials
 
 SECONDS = 0.5
 BOUND = 5e-6  # m, of any site in that time, as docs/speed.md states it
-WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 
 
 @pytest.fixture
@@ -109,23 +108,29 @@ def test_a_missing_library_is_told(no_library):
         batch_of(small_model(), 2, rough=True)
 
 
-def test_a_model_whose_parts_may_touch_is_refused(warp):
+def touching():
     model = small_model()
     model.geom_contype[1:] = model.geom_conaffinity[1:] = 1
-    with pytest.raises(InputError, match="found a model of which parts may touch.*leave TRUNKLINE_BATCHES empty"):
-        batch_of(model, 2, rough=True)
+    return model
 
 
-def test_a_dead_time_that_takes_samples_as_they_are_is_refused(warp):
-    with pytest.raises(InputError, match="found a dead time without interpolation"):
-        batch_of(delayed(), 2, rough=True)
-
-
-def test_cables_cut_down_to_a_point_are_refused(warp):
+def cut_down():
     model = small_model()
     ArmModel(model).switch_off_cables()
-    with pytest.raises(InputError, match="found a cable cut down to a point"):
-        batch_of(model, 2, rough=True)
+    return model
+
+
+@pytest.mark.parametrize(
+    ("model_of", "message"),
+    [
+        (touching, "found a model of which parts may touch.*leave TRUNKLINE_BATCHES empty"),
+        (delayed, "found a dead time without interpolation"),
+        (cut_down, "found a cable cut down to a point"),
+    ],
+)
+def test_what_warp_cannot_move_is_refused(warp, model_of, message):
+    with pytest.raises(InputError, match=message):
+        batch_of(model_of(), 2, rough=True)
 
 
 def test_cables_that_rub_are_refused(library):

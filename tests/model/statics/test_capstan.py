@@ -4,19 +4,17 @@ import mujoco
 import numpy as np
 import pytest
 
-from tests.support.bent_chain import hardening_stump, stump, stump_spec
+from tests.support.bent_chain import hardening_stump, rubbing, stump, stump_spec
 from trunkline.frames import gravity_in_base
-from trunkline.kinematics.dataset.sampling import pull_directions
 from trunkline.model.arm.guide_holes import GuideHoles, add_holes
 from trunkline.model.arm_model import SLIP
 from trunkline.model.simulation.drive import drive
 from trunkline.model.statics.capstan import eliminate, solve_eliminated
 from trunkline.model.statics.chain import read_chain
 from trunkline.model.statics.energy import Pull, evaluate, find_hessian
-from trunkline.model.statics.equilibria import actuated, equilibrium, forward
+from trunkline.model.statics.equilibria import actuated, equilibrium
 from trunkline.model.statics.hysteresis import friction_band
 from trunkline.model.statics.newton import find_equilibrium, new_work
-from trunkline.model.statics.sensitivity import sensitivity
 
 FRICTION, GRAVITY = 0.3, gravity_in_base(0.6)
 
@@ -24,14 +22,7 @@ FRICTION, GRAVITY = 0.3, gravity_in_base(0.6)
 @pytest.fixture(scope="module")
 def chain():
     """Its slip length is the share of a unit's length that conf/build_mjcf/holes/rubbing.yaml names."""
-    rubbing = read_chain(stump())._replace(capstan=FRICTION)
-    return rubbing._replace(slip=0.01 * rubbing.length / rubbing.units)
-
-
-def pulls(chain, count, seed=0):
-    rng = np.random.default_rng(seed)
-    tensions = pull_directions(chain, rng.uniform(0, 2 * np.pi, count)) * rng.uniform(0, 0.6, (count, 1)) ** 2
-    return tensions, gravity_in_base(rng.uniform(0, np.radians(120), count))
+    return rubbing(read_chain(stump()), FRICTION)
 
 
 @pytest.mark.parametrize("side", [1, -1])
@@ -133,33 +124,6 @@ def test_derivatives_are_those_of_the_torques(slope, reach, slip):
             ends.append(state.gradient.copy())
         np.testing.assert_allclose(matrix[:, j], (ends[0] - ends[1]) / (2 * step), rtol=1e-5, atol=1e-5)
     assert np.abs(matrix - matrix.T).max() > 1e-3, "without friction it were symmetric"
-
-
-def test_lengths_and_commands_lead_back_to_the_same_pose(chain):
-    tensions, gravity = pulls(chain, 40)
-    there = equilibrium(chain, tensions, gravity)
-    assert there.converged.all()
-    assert there.residual.max() < 1e-9
-    back = forward(chain, there.lengths, gravity)
-    by_commands = actuated(chain, there.commands, gravity)
-    for result in (back, by_commands):
-        assert result.converged.all()
-        np.testing.assert_allclose(result.position, there.position, rtol=0, atol=1e-7)
-        np.testing.assert_allclose(result.tensions, tensions, rtol=0, atol=1e-4)
-    smooth = equilibrium(chain._replace(capstan=0.0), tensions, gravity)
-    assert np.linalg.norm(smooth.position - there.position, axis=1).max() > 5e-3
-
-
-def test_sensitivities_are_differences_of_equilibria(chain):
-    tensions, step = np.array([[12.0, 5.0, 0.5]]), 1e-4
-    here = equilibrium(chain, tensions, GRAVITY)
-    slopes = sensitivity(chain, here.qpos, here.tensions, GRAVITY)
-    for t in range(3):
-        change = step * np.eye(3)[[t]]
-        ahead, behind = (equilibrium(chain, tensions + s * change, GRAVITY) for s in (1, -1))
-        for name, values in (("position", slopes.tip_by_tension), ("lengths", slopes.length_by_tension)):
-            expected = (getattr(ahead, name) - getattr(behind, name))[0] / (2 * step)
-            np.testing.assert_allclose(values[0, :, t], expected, rtol=1e-4, atol=1e-7)
 
 
 def test_an_arm_drawn_in_bends_less_and_one_let_go_more(chain):

@@ -124,15 +124,19 @@ def test_passive_torques_are_mujocos(model, chain):
     np.testing.assert_allclose(-state.gradient, torque, rtol=1e-12, atol=1e-12)
 
 
+def limit_in_mujoco(model, data, kind):
+    """What it is of, and its force f = -R⁻¹ (0 - aref), as MuJoCo has it where acceleration and velocity vanish."""
+    mujoco.mj_forward(model, data)
+    (row,) = np.flatnonzero(data.efc_type == int(kind))
+    return data.efc_id[row], data.efc_D[row] * data.efc_aref[row]
+
+
 @pytest.mark.parametrize("depth", [1e-4, 0.015, 0.03, 0.2])
 def test_limit_torque_is_mujocos_constraint_force_at_rest(model, chain, depth):
-    """f = -R⁻¹ (0 - aref): what MuJoCo's solver returns where acceleration and velocity vanish."""
     data, joint = mujoco.MjData(model), 5
     data.qpos[joint] = chain.limit[joint // 2, joint % 2, 1] + depth
-    mujoco.mj_forward(model, data)
-    row = np.flatnonzero(data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT))
-    assert list(data.efc_id[row]) == [joint]
-    expected = data.efc_D[row[0]] * data.efc_aref[row[0]]
+    limited, expected = limit_in_mujoco(model, data, mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT)
+    assert limited == joint
     gain, impedance = chain.limit_gain[joint // 2, joint % 2], chain.limit_impedance[joint // 2, joint % 2]
     assert limit_torque(gain, impedance, depth)[0] == pytest.approx(expected, rel=1e-10)
 
@@ -145,10 +149,8 @@ def test_the_limit_of_a_diagonal_is_mujocos_too(model, chain, number, depth):
     tendon = ArmModel(model).diagonals[number].tendon[unit]
     half = (chain.limit[unit, 2 + number, 1] + depth) / 2
     data.qpos[2 * unit : 2 * unit + 2] = half, (1 - 2 * number) * half
-    mujoco.mj_forward(model, data)
-    row = np.flatnonzero(data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON))
-    assert list(data.efc_id[row]) == [tendon]
-    expected = data.efc_D[row[0]] * data.efc_aref[row[0]]
+    limited, expected = limit_in_mujoco(model, data, mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON)
+    assert limited == tendon
     gain, impedance = chain.limit_gain[unit, 2 + number], chain.limit_impedance[unit, 2 + number]
     assert limit_torque(gain, impedance, depth)[0] == pytest.approx(expected, rel=1e-10)
 
@@ -158,7 +160,6 @@ def test_limit_of_negative_solref_is_mujocos():
     model.jnt_solref[:] = [-400.0, -5.0]
     chain, data = read_chain(model), mujoco.MjData(model)
     data.qpos[2] = chain.limit[1, 0, 0] - 0.03
-    mujoco.mj_forward(model, data)
-    row = np.flatnonzero(data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT))
+    _, expected = limit_in_mujoco(model, data, mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT)
     result = limit_torque(chain.limit_gain[1, 0], chain.limit_impedance[1, 0], 0.03)[0]
-    assert result == pytest.approx(data.efc_D[row[0]] * data.efc_aref[row[0]], rel=1e-10)
+    assert result == pytest.approx(expected, rel=1e-10)

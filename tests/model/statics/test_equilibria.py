@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from tests.support.bent_chain import cantilever, hardening_stump, stump
+from tests.support.bent_chain import cantilever, hardening_stump, rubbing, stump
+from tests.support.noisy_trials import with_values
 from trunkline.frames import gravity_in_base
-from trunkline.identification.parameters.parameters import candidate_fields, set_fields
 from trunkline.kinematics.dataset.sampling import pull_directions
 from trunkline.model.simulation.rest import settle
 from trunkline.model.statics.chain import read_chain
@@ -45,8 +45,7 @@ def test_equilibrium_is_where_mujoco_comes_to_rest(build):
 
 def test_an_arm_on_a_turned_mount_rests_there_in_its_own_frame(arm, chain):
     """As an identified mount is; gravity and tip are then in the frame of the mount, not of the world."""
-    turned = arm.__copy__()
-    set_fields(turned, candidate_fields(arm, {"mount_tilt_x": np.array([0.1]), "mount_twist": np.array([-0.2])}))
+    turned = with_values(arm, {"mount_tilt_x": 0.1, "mount_twist": -0.2})
     tensions, gravity = random_pulls(chain, 3)
     result = equilibrium(read_chain(turned), tensions, gravity)
     np.testing.assert_allclose(result.position, equilibrium(chain, tensions, gravity).position, atol=1e-9)
@@ -55,8 +54,7 @@ def test_an_arm_on_a_turned_mount_rests_there_in_its_own_frame(arm, chain):
 
 
 def test_units_that_bend_further_down_rest_where_mujoco_does(arm, chain):
-    lower = arm.__copy__()
-    set_fields(lower, candidate_fields(arm, {"joint_place": np.array([0.4])}))
+    lower = with_values(arm, {"joint_place": 0.4})
     tensions, gravity = random_pulls(chain, 6)
     result = equilibrium(read_chain(lower), tensions, gravity)
     settled = settle(lower, result.lengths - tensions / chain.gain, gravity)
@@ -95,14 +93,18 @@ def test_straight_arm_hangs_straight(chain):
     np.testing.assert_allclose(result.lengths[0], chain.straight_lengths, atol=1e-12)
 
 
-def test_lengths_lead_back_to_the_same_pose(chain):
-    tensions, gravity = random_pulls(chain, 60, seed=1)
+@pytest.mark.parametrize(("friction", "count", "share"), [(0.0, 60, 1.0), (0.3, 40, 0.6)])
+def test_lengths_and_commands_lead_back_to_the_same_pose(chain, friction, count, share):
+    chain = rubbing(chain, friction)
+    tensions, gravity = random_pulls(chain, count, share=share)
     there = equilibrium(chain, tensions, gravity)
-    back = forward(chain, there.lengths, gravity)
-    assert back.converged.all()
-    np.testing.assert_allclose(back.position, there.position, rtol=0, atol=1e-7)
-    np.testing.assert_allclose(back.tensions, tensions, rtol=0, atol=1e-4)
-    assert (back.tensions >= 0).all()
+    assert there.converged.all()
+    assert there.residual.max() < 1e-9
+    for back in (forward(chain, there.lengths, gravity), actuated(chain, there.commands, gravity)):
+        assert back.converged.all()
+        np.testing.assert_allclose(back.position, there.position, rtol=0, atol=1e-7)
+        np.testing.assert_allclose(back.tensions, tensions, rtol=0, atol=1e-4)
+        assert (back.tensions >= 0).all()
 
 
 def test_longer_slack_tendon_changes_nothing_and_a_shorter_one_pulls(chain):
@@ -134,8 +136,9 @@ def test_buckled_arm_is_not_called_an_equilibrium(chain):
     assert not result.converged[0]
 
 
-def test_sensitivities_are_differences_of_equilibria(chain):
-    tensions, step = np.array([[12.0, 5.0, 0.5]]), 1e-4
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_sensitivities_are_differences_of_equilibria(chain, friction):
+    chain, tensions, step = rubbing(chain, friction), np.array([[12.0, 5.0, 0.5]]), 1e-4
     gravity = gravity_in_base(0.9)
     here = equilibrium(chain, tensions, gravity)
     slopes = sensitivity(chain, here.qpos, here.tensions, gravity)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.recordings.cleaning.test_loading import edit_session, one_trial, taken
+from tests.recordings.cleaning.test_loading import one_trial
 from tests.support.sessions import bent_truth, curl_truth, pull_truth, static_truth
 from trunkline.recordings.cleaning.checks import Findings
 from trunkline.recordings.cleaning.clock_offset import align_clocks
@@ -37,10 +37,7 @@ def clock_of(taken):
 
 @pytest.mark.parametrize("clock", ["frame", "stamp"])
 def test_an_arm_that_lags_does_not_move_the_offset(tmp_path, clock):
-    one_trial(tmp_path, lambda m: None, lagging())
-    if clock != "frame":
-        edit_session(tmp_path, "clock: frame", f"clock: {clock}")
-    result, raw, findings = clock_of(taken(tmp_path)[0])
+    result, raw, findings = clock_of(one_trial(tmp_path, truth=lagging(), clock=clock))
     assert result.by == "log times"
     assert abs(result.offset + 0.137) < result.uncertainty < 5e-3
     assert raw.clock_offset == result.offset
@@ -79,14 +76,13 @@ def test_motors_that_the_recorder_dates_need_no_motion(tmp_path):
     truth = np.interp(raw.tendon_time + result.offset - 0.3, [0, 0.9, 1.8], [0, 1, 0])
     assert np.corrcoef(truth, raw.tendon_positions[:, 0])[0, 1] > 0.9
     assert result.lag == pytest.approx(0.0, abs=5e-3), "within the delays of messages"
-    edit_session(tmp_path, "clock: frame", "clock: log")
-    result, raw, _ = clock_of(taken(tmp_path)[0])
+    result, raw, _ = clock_of(one_trial(tmp_path, unstamped, lagging(0.0), "log"))
     assert (result.by, result.offset, raw.clock_offset) == ("log times", 0.0, 0.0)
     assert 1e-3 < result.uncertainty < 6e-3
 
 
 def test_a_trial_without_motion_tells_too_and_one_without_motors_has_nothing_to_say(tmp_path):
-    result, _, findings = clock_of(one_trial(tmp_path, lambda m: None, pull_truth()))
+    result, _, findings = clock_of(one_trial(tmp_path, truth=pull_truth()))
     assert (result.by, result.lag) == ("log times", None)
     assert abs(result.offset + 0.137) < result.uncertainty
     result, _, findings = clock_of(one_trial(tmp_path, silent, static_truth(0.0)))
@@ -96,7 +92,7 @@ def test_a_trial_without_motion_tells_too_and_one_without_motors_has_nothing_to_
 
 def session(tmp_path, *rows):
     """Takes a, b, … with their findings, of (split, offset by log times, offset by motion)."""
-    raw, _ = one_trial(tmp_path, lambda m: None, curl_truth())
+    raw, _ = one_trial(tmp_path, truth=curl_truth())
     raw_trials = [replace(raw, name="abcdefgh"[i], split=split) for i, (split, *_) in enumerate(rows)]
     findings = [
         Findings(

@@ -5,14 +5,14 @@ import re
 import numpy as np
 import pytest
 
+from tests.support.sessions import LIMITS
 from trunkline.errors import InputError
-from trunkline.recordings.cleaning.checks import Findings, TrialLimits
+from trunkline.recordings.cleaning.checks import Findings
 from trunkline.recordings.cleaning.clocks import check_clocks
 from trunkline.recordings.cleaning.trial_window import _log_fit
 from trunkline.recordings.logs.pose_stream import PoseStream
 from trunkline.recordings.signals.steps import find_step
 
-LIMITS = TrialLimits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
 RATE, START = 120.0, 1_760_000_000_000_000_000
 
 

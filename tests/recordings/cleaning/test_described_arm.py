@@ -7,10 +7,10 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
-from tests.recordings.cleaning.test_loading import LIMITS
-from tests.recordings.cleaning.test_sanity_checks import PLAUSIBLE
 from tests.support.sessions import (
+    LIMITS,
     MARKERS,
+    PLAUSIBLE,
     bent_truth,
     curl_truth,
     instruments,
@@ -104,9 +104,8 @@ def test_a_left_handed_frame_is_refused(tmp_path):
     """Mirrored along z, quaternions likewise."""
     mirror = (1, 1, -1)
     turn = np.array([1, *(np.prod(mirror) * np.array(mirror))])
-    with pytest.raises(InputError, match="is the frame left-handed, or are its axes not the arm's") as error:
+    with pytest.raises(InputError, match="is the frame left-handed, or are its axes not the arm's"):
         checked(spoilt(tmp_path, lambda p, q: (p * mirror, q * turn)))
-    assert "\n" not in str(error.value)
 
 
 def test_a_base_of_other_axes_is_refused(tmp_path):

@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from demo.instruments import measure
-from demo.recorder import write_log, write_session
-from tests.support.folders import SHARED, with_recordings
+from tests.recordings.cleaning.test_loading import real_releases
+from tests.support.folders import with_recordings
 from tests.support.sessions import (
+    LIMITS,
     MARKERS,
+    PLAUSIBLE,
     TENDONS,
     curl_truth,
     instruments,
@@ -21,14 +22,12 @@ from tests.support.sessions import (
     static_truth,
 )
 from trunkline.errors import InputError
-from trunkline.recordings.cleaning.checks import Findings, TrialLimits
+from trunkline.recordings.cleaning.checks import Findings
 from trunkline.recordings.cleaning.loading import load_raw_trials
-from trunkline.recordings.cleaning.sanity_checks import SanityLimits, check_sanity
+from trunkline.recordings.cleaning.sanity_checks import check_sanity
 from trunkline.recordings.cleaning.session_checks import check_session
 from trunkline.recordings.session.session import read_session
 
-LIMITS = TrialLimits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
-PLAUSIBLE = SanityLimits(still=0.02, distance=0.1, pull=3.0, clock=0.1, otherwise="refuse")
 NO_TEST = "splits: no trial of the split test: no error is of trials that nothing was decided on"
 
 
@@ -88,22 +87,17 @@ def moved(raw, body, offset):
 
 def test_a_sound_session_has_no_fault_and_no_warning(folder, sound):
     assert judged(sound) == ({}, [])
-    gathered = check_session(sound.values(), read_session(folder), PLAUSIBLE, "stop", "sound")
-    assert [remarks.repairs + remarks.warnings for remarks in gathered.findings] == [[NO_TEST]] * len(sound)
+    checked = check_session(sound.values(), read_session(folder), PLAUSIBLE, "stop", "sound")
+    assert [remarks.repairs + remarks.warnings for remarks in checked.findings] == [[NO_TEST]] * len(sound)
 
 
 @with_recordings
 def test_real_recordings_have_no_fault(tmp_path):
-    logs = sorted((SHARED / "asl_trunk").glob("*.mcap"))
-    for log in logs:
-        (tmp_path / log.name).symlink_to(log)
-    lines = [f"  - {{file: {log.name}, experiment: release, split: identify}}" for log in logs]
-    head = ["frame: {up: [0, 1, 0]}", "base: {position: [0.1015, 0.0, 0.105]}", "trials:"]
-    (tmp_path / "session.yaml").write_text("\n".join(head + lines) + "\n")
+    real_releases(tmp_path)
     session = read_session(tmp_path)
-    gathered = check_session(load_raw_trials(tmp_path, session, LIMITS), session, PLAUSIBLE, "stop", "real")
-    assert len(gathered.raw_trials) == 13
-    for remarks in gathered.findings:
+    checked = check_session(load_raw_trials(tmp_path, session, LIMITS), session, PLAUSIBLE, "stop", "real")
+    assert len(checked.raw_trials) == 13
+    for remarks in checked.findings:
         no_validate, no_test, no_others = remarks.warnings
         assert no_validate == "splits: no trial of the split validate: no error is of trials that were not fitted"
         assert no_test == NO_TEST
@@ -357,43 +351,32 @@ def test_exchanged_topics_are_named(sound):
     assert judged(sound, curl_40=late) == ({}, [])
 
 
+def gathered(folder, sound, chosen=lambda raw: True, otherwise="refuse", refused_trials="stop", **changed):
+    """The session of the chosen takes, of which some are `changed`, by trial."""
+    taken = [(trial, changed.get(name, raw), replace(findings, warnings=[], faults=[]))
+             for name, (trial, raw, findings) in sound.items() if chosen(raw)]  # fmt: skip
+    return check_session(taken, read_session(folder), replace(PLAUSIBLE, otherwise=otherwise), refused_trials, "here")
+
+
 def test_what_is_not_plausible_is_refused_left_out_or_said(folder, sound):
-    trial, raw, findings = sound["release_a"]
-    session = read_session(folder)
-
-    def gathered(otherwise, refused_trials):
-        taken = {name: (t, some, replace(f, warnings=[], faults=[])) for name, (t, some, f) in sound.items()}
-        taken["release_a"] = trial, moved(raw, 2, 0.5), replace(findings, warnings=[], faults=[])
-        return check_session(taken.values(), session, replace(PLAUSIBLE, otherwise=otherwise), refused_trials, "here")
-
+    off = moved(raw_trial_of(sound, "release_a"), 2, 0.5)
     with pytest.raises(InputError, match=r"release_a\.mcap: trial release_a: 'unit_06' is "):
-        gathered("refuse", "stop")
-    left = gathered("refuse", "leave_out")
+        gathered(folder, sound, release_a=off)
+    left = gathered(folder, sound, refused_trials="leave_out", release_a=off)
     assert list(left.refused) == ["release_a"]
     assert "'unit_06' is " in left.refused["release_a"]
     assert "release_a" not in [raw.name for raw in left.raw_trials]
-    checked = gathered("warn", "stop")
+    checked = gathered(folder, sound, otherwise="warn", release_a=off)
     names = [raw.name for raw in checked.raw_trials]
     warnings = checked.findings[names.index("release_a")].warnings
     assert warnings[0].startswith("'unit_06' is ")
 
 
 def test_a_level_that_the_base_contradicts_is_said(folder, sound):
-    trial, raw, _ = sound["tilt_60"]
-    taken = {name: (t, some, replace(f, warnings=[], faults=[])) for name, (t, some, f) in sound.items()}
-    taken["tilt_60"] = trial, replace(raw, level=10.0), taken["tilt_60"][2]
-    gathered = check_session(taken.values(), read_session(folder), PLAUSIBLE, "stop", "here")
-    warnings = {raw.name: remarks.warnings for raw, remarks in zip(gathered.raw_trials, gathered.findings, strict=True)}
+    checked = gathered(folder, sound, tilt_60=replace(raw_trial_of(sound, "tilt_60"), level=10.0))
+    warnings = {raw.name: remarks.warnings for raw, remarks in zip(checked.raw_trials, checked.findings, strict=True)}
     assert warnings["tilt_60"][1].startswith("level: found 10, but the base is tilted by 60°")
     assert all(warnings[name] == [NO_TEST] for name in warnings if name != "tilt_60")
-
-
-def test_an_experiment_that_a_split_lacks_is_said(folder, sound):
-    others = [trial for name, trial in sound.items() if name != "curl_60"]
-    taken = [(t, some, replace(f, warnings=[], faults=[])) for t, some, f in others]
-    gathered = check_session(taken, read_session(folder), PLAUSIBLE, "stop", "here")
-    expected = [NO_TEST, "splits: no curl of the split validate, which the session has"]
-    assert all(remarks.warnings == expected for remarks in gathered.findings)
 
 
 @pytest.mark.parametrize(
@@ -403,6 +386,7 @@ def test_an_experiment_that_a_split_lacks_is_said(folder, sound):
             lambda raw: raw.split == "identify",
             ["splits: no trial of the split validate: no error is of trials that were not fitted", NO_TEST],
         ),
+        (lambda raw: raw.name != "curl_60", [NO_TEST, "splits: no curl of the split validate, which the session has"]),
         (
             lambda raw: raw.split == "validate",
             ["splits: no trial of the split identify: nothing can be identified", NO_TEST],
@@ -420,11 +404,10 @@ def test_an_experiment_that_a_split_lacks_is_said(folder, sound):
             ],
         ),
     ],
-    ids=["identify alone", "validate alone", "no curl", "no motion"],
+    ids=["identify alone", "no curl to validate", "validate alone", "no curl", "no motion"],
 )
 def test_a_split_or_an_experiment_that_the_session_lacks_is_said(folder, sound, chosen, expected):
-    taken = [(t, some, replace(f, warnings=[], faults=[])) for t, some, f in sound.values() if chosen(some)]
-    for remarks in check_session(taken, read_session(folder), PLAUSIBLE, "stop", "here").findings:
+    for remarks in gathered(folder, sound, chosen).findings:
         assert [warning for warning in remarks.warnings if warning.startswith(("splits:", "experiments:"))] == expected
 
 
@@ -432,15 +415,3 @@ def test_usual_distances_of_other_splits_are_said(tmp_path):
     record(tmp_path, [release_truth("validate"), static_truth(0.0, "validate")], instruments())
     for _, _, findings in load_raw_trials(tmp_path, read_session(tmp_path), LIMITS):
         assert "no trial of the split identify can be read: the unit and the usual" in findings.warnings[0]
-
-
-@pytest.mark.parametrize("value", [0.0, 1e300])
-def test_a_body_nowhere_is_not_taken_for_seen(tmp_path, value):
-    m = measure(release_truth(), instruments(occlusions_per_s=0, outliers=0), np.random.default_rng(0))
-    m.positions[:, 3] = value
-    write_log(tmp_path / f"{m.name}.mcap", m)
-    write_session(tmp_path, [m], instruments())
-    ((_, error, findings),) = load_raw_trials(tmp_path, read_session(tmp_path), LIMITS)
-    assert isinstance(error, InputError)
-    assert "trial release_a: 'unit_06' is seen in 0.0 %" in str(error)
-    assert any("(unit_06)" in repair for repair in findings.repairs)

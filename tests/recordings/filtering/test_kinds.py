@@ -3,17 +3,22 @@
 import numpy as np
 import pytest
 
-from tests.support.sessions import CURL_BEGIN, all_truths, instruments, motion_truth, pull_truth, record
+from tests.support.sessions import (
+    CURL_BEGIN,
+    LIMITS,
+    PLAUSIBLE,
+    all_truths,
+    instruments,
+    motion_truth,
+    pull_truth,
+    record,
+)
 from trunkline.frames import tilt_of_gravity
-from trunkline.recordings.cleaning.checks import TrialLimits
 from trunkline.recordings.cleaning.loading import load_raw_trials
-from trunkline.recordings.cleaning.sanity_checks import SanityLimits
 from trunkline.recordings.cleaning.session_checks import check_session
 from trunkline.recordings.filtering.filter import Filter, filter_raw_trial
 from trunkline.recordings.session.session import read_session
 
-LIMITS = TrialLimits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
-PLAUSIBLE = SanityLimits(still=0.02, distance=0.1, pull=3.0, clock=0.1, otherwise="refuse")
 SETTINGS = Filter(rate=120, cutoff=20, order=4, longest_bridge=0.1, outlier_deviations=8, release="onset")
 
 

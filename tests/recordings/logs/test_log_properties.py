@@ -14,15 +14,13 @@ from mcap.records import Channel, Message
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
-from tests.support.sessions import curl_truth, instruments, record
+from tests.support.sessions import LIMITS, curl_truth, instruments, record
 from trunkline.errors import InputError
-from trunkline.recordings.cleaning.checks import TrialLimits
 from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.logs.mcap_log import read_log
 from trunkline.recordings.logs.records import MAGIC
 from trunkline.recordings.session.session import read_session
 
-LIMITS = TrialLimits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
 POSES, PULLS = {"/rigid_bodies"}, {"/tendon_commands", "/tendon_states"}
 ENOUGH = 1e9  # ns of poses and pulls, with which no trial is refused
 FOOTER = b"\x02" + (20).to_bytes(8, "little") + bytes(20) + MAGIC
@@ -171,7 +169,6 @@ def test_a_trial_is_refused_or_holds_measured_poses_only(folder, log, data):
     poses, pulls = ([t for name, t, _ in set(expected_left) if name in names] for names in (POSES, PULLS))
     if isinstance(result, InputError):
         assert "curl_40.mcap" in str(result)
-        assert "\n" not in str(result)
         assert min(np.ptp(poses), np.ptp(pulls)) < ENOUGH if poses and pulls else True
         return
     rows = {row.tobytes() for row in raw.positions}

@@ -74,15 +74,6 @@ def damaged(tmp_path, data: bytes):
     return read_log(path)
 
 
-def test_truncated_log_keeps_its_beginning(tmp_path, whole):
-    data, expected = whole
-    log = damaged(tmp_path, data[: len(data) // 2])
-    result = messages(log)
-    assert result == {time: expected[time] for time in sorted(expected)[: len(result)]}
-    assert 20 < len(result) < 80
-    assert "cut off" in log.damage[0]
-
-
 def test_chunk_that_was_cut_gives_its_readable_messages(tmp_path):
     data = write(tmp_path / "log.mcap", CompressionType.NONE, chunk_size=100_000)
     log = damaged(tmp_path, data[: len(data) // 3])
@@ -125,10 +116,12 @@ def test_any_truncation_gives_a_prefix_or_a_refusal(tmp_path_factory, whole, sha
     data, expected = whole
     cut = int(share * len(data))
     try:
-        result = messages(damaged(tmp_path_factory.getbasetemp(), data[:cut]))
+        log = damaged(tmp_path_factory.getbasetemp(), data[:cut])
     except InputError:
-        result = {}
         assert cut < 8
+        return
+    result = messages(log)
+    assert len(result) == len(expected) or "cut off" in log.damage[0]
     assert result == {time: expected[time] for time in sorted(expected)[: len(result)]}
 
 

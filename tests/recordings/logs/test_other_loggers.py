@@ -1,12 +1,10 @@
 """Messages as other recorders, drivers and serializers leave them: read, or refused with the reason."""
 
-import json
-
 import numpy as np
 import pytest
 import zstandard
+from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from mcap.writer import Writer
-from mcap_ros2.writer import Writer as RosWriter
 
 from tests.recordings.logs.test_schemas import (
     BODIES,
@@ -15,9 +13,14 @@ from tests.recordings.logs.test_schemas import (
     ROS,
     STAMPS,
     a_session,
+    at_stamps,
+    foxglove_time,
     header,
+    in_foxglove,
+    in_ros,
     named_poses,
     point,
+    write,
 )
 from trunkline.errors import InputError
 from trunkline.recordings.logs.definitions import HEADER, POINT, SEPARATOR
@@ -31,16 +34,6 @@ mocap4r2_msgs/Marker[] markers
 int64 index
 geometry_msgs/Point translation
 {POINT}"""
-
-
-def written(path, schema, definition, messages):
-    """A log of (topic, content) for each frame."""
-    with open(path, "wb") as file, RosWriter(file, chunk_size=4096) as writer:
-        kind = writer.register_msgdef(schema, definition)
-        for frame in range(COUNT):
-            for topic, content in messages(frame):
-                writer.write_message(topic, kind, content, int(STAMPS[frame]))
-    return path
 
 
 def rewritten(path, change=bytes, definition=None):
@@ -60,7 +53,7 @@ def rewritten(path, change=bytes, definition=None):
 
 
 def named(path):
-    return written(path, ROS["named"][0], ROS["named"][1], named_poses)
+    return write(path, "ros", "named")
 
 
 def same_poses(path, other):
@@ -95,7 +88,7 @@ def test_older_markers_go_by_their_index(tmp_path):
         content = [{"index": body + 4, "translation": point(POSITIONS[frame, body])} for body in range(3)]
         return [("/markers", {"header": header(STAMPS[frame]), "frame_number": frame, "markers": content})]
 
-    path = written(tmp_path / "log.mcap", "mocap4r2_msgs/msg/Markers", OLDER_MARKERS, markers)
+    path = in_ros(tmp_path / "log.mcap", "mocap4r2_msgs/msg/Markers", OLDER_MARKERS, at_stamps(markers))
     poses = open_log(path, a_session(base={"position": [0, 0, 0]})).poses
     assert poses.names == ("4", "5", "6")
     np.testing.assert_array_equal(poses.positions, POSITIONS)
@@ -109,26 +102,18 @@ def test_the_second_version_of_named_poses_is_read(tmp_path):
     schema, definition, _ = ROS["named"]
     array = "motion_capture_tracking_interfaces/NamedPose[]"
     definition = definition.replace(array, f"uint64 timestamp\n{array}")
-    same_poses(
-        written(tmp_path / "second.mcap", schema + "V2", definition, content), named(tmp_path / "log.mcap")
-    )
+    second = in_ros(tmp_path / "second.mcap", schema + "V2", definition, at_stamps(content, 3_000_000))
+    same_poses(second, named(tmp_path / "log.mcap"))
 
 
 def poses_in_json(path, of):
     """A log of foxglove.PoseInFrame in JSON, a topic a body: what `of` makes of each pose."""
-    with open(path, "wb") as file:
-        writer = Writer(file)
-        writer.start()
-        schema = writer.register_schema("foxglove.PoseInFrame", "jsonschema", b"{}")
-        channels = [writer.register_channel(f"/mocap/{name}", "json", schema) for name in BODIES]
-        for frame in range(COUNT):
-            seconds, rest = divmod(int(STAMPS[frame]), 10**9)
-            for body, channel in enumerate(channels):
-                time = {"sec": seconds} | ({"nsec": rest} if rest else {})
-                text = json.dumps({"timestamp": time, "frame_id": "mocap", "pose": of(frame, body)})
-                writer.add_message(channel, int(STAMPS[frame]), text.encode(), int(STAMPS[frame]))
-        writer.finish()
-    return path
+    def messages(frame):
+        time = {key: value for key, value in foxglove_time(STAMPS[frame]).items() if value}
+        return [(f"/mocap/{name}", {"timestamp": time, "frame_id": "mocap", "pose": of(frame, body)})
+                for body, name in enumerate(BODIES)]  # fmt: skip
+
+    return in_foxglove(path, "json", PoseInFrame, at_stamps(messages))
 
 
 def test_numbers_that_json_leaves_out_are_zero(tmp_path):

@@ -9,19 +9,14 @@ from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from foxglove_schemas_protobuf.PosesInFrame_pb2 import PosesInFrame
 from google.protobuf.json_format import ParseDict
-from mcap.reader import make_reader
 from mcap.writer import Writer
 from mcap_protobuf.schema import build_file_descriptor_set
-from mcap_ros2.decoder import DecoderFactory
 from mcap_ros2.writer import Writer as RosWriter
 from scipy.spatial.transform import Rotation
 
-from tests.support.sessions import curl_truth, instruments, record
 from trunkline.errors import InputError
-from trunkline.recordings.cleaning.checks import TrialLimits
-from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.logs.definitions import HEADER, MARKERS, RIGID_BODIES, SEPARATOR
-from trunkline.recordings.session.session import Session, read_session
+from trunkline.recordings.session.session import Session
 from trunkline.recordings.session.source import open_log
 
 BODIES = ("base", "unit_1", "unit_2")
@@ -55,16 +50,6 @@ float64 x
 float64 y
 float64 z
 {GEOMETRY}"""
-FLOAT_ARRAY = f"""std_msgs/MultiArrayLayout layout
-float64[] data
-{SEPARATOR}MSG: std_msgs/MultiArrayLayout
-std_msgs/MultiArrayDimension[] dim
-uint32 data_offset
-{SEPARATOR}MSG: std_msgs/MultiArrayDimension
-string label
-uint32 size
-uint32 stride
-"""
 
 
 def header(stamp, frame="mocap"):
@@ -111,26 +96,29 @@ def pose_array(frame):
     return [("/poses", {"header": header(STAMPS[frame]), "poses": poses})]
 
 
-def transforms(frame):
-    return [
-        {
-            "header": header(STAMPS[frame]),
-            "child_frame_id": BODIES[body],
-            "transform": {
-                "translation": point(POSITIONS[frame, body]),
-                "rotation": rotation(QUATERNIONS[frame, body]),
-            },
-        }
-        for body in expected_poses(frame)
-    ]
+def link(frame, body):
+    """When, and in what frame, a body is at which place and turn."""
+    return STAMPS[frame], "mocap", BODIES[body], POSITIONS[frame, body], QUATERNIONS[frame, body]
+
+
+def ros_transform(stamp, parent, child, place, turn):
+    transform = {"translation": point(place), "rotation": rotation(turn)}
+    return {"header": header(stamp, parent), "child_frame_id": child, "transform": transform}
+
+
+def foxglove_transform(stamp, parent, child, place, turn):
+    return {
+        "timestamp": foxglove_time(stamp), "parent_frame_id": parent, "child_frame_id": child,
+        "translation": point(place), "rotation": rotation(turn),
+    }  # fmt: skip
 
 
 def tf_together(frame):
-    return [("/tf", {"transforms": transforms(frame)})]
+    return [("/tf", {"transforms": [ros_transform(*link(frame, body)) for body in expected_poses(frame)]})]
 
 
 def tf_apart(frame):
-    return [("/tf", {"transforms": [transform]}) for transform in transforms(frame)]
+    return [("/tf", {"transforms": [ros_transform(*link(frame, body))]}) for body in expected_poses(frame)]
 
 
 def markers(frame):
@@ -155,38 +143,28 @@ def markers(frame):
     ]
 
 
-def foxglove_time(frame):
-    return dict(zip(("sec", "nsec"), divmod(int(STAMPS[frame]), 10**9), strict=True))
-
-
-def foxglove_transform(frame, body):
-    return {
-        "timestamp": foxglove_time(frame),
-        "parent_frame_id": "mocap",
-        "child_frame_id": BODIES[body],
-        "translation": point(POSITIONS[frame, body]),
-        "rotation": rotation(QUATERNIONS[frame, body]),
-    }
+def foxglove_time(stamp):
+    return dict(zip(("sec", "nsec"), divmod(int(stamp), 10**9), strict=True))
 
 
 def foxglove_transforms(frame):
-    return [("/tf", {"transforms": [foxglove_transform(frame, body) for body in expected_poses(frame)]})]
+    return [("/tf", {"transforms": [foxglove_transform(*link(frame, body)) for body in expected_poses(frame)]})]
 
 
 def foxglove_transforms_apart(frame):
-    return [("/tf", foxglove_transform(frame, body)) for body in expected_poses(frame)]
+    return [("/tf", foxglove_transform(*link(frame, body))) for body in expected_poses(frame)]
 
 
 def foxglove_poses(frame):
     poses = [pose(frame, body) for body in range(3)]
-    return [("/poses", {"timestamp": foxglove_time(frame), "frame_id": "mocap", "poses": poses})]
+    return [("/poses", {"timestamp": foxglove_time(STAMPS[frame]), "frame_id": "mocap", "poses": poses})]
 
 
 def foxglove_pose(frame):
     return [
         (
             f"/mocap/{BODIES[body]}",
-            {"timestamp": foxglove_time(frame), "frame_id": "mocap", "pose": pose(frame, body)},
+            {"timestamp": foxglove_time(STAMPS[frame]), "frame_id": "mocap", "pose": pose(frame, body)},
         )
         for body in expected_poses(frame)
     ]
@@ -208,13 +186,45 @@ FOXGLOVE = {
 }
 
 
-def write_ros(path, kind):
-    name, definition, messages = ROS[kind]
+def at_stamps(messages, late=0):
+    """(topic, content, log time) of all frames, of which `messages` gives topics and contents, logged `late` ns."""
+    return [(topic, content, STAMPS[i] + late) for i in range(COUNT) for topic, content in messages(i)]
+
+
+def in_ros(path, schema, definition, messages):
+    """A log of (topic, content, log time)."""
     with open(path, "wb") as file, RosWriter(file, chunk_size=4096) as writer:
-        schema = writer.register_msgdef(name, definition)
-        for frame in range(COUNT):
-            for topic, content in messages(frame):
-                writer.write_message(topic, schema, content, int(STAMPS[frame]) + 3_000_000)
+        kind = writer.register_msgdef(schema, definition)
+        for topic, content, logged in messages:
+            writer.write_message(topic, kind, content, int(logged))
+    return path
+
+
+def in_foxglove(path, encoding, message, messages):
+    """The same of a schema of Foxglove's, in JSON or Protobuf."""
+    with open(path, "wb") as file:
+        writer, channels = Writer(file, chunk_size=4096), {}
+        writer.start()
+        kind = ("jsonschema", b'{"type": "object"}')
+        if encoding == "protobuf":
+            kind = ("protobuf", build_file_descriptor_set(message).SerializeToString())
+        schema = writer.register_schema(message.DESCRIPTOR.full_name, *kind)
+        for topic, content, logged in messages:
+            if topic not in channels:
+                channels[topic] = writer.register_channel(topic, encoding, schema)
+            data = json.dumps(content).encode() if encoding == "json" else protobuf(message, content)
+            writer.add_message(channels[topic], int(logged), data, int(logged))
+        writer.finish()
+    return path
+
+
+def write(path, encoding, kind):
+    """The motion in a schema of the registry."""
+    if encoding == "ros":
+        schema, definition, messages = ROS[kind]
+        return in_ros(path, schema, definition, at_stamps(messages, 3_000_000))
+    message, messages = FOXGLOVE[kind]
+    return in_foxglove(path, encoding, message, at_stamps(messages, 3_000_000))
 
 
 def protobuf(kind, content):
@@ -232,27 +242,6 @@ def _without_time(fields):
     return {key: value for key, value in fields.items() if key != "timestamp"}
 
 
-def write_foxglove(path, kind, encoding):
-    message, messages = FOXGLOVE[kind]
-    with open(path, "wb") as file:
-        writer = Writer(file, chunk_size=4096)
-        writer.start()
-        if encoding == "json":
-            schema = writer.register_schema(message.DESCRIPTOR.full_name, "jsonschema", b'{"type": "object"}')
-        else:
-            descriptors = build_file_descriptor_set(message).SerializeToString()
-            schema = writer.register_schema(message.DESCRIPTOR.full_name, "protobuf", descriptors)
-        channels = {}
-        for frame in range(COUNT):
-            for topic, content in messages(frame):
-                if topic not in channels:
-                    channels[topic] = writer.register_channel(topic, encoding, schema)
-                data = json.dumps(content).encode() if encoding == "json" else protobuf(message, content)
-                logged = int(STAMPS[frame]) + 3_000_000
-                writer.add_message(channels[topic], logged, data, logged)
-        writer.finish()
-
-
 def a_session(**keys):
     trial = {"file": "log.mcap", "experiment": "release", "split": "identify"}
     return Session.model_validate({"frame": {"up": [0, 0, 1]}, "base": "base", "trials": [trial], **keys})
@@ -263,11 +252,7 @@ CASES = [("ros", kind) for kind in ROS] + [(e, kind) for e in ("json", "protobuf
 
 @pytest.mark.parametrize(("encoding", "kind"), CASES)
 def test_poses_come_back_as_written(tmp_path, encoding, kind):
-    path = tmp_path / "log.mcap"
-    if encoding == "ros":
-        write_ros(path, kind)
-    else:
-        write_foxglove(path, kind, encoding)
+    path = write(tmp_path / "log.mcap", encoding, kind)
     unnamed = kind in ("array", "poses")
     poses = open_log(path, a_session(bodies=list(BODIES)) if unnamed else a_session()).poses
     assert poses.undecodable == 0
@@ -292,14 +277,12 @@ def test_poses_come_back_as_written(tmp_path, encoding, kind):
 
 def test_late_samples_of_another_body_join_their_frame(tmp_path):
     """The second body's messages arrive two frames late; its clock is a millisecond off."""
-    path = tmp_path / "log.mcap"
-    with open(path, "wb") as file, RosWriter(file) as writer:
-        schema = writer.register_msgdef("geometry_msgs/msg/PoseStamped", POSE_STAMPED)
-        for frame in range(COUNT):
-            for body, late, off in ((0, 0, 0), (1, 2, 1_000_000)):
-                content = {"header": header(STAMPS[frame] + off), "pose": pose(frame, body)}
-                writer.write_message(f"/{BODIES[body]}", schema, content, int(STAMPS[frame]) + late * 8_333_333 + body)
-    poses = open_log(path, a_session()).poses
+    messages = [
+        (f"/{BODIES[body]}", {"header": header(STAMPS[frame] + off), "pose": pose(frame, body)},
+         STAMPS[frame] + late * 8_333_333 + body)
+        for frame in range(COUNT) for body, late, off in ((0, 0, 0), (1, 2, 1_000_000))
+    ]  # fmt: skip
+    poses = open_log(in_ros(tmp_path / "log.mcap", *ROS["stamped"][:2], messages), a_session()).poses
     assert poses.present.all()
     order = [poses.names.index(name) for name in BODIES[:2]]
     np.testing.assert_array_equal(poses.positions[:, order], POSITIONS[:, :2])
@@ -307,8 +290,7 @@ def test_late_samples_of_another_body_join_their_frame(tmp_path):
 
 
 def test_poses_without_names_need_some(tmp_path):
-    path = tmp_path / "log.mcap"
-    write_ros(path, "array")
+    path = write(tmp_path / "log.mcap", "ros", "array")
     with pytest.raises(InputError, match=r"/poses: found 3 poses without names, expected `bodies`"):
         open_log(path, a_session())
     with pytest.raises(InputError, match=r"/poses: no message fits its schema .* with 2 `bodies`"):
@@ -316,8 +298,7 @@ def test_poses_without_names_need_some(tmp_path):
 
 
 def test_topics_can_be_given_by_body(tmp_path):
-    path = tmp_path / "log.mcap"
-    write_ros(path, "stamped")
+    path = write(tmp_path / "log.mcap", "ros", "stamped")
     wanted = {"poses": {"base": "/vrpn/base/pose", "tip": "/vrpn/unit_2/pose"}}
     poses = open_log(path, a_session(topics=wanted)).poses
     assert poses.names == ("base", "tip")
@@ -341,49 +322,15 @@ def test_other_encodings_are_refused_by_name(tmp_path, encoding, schema_encoding
         open_log(path, a_session())
 
 
-def rewrite_motors(source, target):
-    """The log `source` with the motors' messages as float arrays without a stamp."""
-    with open(source, "rb") as file, open(target, "wb") as out, RosWriter(out) as writer:
-        floats = writer.register_msgdef("std_msgs/msg/Float64MultiArray", FLOAT_ARRAY)
-        bodies = writer.register_msgdef("mocap4r2_msgs/msg/RigidBodies", RIGID_BODIES)
-        reader = make_reader(file, decoder_factories=[DecoderFactory()])
-        for schema, channel, message, content in reader.iter_decoded_messages():
-            if schema.name.endswith("JointState"):
-                plain = {"layout": {"dim": [], "data_offset": 0}, "data": list(content.position)}
-                writer.write_message(channel.topic, floats, plain, message.log_time)
-            else:
-                writer.write_message(channel.topic, bodies, content, message.log_time)
-
-
-def test_float_arrays_count_by_log_time(tmp_path):
-    record(tmp_path, [curl_truth()], instruments())
-    limits = TrialLimits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
-    ((_, stamped, _),) = load_raw_trials(tmp_path, read_session(tmp_path), limits)
-    log = tmp_path / "curl_40.mcap"
-    original = log.rename(tmp_path / "original.log")
-    rewrite_motors(original, log)
-    ((_, refused, _),) = load_raw_trials(tmp_path, read_session(tmp_path), limits)
-    assert "/tendon_commands: found 3 numbers without names, expected `tendons`" in str(refused)
-    with open(tmp_path / "session.yaml", "a") as file:
-        file.write("tendons: [tendon_1, tendon_2, tendon_3]\n")
-    ((_, raw, findings),) = load_raw_trials(tmp_path, read_session(tmp_path), limits)
-    assert raw.tendons == stamped.tendons
-    # the recorder dates all messages by one clock, so that of the offset of 137 ms only the delivery's jitter is left
-    pulls = np.interp(raw.command_time, stamped.command_time - 0.137, stamped.commands[:, 0])
-    np.testing.assert_allclose(raw.commands[:, 0], pulls, atol=2e-3)
-    assert findings.by_log_times.offset == pytest.approx(0, abs=0.02)
-    assert abs(raw.command_time[0]) < 0.02
-
-
 def in_frames(path, frames):
     """PoseStamped of each body, in frames by body and number of its message."""
-    with open(path, "wb") as file, RosWriter(file) as writer:
-        schema = writer.register_msgdef("geometry_msgs/msg/PoseStamped", POSE_STAMPED)
-        for number in range(COUNT):
-            for body, name in enumerate(BODIES):
-                content = {"header": header(STAMPS[number], frames(body, number)), "pose": pose(number, body)}
-                writer.write_message(f"/vrpn/{name}/pose", schema, content, int(STAMPS[number]))
-    return path
+    def messages(number):
+        return [
+            (f"/vrpn/{name}/pose", {"header": header(STAMPS[number], frames(body, number)), "pose": pose(number, body)})
+            for body, name in enumerate(BODIES)
+        ]
+
+    return in_ros(path, *ROS["stamped"][:2], at_stamps(messages))
 
 
 @pytest.mark.parametrize(

@@ -1,13 +1,8 @@
 """Trees of transforms: poses in several frames come out in one, as composed by hand, or are refused by name."""
 
-import json
-
 import numpy as np
 import pytest
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
-from mcap.writer import Writer
-from mcap_protobuf.schema import build_file_descriptor_set
-from mcap_ros2.writer import Writer as RosWriter
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from tests.recordings.logs.test_schemas import (
@@ -15,13 +10,13 @@ from tests.recordings.logs.test_schemas import (
     COUNT,
     POSITIONS,
     QUATERNIONS,
+    ROS,
     STAMPS,
-    TF_MESSAGE,
     a_session,
-    header,
-    point,
-    protobuf,
-    rotation,
+    foxglove_transform,
+    in_foxglove,
+    in_ros,
+    ros_transform,
 )
 from trunkline.errors import InputError
 from trunkline.recordings.preparation.inspect import propose
@@ -49,43 +44,14 @@ def chain(frame: int) -> list[tuple]:
     return [link(STAMPS[frame], *names, pose) for *names, pose in zip(parents, BODIES, relative, strict=False)]
 
 
-def ros(links) -> dict:
-    return {"transforms": [
-        {"header": header(stamp, parent), "child_frame_id": child,
-         "transform": {"translation": point(place), "rotation": rotation(turn)}}
-        for stamp, parent, child, place, turn in links
-    ]}  # fmt: skip
-
-
-def foxglove(links) -> dict:
-    return {"transforms": [
-        {"timestamp": dict(zip(("sec", "nsec"), divmod(stamp, 10**9), strict=True)), "parent_frame_id": parent,
-         "child_frame_id": child, "translation": point(place), "rotation": rotation(turn)}
-        for stamp, parent, child, place, turn in links
-    ]}  # fmt: skip
-
-
 def write(path, messages, encoding="ros"):
     """(topic, links) a message, logged when its first link is dated."""
-    with open(path, "wb") as file:
-        if encoding == "ros":
-            with RosWriter(file) as writer:
-                schema = writer.register_msgdef("tf2_msgs/msg/TFMessage", TF_MESSAGE)
-                for topic, links in messages:
-                    writer.write_message(topic, schema, ros(links), links[0][0])
-            return
-        writer = Writer(file)
-        writer.start()
-        definition = build_file_descriptor_set(FrameTransforms).SerializeToString()
-        kind = ("protobuf", definition) if encoding == "protobuf" else ("jsonschema", b'{"type": "object"}')
-        schema, channels = writer.register_schema(FrameTransforms.DESCRIPTOR.full_name, *kind), {}
-        for topic, links in messages:
-            if topic not in channels:
-                channels[topic] = writer.register_channel(topic, encoding, schema)
-            content = foxglove(links)
-            data = json.dumps(content).encode() if encoding == "json" else protobuf(FrameTransforms, content)
-            writer.add_message(channels[topic], links[0][0], data, links[0][0])
-        writer.finish()
+    made = ros_transform if encoding == "ros" else foxglove_transform
+    contents = [(topic, {"transforms": [made(*link) for link in links]}, links[0][0]) for topic, links in messages]
+    if encoding == "ros":
+        in_ros(path, *ROS["tf"][:2], contents)
+    else:
+        in_foxglove(path, encoding, FrameTransforms, contents)
 
 
 STATIC = ("/tf_static", [link(STAMPS[-1], "world", "mocap", WORLD)])  # dated late: it holds all the time

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mcap.writer import Writer
 
-from tests.recordings.logs.test_schemas import CASES, write_foxglove, write_ros
+from tests.recordings.logs.test_schemas import CASES, write
 from tests.support.sessions import (
     MARKERS,
     all_truths,
@@ -83,8 +83,7 @@ def test_experiments_are_told_apart_without_names(tmp_path, capsys):
 
 @pytest.mark.parametrize(("encoding", "kind"), CASES)
 def test_every_schema_gets_a_proposal_that_is_read(tmp_path, capsys, encoding, kind):
-    path = tmp_path / "log.mcap"
-    write_ros(path, kind) if encoding == "ros" else write_foxglove(path, kind, encoding)
+    path = write(tmp_path / "log.mcap", encoding, kind)
     _, proposed = inspect(capsys, path)
     (tmp_path / "session.yaml").write_text(proposed)
     session = read_session(tmp_path)

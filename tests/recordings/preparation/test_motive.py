@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 
 from demo.instruments import measure
-from tests.support.sessions import MARKERS, instruments, release_truth
+from tests.support.sessions import LIMITS, MARKERS, instruments, release_truth
 from trunkline.errors import InputError
-from trunkline.recordings.cleaning.checks import TrialLimits
 from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.preparation.export import read_export
 from trunkline.recordings.preparation.motive import main
 from trunkline.recordings.session.session import read_session
 
 BODIES = ("base", *MARKERS)
-LIMITS = TrialLimits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
 
 
 @pytest.fixture(scope="module")

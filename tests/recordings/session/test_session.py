@@ -126,9 +126,8 @@ def test_motors_and_tendons_exclude_each_other(tmp_path):
     ],
 )
 def test_mistakes(tmp_path, path, value, message):
-    with pytest.raises(InputError, match=r"session\.yaml: " + message) as error:
+    with pytest.raises(InputError, match=r"session\.yaml: " + message):
         read_session(session(tmp_path, changed(*path, value=value)))
-    assert "\n" not in str(error.value)
 
 
 def test_missing_keys_and_files(tmp_path):

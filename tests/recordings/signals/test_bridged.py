@@ -18,6 +18,7 @@ FAR = [0.0, 4.0, 8.0, 20.0]  # s of samples
         (FAR, [-2.0, -1.0, 0.0], 4.0, [False, False, True]),  # before
         (FAR, [20.0, 21.0, 22.0], 4.0, [True, False, False]),  # and after all
         ([0.0, 1.5, 9.0], [0.0, 1.0, 2.0, 3.0], 0.0, [True, True, True, False]),  # half a step from a sample
+        ([0.0, 1.49, 9.0], [0.0, 1.0, 2.0, 3.0], 0.0, [True, True, False, False]),
         ([0.0, 9.0], [3.0], 1.0, [True]),  # a grid of one
         ([0.0, 9.0], [3.0, 4.0], 1.0, [False, False]),  # of two
         ([5.0], [4.0, 5.0, 6.0], 9.0, [False, True, False]),  # a sample alone

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trunkline.recordings.signals.smoothing import bridged, fill_gaps, low_pass, noise_level, outliers, resample
+from trunkline.recordings.signals.smoothing import fill_gaps, low_pass, noise_level, outliers, resample
 
 RATE = 120.0
 TIME = np.arange(600) / RATE
@@ -54,32 +54,6 @@ def test_resampling_bridges_jitter_and_short_gaps():
     time = (TIME + rng.normal(scale=1e-3, size=600))[visible]
     error = np.linalg.norm(resample(time, swing(time), TIME) - swing(TIME), axis=1)
     assert error[5:-5].max() < 2e-4
-
-
-def test_only_long_gaps_and_ends_are_not_trusted():
-    visible = np.ones(600, bool)
-    visible[200:206] = visible[300:330] = visible[590:] = False
-    trusted = bridged(TIME[visible], TIME, 0.06)
-    assert np.flatnonzero(~trusted).tolist() == [*range(300, 330), *range(590, 600)]
-
-
-@pytest.mark.parametrize(("steps", "trusted"), [(1, True), (15, True), (16, True), (17, False), (48, False)])
-def test_a_gap_is_bridged_up_to_the_longest_and_no_further(steps, trusted):
-    """On a clock whose times are exact: 16 steps of 1/128 s are the 1/8 s that is asked for."""
-    grid = np.arange(256) / 128
-    time = np.delete(grid, range(100, 99 + steps))
-    expected = np.ones(256, bool)
-    expected[100 : 99 + steps] = trusted
-    np.testing.assert_array_equal(bridged(time, grid, 1 / 8), expected)
-
-
-@pytest.mark.parametrize(("aside", "trusted"), [(0.0, True), (0.49, True), (0.51, False)])
-def test_in_a_long_gap_a_lone_sample_is_trusted_where_it_is(aside, trusted):
-    """Within half a step of it, also before the first sample and after the last."""
-    grid = np.arange(100) / 128
-    time = np.array([20 + aside, 50 + aside, 80 + aside]) / 128
-    expected = np.isin(np.arange(100), [20, 50, 80] if trusted else [21, 51, 81])
-    np.testing.assert_array_equal(bridged(time, grid, 1 / 8), expected)
 
 
 def test_noise_level_sees_through_motion_and_gaps():

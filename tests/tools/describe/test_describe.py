@@ -3,7 +3,6 @@
 import re
 import subprocess
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -11,6 +10,7 @@ import yaml
 
 from stages.build_mjcf import main as build_main
 from tests.model.arm.test_sections import ACTUATION, SOLVER, TWO, arm
+from tests.support.folders import ROOT
 from trunkline.errors import InputError
 from trunkline.model.arm.from_file import FromFile
 from trunkline.model.arm.guide_holes import GuideHoles
@@ -20,8 +20,6 @@ from trunkline.recordings.session.session import Session
 from trunkline.tools.describe.__main__ import main
 from trunkline.tools.describe.drawing import read_drawing
 from trunkline.tools.describe.words import doubt_lines, marker_lines, tendon_lines, unit_lines
-
-ROOT = Path(__file__).parents[3]
 
 
 def session(kinds: list[str], **changes) -> Session:

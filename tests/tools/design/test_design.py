@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 from tests.identification.test_stage import settings
+from tests.support.folders import ROOT
 from tests.support.matched_plant import release, small_model, static_pull, tilt
 from tests.support.small_arm import small_spec
 from tests.support.workbench import workbench
@@ -28,7 +29,6 @@ from trunkline.tools.design.ranking import after_each, expected_loss, suggest
 from trunkline.tools.design.settings import Recordable
 from trunkline.tools.design.words import entry_lines, why_words
 
-ROOT = Path(__file__).parents[3]
 SHARE, FRAMES = 0.005, 60
 ELASTIC = {"stiffness": (0.1, 20.0), "rest_bend_y": (-0.1, 0.1)}
 

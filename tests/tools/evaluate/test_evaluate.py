@@ -12,35 +12,28 @@ import pytest
 
 from demo.recorder import write_log
 from tests.identification.test_stage import settings
-from tests.support.matched_plant import curl, release, small_model, tilt
+from tests.support.folders import ROOT
+from tests.support.matched_plant import curl, mjcf_of, release, small_model, tilt
 from tests.support.sessions import MARKERS, all_truths, instruments, record
-from tests.support.small_arm import small_spec
 from tests.support.workbench import workbench
 from trunkline.errors import InputError
-from trunkline.identification.parameters.saving import save_model
 from trunkline.pipeline.identify import run
-from trunkline.pipeline.stage import run_stage
 from trunkline.recordings.trials.splits import SPLITS
 from trunkline.recordings.trials.trial import read_trials, write_trials
 from trunkline.tools.evaluate.__main__ import main
 from trunkline.tools.evaluate.session import trials_of
 from trunkline.twin.twin import Twin
 
-ROOT = Path(__file__).parents[3]
+
+def write_model(path: Path, model: mujoco.MjModel) -> None:
+    path.parent.mkdir(parents=True)
+    path.write_text(mjcf_of(model))
 
 
-def write_model(path: Path, change=lambda model: None) -> Path:
-    spec, model = small_spec(4), small_model(4)
-    spec.option.timestep = model.opt.timestep
-    spec.compile()
-    change(model)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(save_model(spec, model))
-    return path
-
-
-def softer(model):
+def softer() -> mujoco.MjModel:
+    model = small_model(4)
     model.jnt_stiffness[:] *= 0.7
+    return model
 
 
 @pytest.fixture(scope="module")
@@ -57,8 +50,8 @@ def made(tmp_path_factory):
     folder = root / "data/processed/filter"
     folder.mkdir(parents=True)
     write_trials(folder, trials)
-    write_model(root / "artifacts/build_mjcf/arm.xml", softer)
-    write_model(root / "right/arm.xml")
+    write_model(root / "artifacts/build_mjcf/arm.xml", softer())
+    write_model(root / "right/arm.xml", model)
     return root
 
 
@@ -108,8 +101,7 @@ def test_an_arm_that_aged_shows_against_a_reference(lab, capsys):
     root, right, folder = lab
     evaluate(right, folder, "--out", root / "july")
     old = read_trials(folder, SPLITS)
-    aged = small_model(4)
-    softer(aged)
+    aged = softer()
     new = [tilt(aged, trial.level, trial.split) if trial.experiment == "static_tilt" else trial for trial in old]
     write_trials(folder, new)
     capsys.readouterr()
@@ -149,22 +141,6 @@ def test_trials_that_the_model_was_fitted_to_are_marked_and_another_session_s_ar
     write_trials(folder, [replace(t, positions=t.positions + 1e-4) for t in read_trials(folder, SPLITS)])
     evaluate(model_path, folder)
     assert "was fitted" not in capsys.readouterr().out
-
-
-def test_logs_give_the_trials_that_the_stages_make_of_them(tmp_path, monkeypatch, capsys):
-    from stages import filter as filter_stage
-    from stages import ingest
-
-    monkeypatch.chdir(workbench(tmp_path))
-    run_stage("ingest", ingest.Config, ingest.main)
-    run_stage("filter", filter_stage.Config, filter_stage.main)
-    expected = read_trials(filter_stage.PROCESSED, SPLITS)
-    trials = trials_of(tmp_path / "data/raw/demo", tmp_path, "evaluate")
-    assert len(expected) == len(trials) == 4
-    for first, other in zip(expected, trials, strict=True):
-        assert first.name == other.name
-        assert first.positions.tobytes() == other.positions.tobytes()
-    capsys.readouterr()
 
 
 def test_what_is_said_of_logs_begins_with_who_asked_and_names_repairs(tmp_path, monkeypatch, capsys):

@@ -6,14 +6,10 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from demo.instruments import measure
-from demo.recorder import write_log, write_session
 from demo.truth import Truth
-from tests.support.matched_plant import small_model, tilt
-from tests.support.sessions import instruments
-from tests.support.small_arm import small_spec
+from tests.support import sessions
+from tests.support.matched_plant import mjcf_of, small_model, tilt
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
-from trunkline.identification.parameters.saving import save_model
 
 UNITS = 4
 TILTS = (35.0, 50.0, 65.0, 80.0)
@@ -22,10 +18,7 @@ SECONDS, RATE = 1.0, 480.0
 
 def write_model(path: Path, prefix: str = "unit_") -> Path:
     """prefix: of the units' names."""
-    spec, model = small_spec(UNITS), small_model(UNITS)
-    spec.option.timestep = model.opt.timestep
-    spec.compile()
-    path.write_text(save_model(spec, model).replace("unit_", prefix))
+    path.write_text(mjcf_of(small_model(UNITS)).replace("unit_", prefix))
     return path
 
 
@@ -39,15 +32,7 @@ def record(folder: Path, share: float, repeats: int, seed: int) -> Path:
     """Tilts of an arm of `share` times the stiffness, each `repeats` times, as a session."""
     model, frames = softened(share), int(SECONDS * RATE)
     truths = [_truth(model, angle, f"tilt_{angle:.0f}_{i}", frames) for i in range(repeats) for angle in TILTS]
-    folder.mkdir(parents=True)
-    settings, draws = instruments(), np.random.SeedSequence(seed).spawn(len(truths))
-    measured = [
-        measure(truth, settings, np.random.default_rng(draw), index * settings.pause_s)
-        for index, (truth, draw) in enumerate(zip(truths, draws, strict=True))
-    ]
-    for trial in measured:
-        write_log(folder / f"{trial.name}.mcap", trial)
-    write_session(folder, measured, settings)
+    sessions.record(folder, truths, sessions.instruments(), seed)
     return folder
 
 

@@ -8,12 +8,11 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from tests.support.folders import ROOT
 from tests.tools.monitor.sessions import TILTS, record, write_model
 from trunkline.tools.monitor import pending
 from trunkline.tools.monitor.__main__ import main
 from trunkline.tools.monitor.monitor import LEARN
-
-ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture(scope="module")

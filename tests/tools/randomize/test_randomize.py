@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from tests.support.folders import TABLE_OF_NOTHING
+from tests.support.folders import ROOT, TABLE_OF_NOTHING
 from tests.support.small_arm import small_mjcf
 from trunkline.ar.hybrid.uncertainty import GraspUncertainty, sample
 from trunkline.errors import InputError
@@ -28,7 +28,6 @@ from trunkline.tools.randomize.population import of_population
 from trunkline.twin.posterior import Posterior
 from trunkline.twin.twin import Twin
 
-ROOT = Path(__file__).parents[3]
 TOLD = {"identify_stiffness": ("stiffness", "mount_tilt_x"), "identify_control": ("kp", "damping", "force_range")}
 TRIALS = {f"trial_{number}": "" for number in range(10)}
 
@@ -107,9 +106,12 @@ def test_previews_and_the_certificate_draw_the_same_numbers_from_the_same_seed(w
     for name, column in previewed.items():
         np.testing.assert_array_equal(column, drawn[name])
     expected = drawn_fields(model, drawn)
+    by_the_file = drawn_fields(model, read_randomization(written)[0].sample(5, 0))
     with np.load(written.with_suffix(".npz")) as packed:
+        assert set(packed) == set(expected)
         for name, values in expected.items():
             np.testing.assert_array_equal(packed[name], values)
+            np.testing.assert_allclose(packed[name], by_the_file[name], rtol=1e-12)
     certified = parameter_shifts(twin.arm.model, twin.posterior, *poses_of(model), 5, np.random.default_rng(0))
     stated = [arm.tips(poses_of(model)[1]) for arm in arms_with(model, drawn)]
     np.testing.assert_allclose(certified + arm_of(model).tips(poses_of(model)[1]), stated, atol=1e-9)
@@ -157,15 +159,6 @@ def test_every_drawn_arm_compiles_steps_and_is_another(written, model):
     tips = move(batch, controls, ("site_xpos",))["site_xpos"][:, -1, model.site("tip").id]
     assert np.isfinite(tips).all()
     assert 1e-4 < np.std(tips, axis=0).max() < 0.1
-
-
-def test_packed_draws_are_those_fields(written, model):
-    drawn, _ = read_randomization(written)
-    expected = drawn_fields(model, drawn.sample(5, 0))
-    with np.load(written.with_suffix(".npz")) as packed:
-        assert set(packed) == set(expected)
-        for name, values in expected.items():
-            np.testing.assert_allclose(packed[name], values, rtol=1e-12)
 
 
 def test_the_example_s_first_arm_is_the_calibrated_one_and_the_others_spread_about_it(written, model):
