@@ -1,6 +1,10 @@
-"""What lerobot's own loader reads of a dataset, as JSON: run by a Python in which lerobot is, which knows no Trunkline.
+"""What LeRobot's loader reads of a dataset, with chunks of future actions, as JSON on standard output.
 
-LEROBOT_PYTHON lerobot_reads.py FOLDER
+It runs in an environment without Trunkline: releases 0.4 to 0.6 need an older PyTorch, from 0.5 on also an older NumPy
+and a newer Python. The tests compare what it prints, frame by frame, and skip it without LEROBOT_PYTHON:
+
+    python -m venv lerobot && lerobot/bin/pip install lerobot==0.4.4
+    LEROBOT_PYTHON=$PWD/lerobot/bin/python python -m pytest tests/ar/dataset
 """
 # pyright: reportMissingImports=false
 

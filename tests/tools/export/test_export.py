@@ -28,7 +28,7 @@ UNSEEN = slice(10, 20)  # frames in which nobody saw the second marker
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     """A model that is too soft, trials of another, and their export."""
-    root = tmp_path_factory.mktemp("made")
+    root = tmp_path_factory.mktemp("exported")
     (root / "params.yaml").write_text((ROOT / "params.yaml").read_text())
     model = small_model(4)
     trials = [tilt(model, 45, "validate"), release(model, 0.3, "test", 60), curl(model, 40, frames=60)]
