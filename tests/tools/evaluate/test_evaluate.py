@@ -26,7 +26,7 @@ from trunkline.twin.twin import Twin
 
 
 def write_model(path: Path, model: mujoco.MjModel) -> None:
-    path.parent.mkdir(parents=True)
+    path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(mjcf_of(model))
 
 

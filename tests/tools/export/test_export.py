@@ -36,7 +36,7 @@ def made(tmp_path_factory):
     trials[2].tendons = ("tendon 1", *trials[2].tendons[1:])
     (root / "session").mkdir()
     write_trials(root / "session", [trials[0], trials[1], curl(model, 40, frames=60)])
-    write_model(root / "arm.xml", softer)
+    write_model(root / "arm.xml", softer())
     words = [str(root / name) for name in ("arm.xml", "session", "out.mcap")]
     assert main([*words, "--settings", str(root)]) == 0
     return root, trials
