@@ -28,6 +28,13 @@ async function takeControl(page) {
   await inMode(page, "aim");
 }
 
+/** A server whose robot is where it starts. */
+async function anew(t) {
+  const fresh = await serve();
+  t.after(() => fresh.close());
+  return fresh;
+}
+
 /** Drags a target's marker by `dx`, `dy` pixels, with the true mouse. */
 async function drag(page, kind, dx, dy) {
   const [x, y] = await until(page, (name) => {
@@ -223,7 +230,7 @@ test("on a small page the list of keys hides neither the state nor the next acti
 });
 
 test("the tip's marker that is dragged onto a thing marks it, and a handle moves a target along its axis alone", async (t) => {
-  const { page } = await open(t, browser, server, { drawn: false });
+  const server = await anew(t), { page } = await open(t, browser, server, { drawn: false });
   await loaded(page);
   await takeControl(page);
   await drag(page, "rigid", 16, -12);
@@ -260,8 +267,8 @@ test("the tip's marker that is dragged onto a thing marks it, and a handle moves
 });
 
 test("a doubtful grasp looks so, and its first confirmation only asks again", async (t) => {
+  const server = await anew(t);
   await server.tell("doubtful");
-  t.after(() => server.tell("sure"));
   const { page } = await open(t, browser, server, { drawn: false });
   await loaded(page);
   await takeControl(page);

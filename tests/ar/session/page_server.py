@@ -227,7 +227,7 @@ async def obey(
         word = line.strip()
         robot.is_silent = word == "silent" or (robot.is_silent and word != "speak")
         robot.fault = {"fault": "joint 4: torque", "well": ""}.get(word, robot.fault)
-        planning.probability = {"doubtful": 0.4, "sure": 0.84}.get(word, planning.probability)
+        planning.probability = {"doubtful": 0.4}.get(word, planning.probability)
         if word == "drop":
             await site.stop()
             for client in list(server.clients.values()):
