@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError
 
 from trunkline.ar.session.binary import VERSION
 from trunkline.ar.teleop.messages import Mode, Motion, Offer, Pose, Targets, World
-from trunkline.errors import InputError
+from trunkline.errors import InputError, first_problem
 
 STRICT = {"extra": "forbid", "ser_json_inf_nan": "null"}
 LONGEST = 64  # characters of a name
@@ -306,9 +306,7 @@ def hear(text: str) -> ClientMessage:
     try:
         return _CLIENT_MESSAGE.validate_json(text)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"])) or "the whole"
-        raise InputError(f"message: {where}: {first['msg']}") from error
+        raise InputError(f"message: {first_problem(error)}") from error
     except (RecursionError, UnicodeError) as error:
         raise InputError("message: found what is no JSON") from error
 
