@@ -1,4 +1,4 @@
-"""How the command is called, for the first line of help and messages, and what its verbs' options have in common."""
+"""How the command is called, for the first line of help and messages, and what its verbs have in common."""
 
 import argparse
 from pathlib import Path
@@ -22,3 +22,11 @@ def add_settings(parser: argparse.ArgumentParser, what: str = "says how to filte
     """The option `--settings`. what: the params.yaml in that folder is for."""
     parser.add_argument("--settings", type=Path, metavar="FOLDER", default=Path("."),
                         help=f"whose params.yaml {what}; default: the current folder")  # fmt: skip
+
+
+def aligned(rows: list[list[str]], words: int) -> list[str]:
+    """Lines of columns of equal width: the first `words` to the left, numbers to the right."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    sides = ["<"] * words + [">"] * (len(widths) - words)
+    cells = [f"{{:{side}{width}}}" for side, width in zip(sides, widths, strict=True)]
+    return ["  ".join(cells).format(*row).rstrip() for row in rows]

@@ -4,7 +4,7 @@ Positions in m and quaternions (w, x, y, z), in the rigid base frame unless said
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError
 
@@ -279,19 +279,8 @@ ServerMessage = (
     | WorldMessage
 )
 
-CLIENT_MESSAGES: tuple[type, ...] = (Hello, Pong, LeaseRequest, AlignmentByEye, TouchRequest, AnchorPose, PreviewShown)
-SERVER_MESSAGES: tuple[type, ...] = (
-    Welcome,
-    Refusal,
-    Ping,
-    Clock,
-    Lease,
-    AlignmentProgress,
-    StateMessage,
-    PreviewMessage,
-    PredictionMessage,
-    WorldMessage,
-)
+CLIENT_MESSAGES: tuple[type, ...] = get_args(ClientMessage)
+SERVER_MESSAGES: tuple[type, ...] = get_args(ServerMessage)
 
 _CLIENT_MESSAGE: TypeAdapter[ClientMessage] = TypeAdapter(Annotated[ClientMessage, Field(discriminator="type")])
 _SERVER_MESSAGES = {kind: TypeAdapter(kind) for kind in SERVER_MESSAGES}
