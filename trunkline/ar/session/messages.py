@@ -283,7 +283,7 @@ CLIENT_MESSAGES: tuple[type, ...] = get_args(ClientMessage)
 SERVER_MESSAGES: tuple[type, ...] = get_args(ServerMessage)
 
 _CLIENT_MESSAGE: TypeAdapter[ClientMessage] = TypeAdapter(Annotated[ClientMessage, Field(discriminator="type")])
-_SERVER_MESSAGES = {kind: TypeAdapter(kind) for kind in SERVER_MESSAGES}
+_SERVER_MESSAGES: dict[type, TypeAdapter[Any]] = {kind: TypeAdapter(kind) for kind in SERVER_MESSAGES}
 
 
 def hear(text: str) -> ClientMessage:
