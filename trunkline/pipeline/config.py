@@ -66,13 +66,18 @@ def load_config(schema: type[Schema], stage: str, root: str | Path = ".") -> Sch
         raise InputError(f"{where}: {described}{others}") from error
 
 
-def load_folder(schema: type[Schema], folder: Path) -> Schema:
+def load_folder(schema: type[Schema], folder: Path, renamed: dict[str, str] | None = None) -> Schema:
     """The settings of what is no stage, such as teleoperation: `folder / "config.yaml"` alone, which tunes nothing.
+
+    Args:
+        renamed: keys of the release before, which are read too, to the ones of now.
 
     Raises:
         InputError: one line that names the folder and key, what was found and what was expected.
     """
-    return validated(schema, compose_settings(folder, {}, str(folder)), folder)
+    values = compose_settings(folder, {}, str(folder))
+    rename_keys(values, renamed or {}, str(folder))
+    return validated(schema, values, folder)
 
 
 def validated(schema: type[Schema], values: dict, source: Path) -> Schema:

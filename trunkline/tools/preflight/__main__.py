@@ -5,7 +5,6 @@ params.yaml can be identified if the fitted model is off by half a percent of ea
 and writes nothing.
 """
 
-import argparse
 import sys
 from pathlib import Path
 
@@ -27,7 +26,7 @@ from trunkline.identification.stages import STAGES
 from trunkline.model.arm.kinds import described_arm
 from trunkline.model.places import marker_places
 from trunkline.pipeline.config import own_or_project, settings_of
-from trunkline.program import program_name
+from trunkline.program import add_settings, command_parser
 from trunkline.recordings.trials.inventory import missing_lines, recorded_of_each
 from trunkline.recordings.trials.splits import DECIDING, IDENTIFY
 from trunkline.recordings.trials.trial import sessions_of
@@ -38,17 +37,12 @@ from trunkline.tools.preflight.up_axis import other_ups, up_lines
 
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(
-        prog=program_name("check"),
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = command_parser("check", __doc__)
     parser.add_argument("session", type=Path, metavar="SESSION",
                         help="folder of logs and session.yaml, or of several such, or of filtered trials")  # fmt: skip
     parser.add_argument("--error", type=float, default=0.5, metavar="PERCENT",
                         help="by which the fitted model will be off, of a point's distance from the base")  # fmt: skip
-    parser.add_argument("--settings", type=Path, metavar="FOLDER", default=Path("."),
-                        help="whose params.yaml describes arm and stages; default: the current folder")  # fmt: skip
+    add_settings(parser, "describes arm and stages")
     args = parser.parse_args(arguments)
     description = settings_of("build_mjcf", args.settings)
     spec = described_arm(description, own_or_project(args.settings, "conf")).spec
