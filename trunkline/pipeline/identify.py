@@ -43,7 +43,7 @@ CAD_MODEL = ARTIFACTS / "build_mjcf/arm.xml"
 TRIALS = Path("data/processed/filter")
 SCALARS = ("parameters", "per_session")  # their tables in parameters.json
 CSV = {"index": False, "float_format": "%.6g"}
-SAID, REFUSED = 5.0, 25.0  # % of the arm's length by which bodies may be off after a fit, before it is said, or refused
+WARN_PCT, REFUSE_PCT = 5.0, 25.0  # of the arm's length by which bodies may be off after a fit
 
 
 @dataclass
@@ -180,10 +180,10 @@ def misfit(by_experiment: dict[str, dict], kinds: Sequence[str]) -> str:
     off, share = (by_experiment[worst][f"e_position_{unit}"] for unit in ("mm", "pct"))
     problem = f"after the fit, bodies are {off:.3g} mm off in the mean of {EXPERIMENTS[worst].plural}, "
     problem += f"{share:.2g} % of the arm's length"
-    if share > REFUSED:
+    if share > REFUSE_PCT:
         causes = "unit, `frame.up`, base and names in session.yaml, the arm under build_mjcf, ranges of parameters"
-        raise InputError(f"{problem}, expected at most {REFUSED:g} %: nothing is identified; look at {causes}")
-    return f"{problem}: values below are of an arm that does not fit" if share > SAID else ""
+        raise InputError(f"{problem}, expected at most {REFUSE_PCT:g} %: nothing is identified; look at {causes}")
+    return f"{problem}: values below are of an arm that does not fit" if share > WARN_PCT else ""
 
 
 def compared_models(
