@@ -221,13 +221,14 @@ def test_what_settings_are_made_of_is_checked_again_once_it_changed(
     assert checked == [["fit", "train"], [], changed]
 
 
+NO_NAME = "identify_stiffness.parameters.stifness: found 'stifness', expected the name of a parameter"
 FIRST, STIFFNESS = "identify_stiffness", "params.yaml: identify_stiffness.parameters.stiffness"
 
 
 @pytest.mark.parametrize(
     ("stage", "old", "new", "message"),
     [
-        (FIRST, "    stiffness:", "    stifness:", " names, did you mean 'stiffness'?"),
+        (FIRST, "    stiffness:", "    stifness:", f"{NO_NAME}, did you mean 'stiffness'?"),
         (FIRST, "{low: 0.3,", "{low: 30.0,", f"{STIFFNESS}: low: found 30.0, expected less than high, 12.0"),
         (FIRST, "{low: 0.3,", "{lwo: 0.3,", f"{STIFFNESS}.lwo: unknown key, did you mean 'low'?"),
         (FIRST, "{low: 0.3,", "{low: .nan,", f"{STIFFNESS}.low: found nan, expected a finite number"),

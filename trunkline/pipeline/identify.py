@@ -18,7 +18,7 @@ from trunkline.identification.fit.identify import Identification, identify, with
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.settings import IdentificationSettings
 from trunkline.identification.fit.setup import check_parameters, set_up, unidentifiable_mass, with_every
-from trunkline.identification.parameters.parameters import MASS, NAMES
+from trunkline.identification.parameters.parameters import MASS
 from trunkline.identification.parameters.per_session import (
     make_room,
     names_in,
@@ -200,7 +200,7 @@ def compared_models(
         models["coarse"] = models["identified"]
     elif whole:
         extended = read_spec(CAD_MODEL)
-        make_room(extended, names_in(inputs.model, NAMES))
+        make_room(extended, names_in(inputs.model))
         rows = {name: row for table in earlier for key in SCALARS for name, row in table.get(key, {}).items()}
         values = {name: row["value"] for name, row in rows.items()}
         models["coarse"] = with_parameters(extended.compile(), values | result.values)

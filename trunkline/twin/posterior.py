@@ -20,7 +20,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from trunkline.errors import InputError
-from trunkline.identification.parameters.parameters import NAMES, parameter_named
+from trunkline.identification.parameters.parameters import parameter_name, parameter_named
 
 INTERVAL = "interval_95_given_model"
 Seed = np.random.Generator | int
@@ -116,8 +116,10 @@ class Posterior:
 
 def _row(table: dict, name: str) -> tuple[float, ...]:
     """Estimate, half width of the 95 % interval, degrees of freedom, and both ends of the range."""
-    if name not in NAMES:
-        raise InputError(f"parameters: found {name!r}, expected one of {', '.join(NAMES)}")
+    try:
+        parameter_name(name)
+    except ValueError as error:
+        raise InputError(f"parameters: {error}") from error
     row, parameter = table["parameters"][name], parameter_named(name)
     low, high = row[INTERVAL]
     if low is None or high is None or not low <= high or (low <= 0 and not parameter.signed):

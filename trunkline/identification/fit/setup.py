@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import mujoco
 
-from trunkline.errors import InputError
+from trunkline.errors import InputError, nearest
 from trunkline.identification.fit.fit import Fit
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.settings import IdentificationSettings
-from trunkline.identification.parameters.parameters import EVERY, MASS, names_of, parameter_named
+from trunkline.identification.parameters.parameters import EVERY, MASS, names_of, parameter_named, parameters_of
 from trunkline.identification.parameters.per_session import names_in
 from trunkline.identification.simulate.experiment import Experiment, prepare
 from trunkline.identification.simulate.markers import with_measured_markers
@@ -78,10 +78,12 @@ def unidentifiable_mass(config: IdentificationSettings, trials: list[Trial]) -> 
 
 def check_parameters(stage: str, config: IdentificationSettings, model: mujoco.MjModel) -> None:
     """Refuse parameters of what the arm has not got: tendons, motors, joints' elements, units of some length."""
+    of_arm = list(parameters_of(model))
     for name in config.parameters:
         parameter, where = parameter_named(name), f"params.yaml: {stage}.parameters.{name}"
-        if not parameter.belongs_to(model):
-            raise InputError(f"{where}: {parameter.part.lacking}")
+        if name not in of_arm:
+            suggestion = nearest(name, of_arm) if name[-1].isdecimal() else ""
+            raise InputError(f"{where}: {parameter.part.lacking}{suggestion}")
         try:
             parameter.read(model)
         except InputError as error:

@@ -3,6 +3,8 @@
 The model is the first session's. What another has is a number in the MJCF, called `parameter@session`.
 """
 
+from collections.abc import Container
+
 import mujoco
 import numpy as np
 
@@ -37,11 +39,12 @@ def per_session_names(parameters: list[str], per_session: list[str], sessions: l
     return {f"{name}{SESSION_MARK}{session}": name for session in sessions for name in selected}
 
 
-def names_in(model: mujoco.MjModel, parameters) -> dict[str, str]:
-    """Names of the per-session parameters in a model that belong to `parameters`, with the shared names."""
+def names_in(model: mujoco.MjModel, parameters: Container[str] | None = None) -> dict[str, str]:
+    """Names of the per-session parameters in a model, of those alone that belong to `parameters`, with the shared
+    names."""
     numbers = [model.numeric(index).name for index in range(model.nnumeric)]
     shared = {name: name.partition(SESSION_MARK)[0] for name in numbers if SESSION_MARK in name}
-    return {name: parameter for name, parameter in shared.items() if parameter in parameters}
+    return {name: parameter for name, parameter in shared.items() if parameters is None or parameter in parameters}
 
 
 def make_room(spec: mujoco.MjSpec, names: dict[str, str]) -> None:
