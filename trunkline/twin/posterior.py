@@ -21,6 +21,7 @@ from scipy.special import stdtrit
 
 from trunkline.errors import InputError
 from trunkline.identification.parameters.parameters import parameter_name, parameter_named
+from trunkline.identification.stages import last_stages
 
 INTERVAL = "interval_95_given_model"
 Seed = np.random.Generator | int
@@ -54,7 +55,7 @@ class Posterior:
         Raises:
             InputError: naming what a table lacks, a parameter that is unknown, or one whose interval is none.
         """
-        last = {name: stage for stage, table in tables.items() for name in table["parameters"]}
+        last = last_stages(tables, "parameters")
         names, stages = list(last), list(last.values())
         rows, correlation = np.zeros((len(names), 5)), np.eye(len(names))
         for i, (name, stage) in enumerate(last.items()):
