@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import AfterValidator
 from scipy.spatial.transform import Rotation
 
-from trunkline.errors import nearest
+from trunkline.errors import InputError, nearest
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.identification.parameters.joints import (
     DAMPING_FIELDS,
@@ -127,6 +127,18 @@ def parameters_of(model: mujoco.MjModel) -> dict[str, Parameter]:
     """Those that an arm has, in the order in which they are written."""
     names = [name for entry in (*PARAMETERS, *EVERY_NAME) for name in names_of(entry, model)]
     return {name: parameter_named(name) for name in names if parameter_named(name).belongs_to(model)}
+
+
+def parameter_of(model: mujoco.MjModel, name: str) -> Parameter:
+    """An arm's parameter of this name.
+
+    Raises:
+        InputError: the arm lacks the part; of a numbered name, with the nearest that it has.
+    """
+    parameter, names = parameter_named(name), list(parameters_of(model))
+    if name not in names:
+        raise InputError(parameter.part.lacking + (nearest(name, names) if name[-1].isdecimal() else ""))
+    return parameter
 
 
 def in_writing_order(names: Iterable[str]) -> list[str]:

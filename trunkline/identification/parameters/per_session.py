@@ -55,13 +55,21 @@ def make_room(spec: mujoco.MjSpec, names: dict[str, str]) -> None:
             spec.add_numeric(name=name, size=1, data=[parameter_named(shared).read(model)])
 
 
-def unidentifiable_per_session(names: dict[str, str], trials: list[Trial], kinds: list[str]) -> list[str]:
-    """A line for each session of `trials` whose own trials to identify from do not determine one of its per-session
-    parameters; `names` is from `per_session_names`.
+def add_sessions(
+    spec: mujoco.MjSpec, parameters: list[str], per_session: list[str], kinds: list[str], trials: list[Trial]
+) -> list[str]:
+    """As `make_room`, for all sessions of `trials` but the first, whose model it is.
 
     Args:
-        kinds: of experiment, to identify from.
+        parameters: of a stage. per_session: those that each session has for itself. kinds: of experiment, to identify
+            from.
+
+    Returns:
+        A line for each session whose own trials to identify from do not determine one of its per-session parameters.
     """
+    names = per_session_names(parameters, per_session, sessions_of(trials)[1:])
+    if names:
+        make_room(spec, names)
     identified = {trial.session for trial in trials if trial.split == IDENTIFY and trial.experiment in kinds}
     return [
         f"per_session: {shared}: found no {' or '.join(kinds)} of the session {session} with split identify to tell "
