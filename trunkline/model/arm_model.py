@@ -228,7 +228,7 @@ class ArmModel:
         return self.numbers(SECTIONS).astype(int)
 
     def switch_off(self, *names: str) -> bool:
-        """Set the model's numbers of these names to 0, in place; returns whether the first of any was another."""
+        """Set the model's numbers of these names to 0, in place; returns whether any was on, by its first value."""
         changed = any(self.number(name) for name in names)
         for name in names:
             self.model.numeric_data[self.places(name)] = 0
