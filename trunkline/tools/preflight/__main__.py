@@ -16,11 +16,7 @@ from trunkline.identification.diagnostics.identifiability import (
     unidentifiable,
 )
 from trunkline.identification.fit.setup import check_parameters, unidentifiable_mass
-from trunkline.identification.parameters.per_session import (
-    make_room,
-    per_session_names,
-    unidentifiable_per_session,
-)
+from trunkline.identification.parameters.per_session import add_sessions
 from trunkline.identification.simulate.checks import check_trials
 from trunkline.identification.stages import STAGES
 from trunkline.model.arm.kinds import described_arm
@@ -29,7 +25,6 @@ from trunkline.pipeline.config import own_or_project, settings_of
 from trunkline.program import add_settings, command_parser
 from trunkline.recordings.trials.inventory import missing_lines, recorded_of_each
 from trunkline.recordings.trials.splits import DECIDING, IDENTIFY
-from trunkline.recordings.trials.trial import sessions_of
 from trunkline.settings import read_yaml
 from trunkline.tools.evaluate.session import read_trials_of
 from trunkline.tools.preflight.up_axis import other_ups, up_lines
@@ -59,12 +54,9 @@ def main(arguments: list[str] | None = None) -> int:
     ups = other_ups(raw_trials)
     for stage, config in configs.items():
         check_parameters(stage, config, model)
-        names = per_session_names(list(config.parameters), config.per_session, sessions_of(trials)[1:])
-        make_room(spec, names)
+        lines = add_sessions(spec, list(config.parameters), config.per_session, config.experiments, trials)
         model = spec.compile()
-        lacking = unidentifiable(config, trials) or [
-            *unidentifiable_per_session(names, trials, config.experiments), *unidentifiable_mass(config, trials),
-        ]  # fmt: skip
+        lacking = unidentifiable(config, trials) or [*lines, *unidentifiable_mass(config, trials)]
         chosen = [t for t in trials if t.experiment in config.experiments and t.split == IDENTIFY]
         print(f"{stage}, from {len(chosen)} trials:", flush=True)
         for line in lacking:
