@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 import mujoco
 from pydantic import TypeAdapter, ValidationError
 
-from trunkline.errors import InputError, first_problem
+from trunkline.errors import InputError
 from trunkline.kinematics.panda.mounts import Robot
 
 ROOT = "package/"  # folder that npm's and Unity's tarballs hold everything in
@@ -136,7 +136,9 @@ def robot_of(files: dict[str, bytes]) -> Robot:
     try:
         return TypeAdapter(Robot).validate_python(_hybrid(files)["robot"])
     except ValidationError as error:
-        raise InputError(f"{MANIFEST}: hybrid: robot: {first_problem(error)}") from None
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise InputError(f"{MANIFEST}: hybrid: robot: {place}: {first['msg']}") from None
 
 
 class _CheckedBlock(dict):

@@ -13,12 +13,6 @@ float64 x
 float64 y
 float64 z
 """
-QUATERNION = f"""{SEPARATOR}MSG: geometry_msgs/Quaternion
-float64 x
-float64 y
-float64 z
-float64 w
-"""
 MARKER = f"""{SEPARATOR}MSG: mocap4r2_msgs/Marker
 int8 USE_NAME=0
 int8 USE_INDEX=1
@@ -61,7 +55,18 @@ uint32 frame_number
 string[] rigid_body_names
 geometry_msgs/Point[] positions
 geometry_msgs/Quaternion[] orientations
-{HEADER}{POINT}{QUATERNION}"""
+{HEADER}{POINT}{SEPARATOR}MSG: geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+"""
+QUATERNION = f"""{SEPARATOR}MSG: geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+"""
 POSE = f"""{SEPARATOR}MSG: geometry_msgs/Pose
 geometry_msgs/Point position
 geometry_msgs/Quaternion orientation
