@@ -147,6 +147,17 @@ def test_where_the_exchange_itself_fails_the_old_twin_is_where_it_was(step, lab,
     assert not (lab / "stiff.before").exists()
 
 
+def test_a_twin_that_cannot_be_copied_costs_no_earlier_one(lab, monkeypatch):
+    def fail(*args):
+        raise OSError(28, "No space left on device")
+
+    shutil.copytree(lab / "stiff", lab / "stiff.before")
+    earlier = files(lab / "stiff.before")
+    monkeypatch.setattr(shutil, "copytree", fail)
+    assert main(["stiff", "right", "of_right", "of_right"]) == 1
+    assert files(lab / "stiff.before") == earlier
+
+
 def test_what_is_no_pair_of_twins_is_one_line_and_nothing_is_written(lab, capsys):
     os.symlink("stiff", "link")
     (lab / "arm.tgz").write_bytes(b"")

@@ -103,11 +103,11 @@ def _exchange(old: Path, new: Path, digest: str, then: Callable[[], None]) -> No
     """Put a copy of `new` in the place of `old`, which stays beside; `then` is the last step. Where anything fails, the
     old one is where it was. digest: of the model that was judged."""
     part, before = old.with_name(f".part.{old.name}"), old.with_name(old.name + BEFORE)
-    for leftover in (part, before):
-        shutil.rmtree(leftover) if leftover.is_dir() else leftover.unlink(missing_ok=True)
+    _remove(part)
     shutil.copytree(new, part) if new.is_dir() else shutil.copy2(new, part)
     if Twin.load(part).provenance.digest != digest:
         raise InputError(f"{new}: found another model than the one that was judged, expected the same")
+    _remove(before)
     os.rename(old, before)
     try:
         os.rename(part, old)
@@ -117,6 +117,11 @@ def _exchange(old: Path, new: Path, digest: str, then: Callable[[], None]) -> No
             os.rename(old, part)
         os.rename(before, old)
         raise
+
+
+def _remove(path: Path) -> None:
+    """A folder or a file, where there is one."""
+    shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
 
 
 def _read(file: Path) -> list[dict]:
