@@ -59,7 +59,7 @@ def make_timed(runs: list[Run], package: Path, source: Provenance, table: Path, 
     """As `runs.make`, the first missing run of each experiment before all others; then says how long those take."""
     made = {run_of(result) for result in source.of(read_results(table))}
     missing = [run for run in runs if run not in made]
-    first = list({run.experiment: run for run in reversed(missing)}.values())[::-1]
+    first = list({run.experiment: run for run in reversed(missing)}.values())
     print(f"{len(missing)} of {len(runs)} runs to make, {workers} side by side; Ctrl-C stops, the same command goes on")
     if len(missing) > len(first):
         began = time.monotonic()

@@ -12,7 +12,7 @@ from mcap_ros2.writer import Writer as RosWriter
 from tests.recordings.cleaning.test_loading import edit_session, one_trial, taken
 from tests.support.sessions import curl_truth, pull_truth
 from trunkline.errors import InputError
-from trunkline.recordings.logs.definitions import JOINT_STATE, RIGID_BODIES, SEPARATOR
+from trunkline.recordings.logs.definitions import JOINT_STATE, KNOWN, RIGID_BODIES
 
 
 def curl(folder, change=lambda m: None, clock="frame"):
@@ -115,24 +115,12 @@ def test_a_motor_may_wind_several_tendons_by_degrees_of_its_drum(tmp_path):
     refused_curl(tmp_path, "command topic: found m1, m2, m3, expected 'm4' as in session.yaml")
 
 
-FLOAT_ARRAY = f"""std_msgs/MultiArrayLayout layout
-float64[] data
-{SEPARATOR}MSG: std_msgs/MultiArrayLayout
-std_msgs/MultiArrayDimension[] dim
-uint32 data_offset
-{SEPARATOR}MSG: std_msgs/MultiArrayDimension
-string label
-uint32 size
-uint32 stride
-"""
-
-
 def messages_of(folder, split, floats=False):
     """The log of the curl with its commands and measured positions as `split` makes them of each message: a list of
     (topic, names, positions). floats: as arrays of numbers alone."""
     original = (folder / "curl_40.mcap").rename(folder / "original.log")
     with open(original, "rb") as file, open(folder / "curl_40.mcap", "wb") as out, RosWriter(out) as writer:
-        arrays = ("std_msgs/msg/Float64MultiArray", FLOAT_ARRAY)
+        arrays = ("std_msgs/msg/Float64MultiArray", KNOWN["std_msgs/Float64MultiArray"])
         joints = writer.register_msgdef(*(arrays if floats else ("sensor_msgs/msg/JointState", JOINT_STATE)))
         bodies = writer.register_msgdef("mocap4r2_msgs/msg/RigidBodies", RIGID_BODIES)
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
