@@ -24,6 +24,7 @@ LIBRARY = "trunkline"
 CONNECTING = 10.0  # s until a scheduler that does not answer counts as none
 FIRST_WORKER = 10.0  # s until one without workers is an error
 NO_WORKERS = 60.0  # s without any worker until work ends: a killed one comes back sooner
+FETCHING = 60.0  # s in which a result comes, or it is asked for again
 LOOK = 1.0  # s between looks at whether the scheduler and its workers are still there
 SHARED = 8  # values that all pieces need, until the oldest is forgotten
 
@@ -88,10 +89,9 @@ class Cluster:
                 del futures  # what is done is released as it leaves `left`
                 while left:
                     for future in self._done(list(left)):
-                        yield left.pop(future), pickle.loads(future.result())
+                        yield left.pop(future), pickle.loads(self._result(future))
             finally:
-                if left and self.answers():
-                    self._client.cancel(list(left))
+                left.clear()  # the scheduler drops what nobody waits for
 
     @contextmanager
     def _in_one_line(self) -> Iterator[None]:
@@ -104,7 +104,7 @@ class Cluster:
                 "the memory for it"
             ) from error
         except (CancelledError, OSError, RuntimeError) as error:
-            if self.answers() and not isinstance(error, CancelledError):
+            if self.answers() and not isinstance(error, (CancelledError, self._dask.comm.CommClosedError)):
                 raise
             raise InputError(
                 f"{VARIABLE}: the scheduler at {self._address} went away, expected it to stay until the end"
@@ -126,6 +126,15 @@ class Cluster:
                     raise InputError(
                         f"{VARIABLE}: found no workers at {self._address} for {NO_WORKERS:.0f} s, expected one"
                     ) from None
+
+    def _result(self, future: Any) -> bytes:
+        """Of one that is done. Dask waits for ever for one whose scheduler goes away just then."""
+        while True:
+            try:
+                return future.result(timeout=FETCHING)
+            except TimeoutError:
+                if future.status == "error" or not self.answers():
+                    raise
 
     def _check(self, package: str) -> None:
         """Refuse workers with another environment before they have any work; those that come later refuse it."""
