@@ -29,7 +29,7 @@ class Loaded:
 
 
 @dataclass
-class Pull:
+class PullPlan:
     """levels: mm of pull of each tendon, null where it is loose. from_beyond: whether motors go too far at first."""
 
     levels: list[Pulled | None]
@@ -37,7 +37,7 @@ class Pull:
 
 
 @dataclass
-class Motion:
+class MotionPlan:
     """frequencies: Hz, of sines with phases of their own to x and to y. amplitude: mm of pull, the largest of their sum
     to each of both. offset: mm of pull of all tendons, negative for slack."""
 
@@ -55,8 +55,8 @@ class ForTest:
     curl_levels: Annotated[list[Level], Field(min_length=1)]
     curl_tendons: Annotated[list[Group], Field(min_length=1)]
     loads: list[Loaded] = field(default_factory=list)
-    pulls: list[Pull] = field(default_factory=list)
-    motions: list[Motion] = field(default_factory=list)
+    pulls: list[PullPlan] = field(default_factory=list)
+    motions: list[MotionPlan] = field(default_factory=list)
 
 
 @dataclass
@@ -102,13 +102,13 @@ class Experiments:
     curl_ramp: Duration
     curl_hold: Duration
     loads: list[Loaded]
-    pulls: list[Pull]
+    pulls: list[PullPlan]
     pull_ramp: Duration
     pull_beyond: Annotated[float, Field(ge=1, le=10)]
     pull_turn: Duration
     pull_back: Duration
     pull_settle: Duration
-    motions: list[Motion]
+    motions: list[MotionPlan]
     motion_rest: Duration
     motion_fade: Duration
     motion_duration: Duration

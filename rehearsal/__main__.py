@@ -18,7 +18,7 @@ from rehearsal.experiments.bench import bench_of
 from rehearsal.experiments.registry import EXPERIMENTS
 from rehearsal.experiments.result import Result, read_results, summary
 from rehearsal.report import draw
-from rehearsal.runs import Provenance, Run, make, run_of, source_of, wanted
+from rehearsal.runs import Run, RunSource, make, run_of, source_of, wanted
 from trunkline.ar.preview.package import only_package
 from trunkline.compute.threads import thread_count
 from trunkline.errors import in_one_line
@@ -55,7 +55,7 @@ def main() -> int:
     return 0
 
 
-def make_timed(runs: list[Run], package: Path, source: Provenance, table: Path, workers: int) -> list[Result]:
+def make_timed(runs: list[Run], package: Path, source: RunSource, table: Path, workers: int) -> list[Result]:
     """As `runs.make`, the first missing run of each experiment before all others; then says how long those take."""
     made = {run_of(result) for result in source.of(read_results(table))}
     missing = [run for run in runs if run not in made]

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rehearsal.experiments.bench import Bench, perform
+from rehearsal.experiments.bench import SharedRun, perform
 from rehearsal.experiments.registry import EXPERIMENTS
 from rehearsal.film import SHOTS_PER_SECOND, Shot, filmed
 from trunkline.frames import rotation_from_wxyz
@@ -18,7 +18,7 @@ TRACED = 80  # shots, about 7 s
 AROUND = np.linspace(0, 2 * np.pi, 17)
 
 
-def animate(bench: Bench, names: list[str], seed: int, folder: Path) -> None:
+def animate(bench: SharedRun, names: list[str], seed: int, folder: Path) -> None:
     """Write `folder / "<name>.gif"` of each experiment, and `folder / "still.png"` of all."""
     folder.mkdir(parents=True, exist_ok=True)
     stills = {}

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rehearsal.robot.scene import SceneObject, SupportSurface
+from rehearsal.robot.scene import SceneObject
 from rehearsal.session import RATE, RehearsedSession
+from trunkline.ar.hybrid.worlds import SupportSurface
 from trunkline.frames import rotation_from_wxyz
 from trunkline.kinematics.panda.kinematics import FLANGE, joint_frames
 

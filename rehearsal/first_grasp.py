@@ -24,8 +24,9 @@ from demo.plants.stranger import Stranger
 from demo.rig import ROOT as LAB
 from demo.rig import Config as Lab
 from rehearsal.operator.hands import as_hands_move
-from rehearsal.robot.scene import Scene, SceneObject, SupportSurface
+from rehearsal.robot.scene import Scene, SceneObject
 from rehearsal.robot.stand_in import SUBSTEPS, StandIn, StandInRobot, Truth
+from trunkline.ar.hybrid.worlds import SupportSurface
 from trunkline.frames import wxyz_from_rotation
 from trunkline.kinematics.panda.kinematics import Q_MAX, Q_MIN, mount_pose
 from trunkline.pipeline.config import load_config
@@ -127,7 +128,8 @@ class GraspTrial:
                 place[2] = centres[-1][2] + object.half_height - CLEARANCE
             object.position = place.tolist()
             top = place - [0, 0, object.half_height]
-            self.scene = Scene(FLOOR, object, {"table": SupportSurface(top.tolist(), TABLES[placement.shape])})
+            table = SupportSurface(top.tolist(), TABLES[placement.shape], "wood")
+            self.scene = Scene(FLOOR, object, {"table": table})
         self.robot = StandInRobot(arm, self.scene, settings, self.aside, seed, LOOSENED, substeps)
         self.pictures: list[tuple[str, np.ndarray, Truth]] = []
 

@@ -10,7 +10,7 @@ from rehearsal.experiments.registry import EXPERIMENTS
 from rehearsal.experiments.result import Result, rewrite_results, summary
 from rehearsal.experiments.stated import scores
 from rehearsal.report import draw
-from rehearsal.runs import Provenance, make, source_of, wanted
+from rehearsal.runs import RunSource, make, source_of, wanted
 from trunkline.ar.preview.package import only_package
 from trunkline.compute.threads import thread_count
 from trunkline.errors import nearest
@@ -47,7 +47,7 @@ def main(config: Config) -> None:
     print(rehearsal_table(metrics, goals, f"with package `{source.package}`", variants=True))
 
 
-def metrics_of(source: Provenance, results: list[Result]) -> dict:
+def metrics_of(source: RunSource, results: list[Result]) -> dict:
     """metrics.json: digests of what runs are made of, each experiment's `summary`, and in `preview` what `scores` says,
     where anything was stated."""
     stated = {"preview": preview} if (preview := scores(results)) else {}

@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 from threadpoolctl import threadpool_limits
 
 from rehearsal.experiments.ablations import VARIANTS, varied
-from rehearsal.experiments.bench import Bench, bench_of, perform
+from rehearsal.experiments.bench import SharedRun, bench_of, perform
 from rehearsal.experiments.registry import EXPERIMENTS
 from rehearsal.experiments.result import Result, append_result, read_results
 from trunkline.compute.cluster import VARIABLE
@@ -25,7 +25,7 @@ from upkeep.provenance import REHEARSAL, SHOWN, stage_code
 
 
 @dataclass(frozen=True)
-class Provenance:
+class RunSource:
     """What runs are made of: `package` and `code`, digests; rows of another source do not count.
 
     code: of the files and settings that rehearsal/dvc.yaml lists for the stage, as DVC sees them, without the package.
@@ -45,9 +45,9 @@ class Run:
     variant: str = ""
 
 
-def source_of(package: Path) -> Provenance:
+def source_of(package: Path) -> RunSource:
     """Of a package and of the checkout in whose top we are."""
-    return Provenance(package_digest(read_files(package))[:SHOWN], stage_code(Path("."), *REHEARSAL))
+    return RunSource(package_digest(read_files(package))[:SHOWN], stage_code(Path("."), *REHEARSAL))
 
 
 def wanted(runs: dict[str, int], of_variants: int) -> list[Run]:
@@ -59,7 +59,7 @@ def wanted(runs: dict[str, int], of_variants: int) -> list[Run]:
     return sorted(plain, key=lambda run: run.seed) + variants
 
 
-def make(runs: list[Run], package: Path, source: Provenance, table: Path, workers: int) -> list[Result]:
+def make(runs: list[Run], package: Path, source: RunSource, table: Path, workers: int) -> list[Result]:
     """Those of `runs` that `table` has not, of this source; then all of `runs` that it has."""
     made = {run_of(result) for result in source.of(read_results(table))}
     missing = [run for run in runs if run not in made]
@@ -72,7 +72,7 @@ def make(runs: list[Run], package: Path, source: Provenance, table: Path, worker
     return [result for result in source.of(read_results(table)) if run_of(result) in chosen]
 
 
-def make_one(bench: Bench, run: Run) -> tuple[Result, float]:
+def make_one(bench: SharedRun, run: Run) -> tuple[Result, float]:
     """A run and its seconds of processor. One that breaks off by an error failed, and its cause is the error."""
     began = time.process_time()
     try:
@@ -110,10 +110,10 @@ class _Sent:
     """What a worker of a scheduler makes runs with: the package's bytes, and where `source` is from."""
 
     packed: bytes
-    source: Provenance
+    source: RunSource
 
     @cached_property
-    def bench(self) -> Bench:
+    def bench(self) -> SharedRun:
         with TemporaryDirectory() as folder:
             package = Path(folder) / "package.tgz"
             package.write_bytes(self.packed)
@@ -130,7 +130,7 @@ def _make_sent(sent: _Sent, run: Run) -> tuple[Result, float]:
         return make_one(bench, run)
 
 
-_bench: Bench | None = None  # of a worker
+_bench: SharedRun | None = None  # of a worker
 
 
 def _begin(package: Path) -> None:

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from demo.experiments import Experiments, Motion, Pull
+from demo.experiments import Experiments, MotionPlan, PullPlan
 from demo.instruments import measure
 from demo.laboratory import Laboratory
 from demo.plants.bench import Plant
@@ -79,9 +79,9 @@ def planned(kind: str, base: Experiments, rng: np.random.Generator) -> Experimen
         levels: list[float | None] = [None, None, None]
         for tendon in rng.choice(3, size=rng.integers(1, 3), replace=False):
             levels[tendon] = float(rng.uniform(10, 55))
-        return replace(empty, pulls=[Pull(levels, bool(rng.random() < 0.5))])
+        return replace(empty, pulls=[PullPlan(levels, bool(rng.random() < 0.5))])
     frequencies = np.sort(rng.uniform(0.3, 1.8, 3)).round(2).tolist()
-    return replace(empty, motions=[Motion(frequencies, float(rng.uniform(15, 40)), float(rng.uniform(-4, 1)))])
+    return replace(empty, motions=[MotionPlan(frequencies, float(rng.uniform(15, 40)), float(rng.uniform(-4, 1)))])
 
 
 def done(lab: Laboratory, kind: str, plan: Experiments, rng: np.random.Generator) -> Truth:

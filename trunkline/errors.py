@@ -7,6 +7,10 @@ import sys
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
 
 UNWRITABLE = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EFBIG}  # the disk's business, not the code's
 
@@ -45,6 +49,12 @@ def in_one_line(main: Callable[..., int]) -> Callable[..., int]:
             return 1
 
     return command
+
+
+def first_problem(error: "ValidationError") -> str:
+    """What pydantic said first: `key.0: Input should be …`."""
+    problem = error.errors()[0]
+    return f"{'.'.join(map(str, problem['loc'])) or 'the whole'}: {problem['msg']}"
 
 
 def nearest(name: str, valid: list[str]) -> str:

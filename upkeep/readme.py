@@ -22,7 +22,7 @@ from dvc.repo import Repo
 from trunkline.errors import in_one_line
 from trunkline.identification.evaluation.error_tables import LABELS
 from trunkline.identification.fit.settings import IdentificationSettings
-from trunkline.identification.parameters.parameters import NAMES
+from trunkline.identification.parameters.parameters import EVERY_NAME, in_writing_order
 from trunkline.identification.stages import model_name
 from trunkline.pipeline.checkout import require_checkout
 from trunkline.pipeline.config import load_config
@@ -233,7 +233,7 @@ def parameter_table(root: Path) -> str:
     for stage in STAGES:
         config = load_config(IdentificationSettings, stage, root)
         kinds = ", ".join(EXPERIMENTS[kind].plural for kind in config.experiments)
-        names = [name for name in NAMES if name in config.parameters]
+        names = in_writing_order(name for name in config.parameters if name not in EVERY_NAME)
         lines.append(f"| `{stage}` | {kinds} | {', '.join(f'`{name}`' for name in names)} |")
     return "\n".join(lines)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from trunkline.identification.evaluation.error_tables import number
-from trunkline.identification.stages import STAGES, read_tables
+from trunkline.identification.stages import STAGES, last_stages, read_tables
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.recordings.trials.splits import TEST, VALIDATE
 
@@ -110,8 +110,8 @@ def truth_table(root: Path) -> str:
 
 def identified(root: Path) -> dict[str, dict]:
     """The rows of all stages' parameters.json, by name; of a parameter that two stages identify, the later one."""
-    tables = read_tables(root / "artifacts").values()
-    return {name: row for table in tables for name, row in table["parameters"].items()}
+    tables = read_tables(root / "artifacts")
+    return {name: tables[stage]["parameters"][name] for name, stage in last_stages(tables, "parameters").items()}
 
 
 def expectation(truth: dict, name: str) -> float | None:

@@ -4,9 +4,13 @@ The walk takes the calls of a function in the order in which they stand in the s
 project at its first call, before the calls that come after: depth first, each function once. A call is resolved without
 running anything: names by the imports of the file or its definitions, also where a package's `__init__` hands them on;
 `self.method` by the class around; a class by its `__init__` or `__post_init__`; any other method by its name, where one
-method alone of the project has that name, no built-in type has it, and it is no library's. What is called otherwise is
-not followed, nor are functions that are only handed on. The body of a nested function belongs to the function around
-it. The walk goes back when it comes, by a call or by the end of one, to another file in which it has been before.
+method alone of the project has that name, the file has or imports its class, no built-in type has it, and it is no
+library's. What is called otherwise is not followed, nor are functions that are only handed on. The body of a nested
+function belongs to the function around it.
+
+The walk goes back when a call leads to another file in which it has been before, for a function that it has not read.
+At the end of a call the reader is where he was, which is no going back. A helper of another file whose body is a single
+statement is not entered.
 """
 
 import ast
@@ -57,7 +61,11 @@ class Index:
         if target or not isinstance(function, ast.Attribute) or function.attr in BUILT_IN or self.foreign(path, head):
             return target
         candidates = self.methods.get(function.attr, [])
-        return candidates[0] if len(candidates) == 1 else None
+        return candidates[0] if len(candidates) == 1 and self.named_in(path, candidates[0]) else None
+
+    def named_in(self, path: str, method: Place) -> bool:
+        """Whether the class of a method stands in a file: `plot.text` is of no class that the file does not know."""
+        return method[0] == path or method[1].partition(".")[0] in self.imports[path]
 
     def foreign(self, path: str, head: str) -> bool:
         """Whether a file imports this name from elsewhere than the project: `np`."""
@@ -89,23 +97,29 @@ def _definitions(tree: ast.Module) -> Iterator[tuple[str, ast.AST]]:
 
 
 def walk(index: Index, start: Place) -> list[str]:
-    """The files in the order in which a reader is in them, one entry for each function entered and each call ended."""
-    trail: list[str] = []
+    """The files in the order in which a reader opens them, one entry for each call that leads into another file."""
+    opened = [start[0]]
     entered: set[Place] = set()
 
     def enter(place: Place) -> None:
         entered.add(place)
-        trail.append(place[0])
         for target in index.calls(place):
-            if target not in entered:
+            beside = target[0] == place[0]
+            if target not in entered and (beside or not is_helper(index.functions[target])):
+                if not beside:
+                    opened.append(target[0])
                 enter(target)
-                trail.append(place[0])
 
     enter(start)
-    return trail
+    return opened
 
 
-def going_back(trail: list[str]) -> tuple[int, int]:
-    """How many files are entered, and how often the walk comes back to one that it had left."""
-    moves = [file for before, file in zip([""] + trail, trail, strict=False) if file != before]
-    return len(set(moves)), len(moves) - len(set(moves))
+def is_helper(function: ast.AST) -> bool:
+    """Whether the body is one statement, beside a docstring: its name says enough."""
+    statements = [node for node in ast.walk(function) if isinstance(node, ast.stmt)][1:]
+    return sum(not (isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)) for node in statements) <= 1
+
+
+def going_back(opened: list[str]) -> tuple[int, int]:
+    """How many files are opened, and how often one that was opened before."""
+    return len(set(opened)), len(opened) - len(set(opened))

@@ -1,4 +1,4 @@
-// Written by `python -m trunkline.ar.session.binary_table` from trunkline/ar/session/binary.py and messages.py; do not edit.
+// Written by `python -m upkeep.wire_table` from trunkline/ar/session/binary.py and messages.py; do not edit.
 export const VERSION = 1;
 export const HEAD = {
   "type": {

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import mujoco
 
-from rehearsal.experiments.bench import Bench
+from rehearsal.experiments.bench import SharedRun
 from rehearsal.experiments.lookup import lookup
 from trunkline.ar.hybrid.friction import TPU_ON
 from trunkline.ar.hybrid.uncertainty import Contact, GraspUncertainty
@@ -31,10 +31,10 @@ NOWHERE = 5.0  # m; within it of its axis the arm has no bending plane: further 
 SLIPPERY = 0.7  # of the friction that is believed
 SURE = GraspUncertainty(contact=Contact(0.0, (0.0, 0.0, 0.0), 0.0))  # of everything
 
-Change = Callable[[Bench], Bench]
+Change = Callable[[SharedRun], SharedRun]
 
 
-def varied(bench: Bench, experiment: str, name: str) -> Bench:
+def varied(bench: SharedRun, experiment: str, name: str) -> SharedRun:
     """What runs of the variant `name` of an experiment share.
 
     Raises:
@@ -46,7 +46,7 @@ def varied(bench: Bench, experiment: str, name: str) -> Bench:
     return variants[name](bench)
 
 
-def _planned_with(bench: Bench, model: mujoco.MjModel) -> Bench:
+def _planned_with(bench: SharedRun, model: mujoco.MjModel) -> SharedRun:
     """Plans, previews and shapers by `model` alone, without the network; reach stays by the package's maps."""
     chain = read_chain(model).smooth
     straight = model.tendon_length0[model.actuator_trnid[:, 0]]
@@ -54,42 +54,42 @@ def _planned_with(bench: Bench, model: mujoco.MjModel) -> Bench:
     return replace(bench, package=package)
 
 
-def _statics(bench: Bench) -> Bench:
+def _statics(bench: SharedRun) -> SharedRun:
     return _planned_with(bench, bench.package.model)
 
 
-def _cad(bench: Bench, drawing: Path = DRAWING) -> Bench:
+def _cad(bench: SharedRun, drawing: Path = DRAWING) -> SharedRun:
     return _planned_with(bench, read_model(drawing))
 
 
-def _no_preview(bench: Bench) -> Bench:
+def _no_preview(bench: SharedRun) -> SharedRun:
     return replace(bench, judged=False)
 
 
-def _no_plane(bench: Bench) -> Bench:
+def _no_plane(bench: SharedRun) -> SharedRun:
     core = bench.config.core
     core = replace(core, bending_plane=replace(core.bending_plane, axis=NOWHERE))
     return replace(bench, config=replace(bench.config, core=core))
 
 
-def _base(bench: Bench, **off: float) -> Bench:
+def _base(bench: SharedRun, **off: float) -> SharedRun:
     sensors = replace(bench.stand_in.sensors, **off)
     return replace(bench, stand_in=replace(bench.stand_in, sensors=sensors))
 
 
-def _delay(bench: Bench, seconds: float) -> Bench:
+def _delay(bench: SharedRun, seconds: float) -> SharedRun:
     core = replace(bench.config.core, follow_delay=seconds)
     return replace(bench, config=replace(bench.config, core=core))
 
 
-def _single(bench: Bench) -> Bench:
+def _single(bench: SharedRun) -> SharedRun:
     """One future, with all as it is believed, of the plan and of each place that the assistant tries."""
     assert bench.world_model is not None
     previewing = replace(bench.previewing, futures=1, assistant=min(bench.previewing.assistant, 1))
     return replace(bench, world_model=replace(bench.world_model, uncertainty=SURE), previewing=previewing)
 
 
-def _cad_grasp(bench: Bench, drawing: Path = DRAWING) -> Bench:
+def _cad_grasp(bench: SharedRun, drawing: Path = DRAWING) -> SharedRun:
     """Shaped and previewed with the drawing's arm. A grasp is planned by its geometry, which the identified one has."""
     bench, spec, model = _single(bench), read_spec(drawing), read_model(drawing)
     assert bench.world_model is not None
@@ -97,7 +97,7 @@ def _cad_grasp(bench: Bench, drawing: Path = DRAWING) -> Bench:
     return replace(bench, package=package, world_model=replace(bench.world_model, arm=spec))
 
 
-def _slippery(bench: Bench) -> Bench:
+def _slippery(bench: SharedRun) -> SharedRun:
     """The futures stay as they are: whether they foresee it is the question."""
     touch = replace(bench.stand_in.touch, arm_object=SLIPPERY * TPU_ON[bench.previewing.material])
     return replace(bench, stand_in=replace(bench.stand_in, touch=touch))

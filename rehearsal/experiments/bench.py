@@ -38,9 +38,12 @@ LONGEST = 300.0  # s of a run
 
 
 @dataclass(frozen=True)
-class Bench:
-    """All that runs share. `judged`: whether plans are previewed and the operator confirms only one whose preview is
-    good. `known`, `previewing`: what grasps are previewed with; the package's arm and `previewing` by themselves."""
+class SharedRun:
+    """What all runs have in common: package, settings, arm.
+
+    judged: whether plans are previewed and the operator confirms only one whose preview is good. world_model,
+        previewing: what grasps are previewed with.
+    """
 
     package: Package
     config: TeleoperationConfig
@@ -89,8 +92,8 @@ class Bench:
         return RehearsedSession(self.package, self.config, robot, hands, world, place, self.foresight, self.judged)
 
 
-def bench_of(file: Path) -> Bench:
-    """The bench with the package at `file`, the lab's arm, and the settings as they are.
+def bench_of(file: Path) -> SharedRun:
+    """With the package at `file`, the lab's arm, and the settings as they are.
 
     Raises:
         InputError: the lab's arm is no stranger, or there is no package.
@@ -101,7 +104,7 @@ def bench_of(file: Path) -> Bench:
     config = load_folder(TeleoperationConfig, PROJECT / "conf/teleop")
     package, previewing = read_package(file), read_previewing()
     world_model = robot_model_of(previewing, package.files)
-    return Bench(
+    return SharedRun(
         package, config, arm, settings.stand_in(), settings.person(), settings.free(), world_model=world_model,
         previewing=previewing,
     )  # fmt: skip

@@ -5,7 +5,7 @@ The path is drawn: along each axis two sines, from rest. The object that is foll
 
 import numpy as np
 
-from rehearsal.experiments.bench import Bench, SessionFrame, Staged
+from rehearsal.experiments.bench import SessionFrame, SharedRun, Staged
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending
 from rehearsal.session import View
@@ -38,11 +38,11 @@ class Path:
         return now >= self.begun + self.seconds
 
 
-def follow(bench: Bench, seed: int) -> Staged:
+def follow(bench: SharedRun, seed: int) -> Staged:
     return on_path(bench, seed)[1]
 
 
-def on_path(bench: Bench, seed: int) -> tuple[Path, Staged]:
+def on_path(bench: SharedRun, seed: int) -> tuple[Path, Staged]:
     """The path that the seed draws, and the experiment of following it to its end."""
     rng = np.random.default_rng([seed, 1])
     s, delay = bench.settings, bench.config.core.follow_delay

@@ -10,13 +10,14 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rehearsal import settings
-from rehearsal.experiments.bench import FLOOR, FLOOR_OBSTACLE, START, Bench, SessionFrame, Staged, executed
+from rehearsal.experiments.bench import FLOOR, FLOOR_OBSTACLE, START, SessionFrame, SharedRun, Staged, executed
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending, Operator
-from rehearsal.robot.scene import Scene, SceneObject, SupportSurface
+from rehearsal.robot.scene import Scene, SceneObject
 from rehearsal.robot.stand_in import StandInRobot
 from rehearsal.session import RehearsedSession
 from trunkline.ar.hybrid.grasps import object_in_base
+from trunkline.ar.hybrid.worlds import SupportSurface
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.teleop.messages import Obstacle, WorldObject
 from trunkline.ar.teleop.rigid_ik import RigidIK
@@ -47,7 +48,7 @@ class Offered:
 
 
 def offered(
-    bench: Bench, s: settings.Grasped, rng: np.random.Generator, shapes: Sequence[settings.Shape] = ()
+    bench: SharedRun, s: settings.Grasped, rng: np.random.Generator, shapes: Sequence[settings.Shape] = ()
 ) -> Offered:
     """A random object at a random place, no heavier than what may be grasped at its width. What is gripped of it is at
     that place: a basket's bar. `shapes`: of which it is one, all of the settings by default.
@@ -74,11 +75,11 @@ def offered(
         return Offered(object, towards, None)
     object.position = (place - object.grip).tolist()
     top = [*object.position[:2], object.position[2] - object.half_height]
-    return Offered(object, towards, SupportSurface(top, list(s.stand)))
+    return Offered(object, towards, SupportSurface(top, list(s.stand), "wood"))
 
 
 def session_of(
-    bench: Bench,
+    bench: SharedRun,
     s: settings.Grasped,
     placed: Offered,
     operator: Operator,
@@ -114,14 +115,14 @@ def obstacle_of(name: str, board: SupportSurface) -> Obstacle:
     return Obstacle(name, (a, b, c), (d, e, f))
 
 
-def beside(bench: Bench, placed: Offered) -> np.ndarray:
+def beside(bench: SharedRun, placed: Offered) -> np.ndarray:
     """Where the operator means the mount to be, less what is gripped, (3,), m: the grasp frame."""
     frame = bench.config.basket.grasp if placed.way == "basket" else bench.config.hanging.grasp
     centre = object_in_base(bench.package.geometry, placed.object.diameter, frame, "dorsal")
     return -centre[0] * placed.towards - [0.0, 0.0, centre[2]]
 
 
-def grasp(bench: Bench, seed: int) -> Staged:
+def grasp(bench: SharedRun, seed: int) -> Staged:
     rng, s = np.random.default_rng([seed, 2]), settings.grasped()
     placed = offered(bench, s, rng)
     operator = bench.operator(rng)

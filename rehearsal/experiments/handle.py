@@ -3,12 +3,13 @@
 import numpy as np
 
 from rehearsal import settings
-from rehearsal.experiments.bench import Bench, SessionFrame, Staged, executed
+from rehearsal.experiments.bench import SessionFrame, SharedRun, Staged, executed
 from rehearsal.experiments.grasp import NAME, TABLE, beside, failure, offered, session_of, tell
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending
-from rehearsal.robot.scene import Scene, SupportSurface
+from rehearsal.robot.scene import Scene
 from rehearsal.session import View
+from trunkline.ar.hybrid.worlds import SupportSurface
 from trunkline.ar.teleop.object_shapes import below_grip
 from trunkline.frames import STANDARD_GRAVITY
 
@@ -20,10 +21,10 @@ def table_for(s: settings.Grasped, place: list[float], rng: np.random.Generator)
     """To either side of the object."""
     azimuth = np.arctan2(place[1], place[0]) + rng.choice([-1, 1]) * np.radians(s.table_azimuth_deg)
     top = [s.table_radius * float(np.cos(azimuth)), s.table_radius * float(np.sin(azimuth)), s.table_top]
-    return SupportSurface(top, list(s.table))
+    return SupportSurface(top, list(s.table), "wood")
 
 
-def handle(bench: Bench, seed: int) -> Staged:
+def handle(bench: SharedRun, seed: int) -> Staged:
     rng, s = np.random.default_rng([seed, 3]), settings.grasped()
     placed = offered(bench, s, rng, STANDING)
     table = table_for(s, placed.object.position, rng)

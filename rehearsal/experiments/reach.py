@@ -7,7 +7,7 @@ with the object away. How far off the tip was beside the object is told as well.
 
 import numpy as np
 
-from rehearsal.experiments.bench import Bench, SessionFrame, Staged, executed
+from rehearsal.experiments.bench import SessionFrame, SharedRun, Staged, executed
 from rehearsal.experiments.result import LATER, Result
 from rehearsal.operator.scripts import Ending
 from rehearsal.session import RehearsedSession
@@ -18,7 +18,7 @@ from trunkline.errors import InputError
 WITHIN = 0.02  # m from the object's place: nearer than its surface, which a tip also touches from the side
 
 
-def reach(bench: Bench, seed: int) -> Staged:
+def reach(bench: SharedRun, seed: int) -> Staged:
     rng = np.random.default_rng([seed, 0])
     object, operator = bench.place(rng), bench.operator(rng)
     session = bench.session(operator, object, seed, lambda now: object)

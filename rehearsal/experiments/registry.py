@@ -2,13 +2,13 @@
 
 from collections.abc import Callable
 
-from rehearsal.experiments.bench import Bench, Staged
+from rehearsal.experiments.bench import SharedRun, Staged
 from rehearsal.experiments.follow import follow
 from rehearsal.experiments.grasp import grasp
 from rehearsal.experiments.handle import handle
 from rehearsal.experiments.reach import reach
 
-EXPERIMENTS: dict[str, Callable[[Bench, int], Staged]] = {  # made of a seed, to be run
+EXPERIMENTS: dict[str, Callable[[SharedRun, int], Staged]] = {  # made of a seed, to be run
     "reach": reach,
     "follow": follow,
     "grasp": grasp,

@@ -11,29 +11,19 @@ from rehearsal.robot.rigid_object import Motion, RigidObject
 from rehearsal.robot.shapes import BOX, CYLINDER, distance
 from trunkline.ar.hybrid.basket import Part, unit_inertia
 from trunkline.ar.hybrid.objects import ObjectShape
+from trunkline.ar.hybrid.worlds import HOOK_LENGTH, HOOK_RADIUS, Metres, SupportSurface
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 
-Metres = Annotated[float, Field(ge=-10, le=10)]
-Size = Annotated[float, Field(gt=0, le=10)]
 Place = Annotated[list[Metres], Field(min_length=3, max_length=3)]
 Quaternion = Annotated[list[Annotated[float, Field(ge=-1, le=1)]], Field(min_length=4, max_length=4)]
 Friction = Annotated[float, Field(ge=0, le=5)]
 
 RIM = 12  # points on each rim of a cylinder: it stands on these
 TOY_EDGE = 0.25  # radius of a toy's edges over its width
-HOOK_RADIUS, HOOK_LENGTH = 0.004, 0.3  # m, of the rod that ends in the hook
 DEEP = 1.0  # m, of the floor
 KINDS = {"box": BOX, "cylinder": CYLINDER}
 CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
-
-
-@dataclass
-class SupportSurface:
-    """A level board. top: the middle of its upper side, m. size: along x, y and z, m."""
-
-    top: Place
-    size: Annotated[list[Size], Field(min_length=3, max_length=3)]
 
 
 @dataclass

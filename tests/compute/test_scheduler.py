@@ -195,7 +195,7 @@ def test_labels_of_the_rigid_map_are_the_same(spreading, monkeypatch):
 def test_rehearsals_arrive_from_workers_too(monkeypatch, tmp_path):
     """In this process, so that the bench can be another one."""
     monkeypatch.setenv("TRUNKLINE_THREADS", "1")
-    source, package = runs.Provenance("package", "code"), tmp_path / "package.tgz"
+    source, package = runs.RunSource("package", "code"), tmp_path / "package.tgz"
     package.write_bytes(b"a package")
     monkeypatch.setattr(runs, "bench_of", lambda file: file.read_bytes().decode())
     monkeypatch.setattr(runs, "source_of", lambda file: source)

@@ -15,8 +15,8 @@ from demo.experiments import (
     PLANS,
     ForTest,
     Loaded,
-    Motion,
-    Pull,
+    MotionPlan,
+    PullPlan,
     curl_trials,
     loaded_trials,
     motion_trials,
@@ -216,8 +216,8 @@ def test_beyond_the_table_there_are_loads_pulls_and_motions():
 def test_more_experiments_change_no_trial_of_the_table():
     """With either of them the cousin does them: pulled, moved, and with a load at its tip."""
     more = replace(
-        SHORT, loads=[Loaded(0.05, [90.0], [0.0])], pulls=[Pull([20.0, None, -5.0], True)], pull_ramp=0.1,
-        pull_turn=0.02, pull_back=0.05, pull_settle=0.1, motions=[Motion([1.0, 2.5], 10.0, -2.0)], motion_rest=0.05,
+        SHORT, loads=[Loaded(0.05, [90.0], [0.0])], pulls=[PullPlan([20.0, None, -5.0], True)], pull_ramp=0.1,
+        pull_turn=0.02, pull_back=0.05, pull_settle=0.1, motions=[MotionPlan([1.0, 2.5], 10.0, -2.0)], motion_rest=0.05,
         motion_fade=0.1, motion_duration=0.3,
     )  # fmt: skip
     extended = session(1, more)

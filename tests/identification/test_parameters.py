@@ -15,7 +15,9 @@ from trunkline.identification.parameters.parameter import Parameter
 from trunkline.identification.parameters.parameters import (
     PARAMETERS,
     candidate_fields,
+    in_writing_order,
     names_of,
+    parameter_name,
     parameter_named,
     parameters_of,
     set_fields,
@@ -194,7 +196,7 @@ def test_units_without_a_line_have_no_joint_place(old, new, message):
         ("winding", "evenly spread tendons, expected tendons that are described one by one"),
         ("preload_2", "evenly spread tendons, expected tendons that are described one by one"),
         ("preload_*", "evenly spread tendons, expected tendons that are described one by one"),
-        ("tendon_angle_4", "an arm without tendon 4, expected one for each tendon that it has"),
+        ("tendon_angle_4", "an arm without tendon 4, expected one for each .*, did you mean 'tendon_angle_3'"),
         ("section_stiffness_*", "an arm without section 2, expected build_mjcf.arm of the kind sections"),
     ],
 )
@@ -202,6 +204,23 @@ def test_a_parameter_of_what_the_arm_lacks_is_refused(name, message):
     config = SimpleNamespace(parameters=[name])
     with pytest.raises(InputError, match=f"identify_control.parameters.{re.escape(name)}: found it for {message}"):
         check_parameters("identify_control", config, small_spec().compile())
+
+
+@pytest.mark.parametrize("name", ["stifness", "section_stiffness_1", "preload_01", "preload", "mass_*", ""])
+def test_what_is_no_parameter_of_any_arm_is_refused(name):
+    with pytest.raises(ValueError, match=f"found '{re.escape(name)}', expected the name of a parameter"):
+        parameter_name(name)
+
+
+@pytest.mark.parametrize("name", ["stiffness", "section_stiffness_2", "preload_*", "tendon_angle_40"])
+def test_an_arm_may_have_any_number_of_tendons(name):
+    assert parameter_name(name) == name
+
+
+def test_parameters_are_written_in_one_order():
+    names = ["tendon_angle_10", "tendon_angle_2", "mass", "kp_ratio_2", "section_stiffness_2", "hardening", "stiffness"]
+    order = "stiffness hardening kp_ratio_2 mass tendon_angle_2 tendon_angle_10 section_stiffness_2"
+    assert " ".join(in_writing_order(names)) == order
 
 
 def test_a_ratio_of_a_motor_that_the_arm_lacks_is_refused():

@@ -34,7 +34,8 @@ def test_numbers_are_read_when_they_are_asked_for():
     assert (arm.capstan_friction, arm.backlash, arm.rate_limit, arm.preload.size) == (0.1, 0.001, 0.0, 0)
     arm.model.numeric_data[arm.places(CAPSTAN_FRICTION)] = 0.2
     assert ArmModel(arm.model).capstan_friction == arm.capstan_friction == 0.2
-    arm.switch_off(CAPSTAN_FRICTION, "no such number")
+    assert arm.switch_off("no such number", CAPSTAN_FRICTION)
+    assert not arm.switch_off(CAPSTAN_FRICTION, "no such number")
     assert (arm.capstan_friction, arm.backlash) == (0.0, 0.001)
     assert ArmModel(small_spec().compile()).number(SLIP_LENGTH) == 0.0
     assert ArmModel(small_spec().compile()).slip_length == SLIP

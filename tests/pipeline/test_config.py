@@ -168,9 +168,9 @@ def whole_project(tmp_path):
             "from trunkline.settings import settings\n\n\n@settings\nclass Config:\n    count: int\n"
         )
 
-    def check(params: str) -> None:
+    def check(params: str, running: str = "") -> None:
         (tmp_path / "params.yaml").write_text(params)
-        check_once(tmp_path)
+        check_once(running, tmp_path)
 
     return check
 
@@ -185,25 +185,50 @@ def test_a_stage_checks_the_settings_of_all(whole_project):
         whole_project("{fit: {count: x}, train: {count: 2}}")
 
 
-def test_a_changed_range_in_the_library_is_checked_again(whole_project, tmp_path, monkeypatch):
-    """What has passed is noted with the files that hold the ranges, the library's among them."""
-    checked = []
+@pytest.fixture
+def checked(monkeypatch):
+    """Which stages are checked, a list for each time."""
+    stages: list[list[str]] = []
+    monkeypatch.setattr("trunkline.pipeline.settings.check_settings", lambda root, changed: stages.append(changed))
+    return stages
+
+
+def test_a_stage_checks_those_after_it_whose_settings_changed(whole_project, checked):
+    whole_project("{fit: {count: 1}, train: {count: 2}}", "fit")
+    whole_project("{fit: {count: 1}, train: {count: 2}}")
+    whole_project("{fit: {count: 1}, train: {count: 3}}", "train")
+    whole_project("{fit: {count: 1}, train: {count: 3}}")
+    whole_project("{fit: {count: 1}, train: {count: 3}}")
+    assert checked == [["train"], ["fit"], [], ["train"], []]
+
+
+def test_what_was_mistaken_is_checked_again(whole_project):
+    for _ in range(2):
+        with pytest.raises(InputError, match="fit.count: found 'x'"):
+            whole_project("{fit: {count: x}, train: {count: 2}}")
+
+
+@pytest.mark.parametrize("file", ["trunkline/ranges.py", "conf/shared/optimizer/short.yaml", "conf/fit/more.yaml"])
+def test_what_settings_are_made_of_is_checked_again_once_it_changed(
+    whole_project, checked, tmp_path, monkeypatch, file
+):
     monkeypatch.setattr("trunkline.pipeline.settings.PROJECT", tmp_path)
-    monkeypatch.setattr("trunkline.pipeline.settings.check_settings", lambda root: checked.append(root) or [])
-    for text, times in (("low = 0", 1), ("low = 0", 1), ("low = 1", 2)):
-        (tmp_path / "trunkline").mkdir(exist_ok=True)
-        (tmp_path / "trunkline" / "ranges.py").write_text(f"import pydantic\n{text}\n")
+    for text in ("low: 0", "low: 0", "low: 1"):
+        (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / file).write_text(f"# pydantic\n{text}\n")
         whole_project("{fit: {count: 1}, train: {count: 2}}")
-        assert len(checked) == times
+    changed = ["fit"] if "conf/fit" in file else ["fit", "train"]
+    assert checked == [["fit", "train"], [], changed]
 
 
+NO_NAME = "identify_stiffness.parameters.stifness: found 'stifness', expected the name of a parameter"
 FIRST, STIFFNESS = "identify_stiffness", "params.yaml: identify_stiffness.parameters.stiffness"
 
 
 @pytest.mark.parametrize(
     ("stage", "old", "new", "message"),
     [
-        (FIRST, "    stiffness:", "    stifness:", " names, did you mean 'stiffness'?"),
+        (FIRST, "    stiffness:", "    stifness:", f"{NO_NAME}, did you mean 'stiffness'?"),
         (FIRST, "{low: 0.3,", "{low: 30.0,", f"{STIFFNESS}: low: found 30.0, expected less than high, 12.0"),
         (FIRST, "{low: 0.3,", "{lwo: 0.3,", f"{STIFFNESS}.lwo: unknown key, did you mean 'low'?"),
         (FIRST, "{low: 0.3,", "{low: .nan,", f"{STIFFNESS}.low: found nan, expected a finite number"),

@@ -7,7 +7,7 @@ import pytest
 
 from rehearsal import settings
 from rehearsal.experiments.ablations import SURE, VARIANTS, _cad_grasp, varied
-from rehearsal.experiments.bench import Bench
+from rehearsal.experiments.bench import SharedRun
 from rehearsal.experiments.lookup import lookup, tensions_of
 from tests.rehearsal.arm import settings as stand_in
 from tests.rehearsal.arm import stranger
@@ -34,16 +34,17 @@ MODELS = ("statics", "cad")  # that need a package, and a drawing of the arm
 
 
 @pytest.fixture(scope="module")
-def bench() -> Bench:
+def bench() -> SharedRun:
     robot = PandaRobot("panda", 0.05, 0.8, 0.0, list(READY))
     posterior = posterior_about(stump_spec().compile(), {"kp": 1.0})
     uncertainty = GraspUncertainty(Contact(FRICTION, PLACE, 0.1), posterior)
     world_model = RobotModel(stump_spec(), uncertainty, robot, BaseAlignment(0.0, 0.0))
-    return Bench(None, config(), stranger(), stand_in(), settings.person(), settings.free(), world_model=world_model)  # type: ignore[arg-type]
+    person, free = settings.person(), settings.free()
+    return SharedRun(None, config(), stranger(), stand_in(), person, free, world_model=world_model)  # type: ignore[arg-type]
 
 
-def changed(variant: Bench, bench: Bench) -> list[str]:
-    return [field.name for field in fields(Bench) if getattr(variant, field.name) is not getattr(bench, field.name)
+def changed(variant: SharedRun, bench: SharedRun) -> list[str]:
+    return [field.name for field in fields(SharedRun) if getattr(variant, field.name) is not getattr(bench, field.name)
             and getattr(variant, field.name) != getattr(bench, field.name)]  # fmt: skip
 
 

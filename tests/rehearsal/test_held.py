@@ -12,8 +12,9 @@ from rehearsal.experiments.handle import BORNE, STILL, why_not
 from rehearsal.experiments.result import Result
 from rehearsal.first_grasp import LIFT, SLIP, holds
 from rehearsal.operator.scripts import Ending
-from rehearsal.robot.scene import Scene, SceneObject, SupportSurface
+from rehearsal.robot.scene import Scene, SceneObject
 from tests.rehearsal.frames import FORCE, UNITS, frame
+from trunkline.ar.hybrid.worlds import SupportSurface
 from trunkline.frames import STANDARD_GRAVITY
 
 S = settings.grasped()
@@ -147,7 +148,7 @@ MASS = 0.2
 SCENE = Scene(
     -0.75,
     SceneObject("cylinder", 0.05, 0.1, MASS, [0.5, 0.0, 0.5], hanging=True),
-    {TABLE: SupportSurface([1.0, 0.0, -0.1], [0.5, 0.5, 0.03])},
+    {TABLE: SupportSurface([1.0, 0.0, -0.1], [0.5, 0.5, 0.03], "wood")},
     [0.5, 0.0, 0.9],
 )  # its names: the floor, the table, the hook
 HALF = BORNE * MASS * STANDARD_GRAVITY

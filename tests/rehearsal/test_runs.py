@@ -14,14 +14,14 @@ from rehearsal import __main__ as command
 from rehearsal import runs
 from rehearsal.experiments.result import Result, read_results, summary
 from rehearsal.report import draw
-from rehearsal.runs import Provenance, Run, make, make_one, source_of, wanted
+from rehearsal.runs import Run, RunSource, make, make_one, source_of, wanted
 from trunkline.ar.preview.package import only_package
 from trunkline.errors import InputError
 from upkeep.limits import Limit
 from upkeep.rehearsal_table import rehearsal_table
 
 ROOT = Path(__file__).parents[2]
-SOURCE = Provenance("package", "code")
+SOURCE = RunSource("package", "code")
 
 
 @pytest.fixture

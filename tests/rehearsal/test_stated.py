@@ -9,7 +9,7 @@ import pytest
 from rehearsal.experiments.result import LATER, Result, share_of
 from rehearsal.experiments.stated import covered, probabilities, scores
 from rehearsal.rehearse import metrics_of
-from rehearsal.runs import Provenance
+from rehearsal.runs import RunSource
 from trunkline.ar.hybrid.rates import wilson
 
 NAN = float("nan")
@@ -121,12 +121,12 @@ def test_nothing_is_said_of_what_no_run_has(rows, keys):
 
 def test_the_metrics_name_package_code_experiments_and_previews():
     rows = [TRUE, FALSE, replace(TRUE, experiment="handle"), reach(2.0, 4.0)]
-    metrics = json.loads(json.dumps(metrics_of(Provenance("abc", "def"), rows)))
+    metrics = json.loads(json.dumps(metrics_of(RunSource("abc", "def"), rows)))
     assert (metrics["package"], metrics["code"]) == ("abc", "def")
     assert set(metrics) == {"package", "code", "grasp", "handle", "reach", "preview"}
     for key in ("agreement", "path_pct_median", "brier", "brier_base"):
         assert np.isfinite(metrics["preview"][key])
-    assert "preview" not in metrics_of(Provenance("abc", "def"), [Result("follow", 0, True)])
+    assert "preview" not in metrics_of(RunSource("abc", "def"), [Result("follow", 0, True)])
 
 
 @pytest.mark.parametrize(

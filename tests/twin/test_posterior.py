@@ -61,7 +61,7 @@ def test_the_far_draws_of_few_trials_are_cut_and_no_warning():
 @pytest.mark.parametrize(
     ("broken", "message"),
     [
-        ({"parameters": {"kp_ratio": {}}}, "parameters: found 'kp_ratio', expected one of"),
+        ({"parameters": {"kp_ratio": {}}}, "parameters: found 'kp_ratio', expected the name of a parameter, did"),
         ({"parameters": {"kp": {"interval_95_given_model": [None, None]}}}, "expected two numbers that rise"),
         ({"parameters": {"kp": {}}}, "identify_control/parameters.json: kp: found no 'interval_95_given_model'"),
     ],

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.folders import unpack
 from tests.support.operator import config
+from tests.support.unity_frame import unity_quaternion
 from tests.unity.mono import compiled
 from tests.unity.test_assemble import network
 from tests.unity.test_shared_vectors import CASES
@@ -33,7 +34,7 @@ from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.kinematics.ik.inputs import DIRECTION, TILT
 from trunkline.twin.package import MANIFEST, package_digest, robot_of
 from trunkline.unity.assemble import CSHARP
-from trunkline.unity.frame import unity_position, unity_quaternion
+from trunkline.unity.frame import unity_position
 from trunkline.unity.unpacked import maps_of
 from trunkline.unity.upm_package import NETWORK, write_tarball
 

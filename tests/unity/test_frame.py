@@ -6,8 +6,9 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.support.unity_frame import unity_quaternion
 from trunkline.frames import rotation_from_wxyz
-from trunkline.unity.frame import unity_obj, unity_position, unity_quaternion, unity_volume
+from trunkline.unity.frame import unity_obj, unity_position, unity_volume
 
 numbers = st.floats(-1, 1)
 

@@ -18,16 +18,6 @@ def pulls(spec: mujoco.MjSpec) -> str:
 
 
 MJCF = pulls(small_spec())
-TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
-CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype="<f4")
-FACES = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)]
-
-
-def binary_stl(header: bytes = b"binary") -> bytes:
-    triangles = b"".join(
-        np.zeros(3, "<f4").tobytes() + CORNERS[list(face)].tobytes() + b"\0\0" for face in FACES
-    )
-    return header.ljust(80, b"\0") + np.uint32(len(FACES)).tobytes() + triangles
 
 
 def insert(anchor: str, text: str) -> str:
@@ -167,20 +157,6 @@ TEXT_CASES = {
 def test_an_unsupported_element_is_named(case):
     text, expected = TEXT_CASES[case]
     assert expected in [(violation.element, violation.rule) for violation in lint_mjcf(text)]
-
-
-@pytest.mark.parametrize(
-    ("file", "data", "accepted"),
-    [
-        ("m.obj", TETRAHEDRON.encode(), True),
-        ("m.stl", binary_stl(), True),
-        ("m.stl", binary_stl(b"solid of a CAD program"), False),  # taken for text by StlMeshParser
-    ],
-)
-def test_meshes_are_binary_stl_or_obj(file, data, accepted):
-    text = insert("<worldbody>", f'<asset><mesh name="m" file="{file}"/></asset>')
-    rules = [violation.rule for violation in lint_mjcf(text, {file: data})]
-    assert rules == ([] if accepted else ["mesh"])
 
 
 def test_a_file_that_does_not_load_is_one_line():

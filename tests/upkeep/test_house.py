@@ -242,24 +242,49 @@ def test_calls_are_resolved_in_the_order_of_the_source(place, calls):
     assert [" ".join(target) for target in Index.of(PROJECT).calls(place)] == calls
 
 
-def test_a_walk_enters_each_function_once_and_comes_back_from_each():
-    trail = walk(Index.of(PROJECT), ("a.py", "start"))
-    #       start, end and back,  helper and back, B(): only, make, both, and back
-    expected = "a.py p/d.py a.py b.py a.py b.py b.py b.py b.py b.py b.py b.py a.py"
-    #            local, last and back, and back; handed and back
-    expected += " a.py p/d.py a.py a.py p/d.py a.py"
-    assert trail == expected.split()
-    assert going_back(trail) == (3, 8)
+TRIP = {
+    "a.py": """
+from b import first, line, second
+def start():
+    first()
+    first()
+    line()
+    second()
+    end()
+def end():
+    x = 1
+    return x
+""",
+    "b.py": """
+from a import end
+def first():
+    x = 1
+    return x
+def line():
+    "One statement."
+    return 1
+def second():
+    x = end()
+    return x
+""",
+}
 
 
-@pytest.mark.parametrize(("trail", "counts"), [
-    ("a", (1, 0)),
-    ("a a a", (1, 0)),
-    ("a b", (2, 0)),
-    ("a b a", (2, 1)),
-    ("a b b a c a b", (3, 3)),
-])  # fmt: skip
-def test_going_back_is_to_a_file_that_was_left(trail, counts):
+def test_a_reader_goes_back_for_what_is_longer_than_a_line_and_not_read():
+    trail = walk(Index.of(TRIP), ("a.py", "start"))
+    assert trail == ["a.py", "b.py", "b.py", "a.py"]  # first, second, and end of it
+    assert going_back(trail) == (2, 2)
+
+
+def test_a_method_is_of_a_class_that_the_file_knows():
+    sources = {"a.py": "def start(plot): plot.word()", "b.py": "class B:\n    def word(self): return str()"}
+    assert Index.of(sources).calls(("a.py", "start")) == []
+    imported = sources | {"a.py": "from b import B\n" + sources["a.py"]}
+    assert Index.of(imported).calls(("a.py", "start")) == [("b.py", "B.word")]
+
+
+@pytest.mark.parametrize(("trail", "counts"), [("a", (1, 0)), ("a b", (2, 0)), ("a b a", (2, 1)), ("a b b", (2, 1))])
+def test_going_back_is_to_a_file_that_was_opened_before(trail, counts):
     assert going_back(trail.split()) == counts
 
 

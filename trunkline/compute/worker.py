@@ -10,7 +10,7 @@ import sys
 
 from trunkline.compute.threads import thread_count
 from trunkline.errors import InputError, in_one_line
-from trunkline.program import program_name
+from trunkline.program import command_parser
 
 
 @in_one_line
@@ -32,9 +32,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     """For the help alone: Dask parses the arguments."""
-    parser = argparse.ArgumentParser(
-        prog=program_name("worker"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = command_parser("worker", __doc__)
     parser.add_argument("scheduler", metavar="ADDRESS", help="of the scheduler")
     parser.add_argument("--nworkers", metavar="N", help="processes; default: as many as there are cores")
     return parser

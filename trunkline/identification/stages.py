@@ -33,6 +33,11 @@ def read_tables(artifacts: Path, stages: Iterable[str] = STAGES) -> dict[str, di
     return {stage: read_table(file) for stage, file in files.items() if file.is_file()}
 
 
+def last_stages(tables: dict[str, dict], *keys: str) -> dict[str, str]:
+    """By name of a parameter in tables' `keys`, the stage that is the last to identify it: the model has its value."""
+    return {name: stage for stage, table in tables.items() for key in keys for name in table.get(key, {})}
+
+
 def read_table(file: Path) -> dict:
     """`parameters`, `fitted_to` and `compared` are in it, whoever reads it.
 

@@ -227,10 +227,12 @@ class ArmModel:
         """Numbers of units of an arm that is made of several sections, else empty."""
         return self.numbers(SECTIONS).astype(int)
 
-    def switch_off(self, *names: str) -> None:
-        """Set the model's numbers of these names to 0, in place."""
+    def switch_off(self, *names: str) -> bool:
+        """Set the model's numbers of these names to 0, in place; returns whether any was on, by its first value."""
+        changed = any(self.number(name) for name in names)
         for name in names:
             self.model.numeric_data[self.places(name)] = 0
+        return changed
 
     def switch_off_cables(self) -> None:
         """Take all cables from the model in place, for where they are slack and so move nothing: each is cut down to a

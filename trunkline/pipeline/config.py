@@ -8,6 +8,7 @@ use it, named in config.yaml's defaults list) is chosen in params.yaml by its na
 
 import json
 import runpy
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -66,13 +67,18 @@ def load_config(schema: type[Schema], stage: str, root: str | Path = ".") -> Sch
         raise InputError(f"{where}: {described}{others}") from error
 
 
-def load_folder(schema: type[Schema], folder: Path) -> Schema:
+def load_folder(schema: type[Schema], folder: Path, renamed: dict[str, str] | None = None) -> Schema:
     """The settings of what is no stage, such as teleoperation: `folder / "config.yaml"` alone, which tunes nothing.
+
+    Args:
+        renamed: keys of the release before, which are read too, to the ones of now.
 
     Raises:
         InputError: one line that names the folder and key, what was found and what was expected.
     """
-    return validated(schema, compose_settings(folder, {}, str(folder)), folder)
+    values = compose_settings(folder, {}, str(folder))
+    rename_keys(values, renamed or {}, str(folder))
+    return validated(schema, values, folder)
 
 
 def validated(schema: type[Schema], values: dict, source: Path) -> Schema:
@@ -91,8 +97,8 @@ def validated(schema: type[Schema], values: dict, source: Path) -> Schema:
         raise InputError(f"{source}: {where}: {problem}") from error
 
 
-def check_settings(root: str | Path = ".") -> list[str]:
-    """Validate the settings of every stage in `root / "dvc.yaml"`, and return their names.
+def check_settings(root: str | Path = ".", only: Collection[str] | None = None) -> list[str]:
+    """Validate the settings of every stage in `root / "dvc.yaml"`, or of `only` some, and return their names.
 
     Raises:
         InputError: for the first bad value in any section, or a section of no stage in dvc.yaml.
@@ -102,7 +108,8 @@ def check_settings(root: str | Path = ".") -> list[str]:
     for section in read_yaml(params):
         if section not in stages:
             raise InputError(f"{params}: {section}: no such stage in dvc.yaml{nearest(str(section), stages)}")
-    files = [file for file in sorted(own_or_project(root, "stages").glob("*.py")) if file.stem in stages]
+    checked = stages if only is None else only
+    files = [file for file in sorted(own_or_project(root, "stages").glob("*.py")) if file.stem in checked]
     for file in files:
         settings_of(file.stem, root)
     return [file.stem for file in files]
@@ -163,7 +170,7 @@ def _read_section(path: Path, stage: str) -> dict[str, Any]:
     params = read_yaml(path)
     if stage not in params:
         raise InputError(f"{path}: no section {stage!r}{nearest(stage, [str(key) for key in params])}")
-    section = {} if params[stage] is None else _container(params)[stage]
+    section = {} if params[stage] is None else container(params)[stage]
     if not isinstance(section, dict):
         raise InputError(f"{path}: {stage}: found {section!r}, expected a section of `key: value` lines")
     _expect_names(section, f"{path}: {stage}")
@@ -193,23 +200,23 @@ def _choices(folder: Path, section: dict[str, Any], where: str) -> dict[str, str
 
 def _defaults(folder: Path) -> dict[str, str]:
     """Each group of the defaults list with the option that it names, often ???."""
-    entries = _container(read_yaml(folder / "config.yaml")).get("defaults", [])
+    entries = container(read_yaml(folder / "config.yaml")).get("defaults", [])
     return {group: option for entry in entries if isinstance(entry, dict) for group, option in entry.items()}
 
 
-def _container(config: DictConfig, resolve: bool = False) -> dict[Any, Any]:
+def container(config: DictConfig, resolve: bool = False) -> dict[Any, Any]:
     """`config` as plain values; its keys are what YAML makes of them."""
-    container = OmegaConf.to_container(config, resolve=resolve)
-    assert isinstance(container, dict)
-    return container
+    values = OmegaConf.to_container(config, resolve=resolve)
+    assert isinstance(values, dict)
+    return values
 
 
 def _plain(config: DictConfig) -> dict[str, Any]:
     """`config` as plain values, without its `???` entries, so that validation reports them as missing."""
     try:
-        return _without_missing(_container(config, resolve=True))
+        return _without_missing(container(config, resolve=True))
     except InterpolationToMissingValueError:  # then the missing value is the mistake, and validation names it
-        return _without_missing(_container(config))
+        return _without_missing(container(config))
 
 
 def _without_missing(value: Any) -> Any:

@@ -17,14 +17,9 @@ from trunkline.identification.fit.fit import Fit
 from trunkline.identification.fit.identify import Identification, identify, with_parameters
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.settings import IdentificationSettings
-from trunkline.identification.fit.setup import check_parameters, set_up, unidentifiable_mass, with_every
-from trunkline.identification.parameters.parameters import MASS, NAMES
-from trunkline.identification.parameters.per_session import (
-    make_room,
-    names_in,
-    per_session_names,
-    unidentifiable_per_session,
-)
+from trunkline.identification.fit.setup import check_stage, set_up
+from trunkline.identification.parameters.parameters import MASS
+from trunkline.identification.parameters.per_session import make_room, names_in
 from trunkline.identification.parameters.saving import save_model
 from trunkline.identification.results.parameter_table import parameter_table, undetermined
 from trunkline.identification.results.scoring import Compared, fingerprints, predict, start_fit
@@ -36,14 +31,14 @@ from trunkline.model_files import read_spec
 from trunkline.pipeline.stage import output_folder, write_json, write_metrics
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_static
 from trunkline.recordings.trials.splits import DECIDING, IDENTIFY, VALIDATE
-from trunkline.recordings.trials.trial import Trial, read_trials, sessions_of
+from trunkline.recordings.trials.trial import Trial, read_trials
 
 ARTIFACTS = Path("artifacts")
 CAD_MODEL = ARTIFACTS / "build_mjcf/arm.xml"
 TRIALS = Path("data/processed/filter")
 SCALARS = ("parameters", "per_session")  # their tables in parameters.json
 CSV = {"index": False, "float_format": "%.6g"}
-SAID, REFUSED = 5.0, 25.0  # % of the arm's length by which bodies may be off after a fit, before it is said, or refused
+WARN_PCT, REFUSE_PCT = 5.0, 25.0  # of the arm's length by which bodies may be off after a fit
 
 
 @dataclass
@@ -91,19 +86,10 @@ def load(stage: str, config: IdentificationSettings, model_path: Path) -> FitInp
     """
     print(f"{stage}: reading the model and the trials", flush=True)
     spec = read_spec(model_path)
-    model = spec.compile()
-    config = with_every(config, model)
-    check_parameters(stage, config, model)
-    reported = read_reported(config)
+    reported, every = read_reported(config), read_trials(TRIALS, DECIDING)
+    config, model = check_stage(stage, config, spec, every)
     # of an arm with tendons also the trials of later stages: a wrong name is an error now, not after minutes
-    every = read_trials(TRIALS, DECIDING)
     check_trials(every if model.nu else reported, model)
-    names = per_session_names(list(config.parameters), config.per_session, sessions_of(every)[1:])
-    for line in unidentifiable_per_session(names, every, config.experiments) + unidentifiable_mass(config, every):
-        raise InputError(f"{stage}.{line}")
-    if names:
-        make_room(spec, names)
-        model = spec.compile()
     model, experiments, settings = set_up(config, reported, model)
     inputs = FitInputs(spec, model, model_path == CAD_MODEL, config, reported, experiments, settings)
     folds, most = config.cross_validation_folds, sum(e.split == IDENTIFY for e in inputs.fitted)
@@ -180,10 +166,10 @@ def misfit(by_experiment: dict[str, dict], kinds: Sequence[str]) -> str:
     off, share = (by_experiment[worst][f"e_position_{unit}"] for unit in ("mm", "pct"))
     problem = f"after the fit, bodies are {off:.3g} mm off in the mean of {EXPERIMENTS[worst].plural}, "
     problem += f"{share:.2g} % of the arm's length"
-    if share > REFUSED:
+    if share > REFUSE_PCT:
         causes = "unit, `frame.up`, base and names in session.yaml, the arm under build_mjcf, ranges of parameters"
-        raise InputError(f"{problem}, expected at most {REFUSED:g} %: nothing is identified; look at {causes}")
-    return f"{problem}: values below are of an arm that does not fit" if share > SAID else ""
+        raise InputError(f"{problem}, expected at most {REFUSE_PCT:g} %: nothing is identified; look at {causes}")
+    return f"{problem}: values below are of an arm that does not fit" if share > WARN_PCT else ""
 
 
 def compared_models(
@@ -200,7 +186,7 @@ def compared_models(
         models["coarse"] = models["identified"]
     elif whole:
         extended = read_spec(CAD_MODEL)
-        make_room(extended, names_in(inputs.model, NAMES))
+        make_room(extended, names_in(inputs.model))
         rows = {name: row for table in earlier for key in SCALARS for name, row in table.get(key, {}).items()}
         values = {name: row["value"] for name, row in rows.items()}
         models["coarse"] = with_parameters(extended.compile(), values | result.values)
@@ -209,9 +195,9 @@ def compared_models(
             getattr(models["coarse"], field)[:] = getattr(inputs.model, field)
     # as in MuJoCo alone and in Unity: tendons without friction in their guide holes, winches without rate limit or play
     for name, numbers in {"smooth": (CAPSTAN_FRICTION,), "prompt": (RATE_LIMIT, BACKLASH)}.items():
-        if any(ArmModel(models["identified"]).number(number) for number in numbers):
-            models[name] = mujoco.MjModel.from_xml_string(mjcf)
-            ArmModel(models[name]).switch_off(*numbers)
+        arm = ArmModel(mujoco.MjModel.from_xml_string(mjcf))
+        if arm.switch_off(*numbers):
+            models[name] = arm.model
     return models
 
 

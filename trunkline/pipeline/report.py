@@ -4,7 +4,6 @@ It is the stage `report`, by DVC: stages before it run where code, settings or l
 `--dry-run` says what changed. The page is artifacts/report/certificate.html, the same facts as JSON lie beside it.
 """
 
-import argparse
 import os
 import subprocess
 import sys
@@ -12,17 +11,14 @@ from pathlib import Path
 
 from trunkline.errors import in_one_line
 from trunkline.pipeline.checkout import require_checkout
-from trunkline.program import program_name
+from trunkline.program import command_parser
 
 PAGE = Path("artifacts/report/certificate.html")
 
 
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(
-        prog=program_name("report"), description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )  # fmt: skip
+    parser = command_parser("report", __doc__)
     parser.add_argument("--dry-run", action="store_true", help="say what changed since they ran, and run none")
     parser.add_argument("--project", type=Path, metavar="FOLDER", default=Path("."),
                         help="where dvc.yaml is; default: the current folder")  # fmt: skip

@@ -1,45 +1,56 @@
 """`python -m trunkline.pipeline.settings`: check every stage's settings before anything runs."""
 
 import hashlib
+import json
 import sys
 from pathlib import Path
 
 from trunkline.errors import InputError, in_one_line, nearest
 from trunkline.pipeline.checkout import require_checkout
-from trunkline.pipeline.config import PROJECT, check_settings, own_or_project
+from trunkline.pipeline.config import PROJECT, SHARED, check_settings, container, own_or_project
 from trunkline.recordings.session.session import sessions_in
 from trunkline.settings import read_yaml
 
 LAB = "demo"  # the session that the stand-in lab records, see demo/dvc.yaml
 
 
-def check_once(root: Path = Path(".")) -> None:
-    """Check the settings of all stages, unless these very files passed before.
+def check_once(running: str = "", root: Path = Path(".")) -> None:
+    """Check the settings of the stages that come after `running` in dvc.yaml, or of all, unless they passed before.
 
     Every stage that DVC runs calls this first, so that a typo in the last section shows before the first stage works.
-    To check is to import every stage, which takes seconds: hence the note of what has passed, in DVC's temporary
-    folder, and a stage that is run by itself checks its own settings alone.
-    Outside of a pipeline (no dvc.yaml) there is nothing to check.
+    To check a stage is to import it, which takes seconds: hence the note, in DVC's temporary folder, of which settings
+    have passed. Outside of a pipeline (no dvc.yaml) there is nothing to check.
 
     Raises:
         InputError: for the first mistake in any section.
     """
     if not (root / "dvc.yaml").is_file():
         return
-    conf, stages = own_or_project(root, "conf"), own_or_project(root, "stages")
-    files = [root / "params.yaml", root / "dvc.yaml", *conf.glob("**/*.yaml"), *stages.glob("*.py")]
-    # and what stages nest in their settings: a range is a type of pydantic's
-    files += [file for file in (PROJECT / "trunkline").glob("**/*.py") if b"pydantic" in file.read_bytes()]
-    digest = hashlib.sha256()
-    for file in sorted(file for file in files if file.is_file()):
-        digest.update(str(file).encode() + b"\0" + file.read_bytes() + b"\0")
-    passed = stages.parent / ".dvc" / "tmp" / f"settings.{root.resolve().name}.sha256"
-    if passed.is_file() and passed.read_text() == digest.hexdigest():
-        return
-    print("settings: checking those of all stages", flush=True)
-    print(f"settings: {len(check_settings(root))} stages checked", flush=True)
-    passed.parent.mkdir(parents=True, exist_ok=True)
-    passed.write_text(digest.hexdigest())
+    order = list(read_yaml(root / "dvc.yaml").stages)
+    digests = settings_digests(order[order.index(running) + 1 :] if running in order else order, root)
+    note = own_or_project(root, "stages").parent / ".dvc" / "tmp" / f"settings.{root.resolve().name}.json"
+    passed = json.loads(note.read_text()) if note.is_file() else {}
+    changed = [stage for stage, digest in digests.items() if passed.get(stage) != digest]
+    if changed:
+        print(f"settings: checking those of {', '.join(changed)}", flush=True)
+    check_settings(root, changed)
+    note.parent.mkdir(parents=True, exist_ok=True)
+    note.write_text(json.dumps(passed | digests))
+
+
+def settings_digests(stages: list[str], root: Path) -> dict[str, str]:
+    """By stage, of its section, its files, and what stages nest in their settings: a range is a type of pydantic's."""
+    conf, files = own_or_project(root, "conf"), own_or_project(root, "stages")
+    params = container(read_yaml(root / "params.yaml"))
+    ranges = [file.read_bytes() for file in sorted((PROJECT / "trunkline").glob("**/*.py"))]
+    common = [text for text in ranges if b"pydantic" in text]
+    common += [file.read_bytes() for file in sorted((conf / SHARED).glob("**/*.yaml"))]
+    digests = {}
+    for stage in stages:
+        stage_files = [*sorted((conf / stage).glob("**/*.yaml")), *files.glob(f"{stage}.py")]
+        parts = [repr(params.get(stage)).encode(), *(file.read_bytes() for file in stage_files), *common]
+        digests[stage] = hashlib.sha256(b"\0".join(parts)).hexdigest()
+    return digests
 
 
 def require_session(root: Path) -> None:

@@ -32,7 +32,7 @@ def run_stage(name: str, schema: type[Config], main: Callable[[Config], None], r
     @in_one_line
     def run() -> int:
         if "DVC_STAGE" in os.environ:  # the pipeline runs: others may come after this one
-            check_once()
+            check_once(name)
         config = load_config(schema, name, root)
         with threadpool_limits(1, user_api="blas"):
             main(config)

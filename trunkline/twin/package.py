@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 import mujoco
 from pydantic import TypeAdapter, ValidationError
 
-from trunkline.errors import InputError
+from trunkline.errors import InputError, first_problem
 from trunkline.kinematics.panda.mounts import Robot
 
 ROOT = "package/"  # folder that npm's and Unity's tarballs hold everything in
@@ -136,9 +136,7 @@ def robot_of(files: dict[str, bytes]) -> Robot:
     try:
         return TypeAdapter(Robot).validate_python(_hybrid(files)["robot"])
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        raise InputError(f"{MANIFEST}: hybrid: robot: {place}: {first['msg']}") from None
+        raise InputError(f"{MANIFEST}: hybrid: robot: {first_problem(error)}") from None
 
 
 class _CheckedBlock(dict):

@@ -20,7 +20,8 @@ import numpy as np
 from scipy.special import stdtrit
 
 from trunkline.errors import InputError
-from trunkline.identification.parameters.parameters import NAMES, parameter_named
+from trunkline.identification.parameters.parameters import parameter_name, parameter_named
+from trunkline.identification.stages import last_stages
 
 INTERVAL = "interval_95_given_model"
 Seed = np.random.Generator | int
@@ -54,7 +55,7 @@ class Posterior:
         Raises:
             InputError: naming what a table lacks, a parameter that is unknown, or one whose interval is none.
         """
-        last = {name: stage for stage, table in tables.items() for name in table["parameters"]}
+        last = last_stages(tables, "parameters")
         names, stages = list(last), list(last.values())
         rows, correlation = np.zeros((len(names), 5)), np.eye(len(names))
         for i, (name, stage) in enumerate(last.items()):
@@ -116,8 +117,10 @@ class Posterior:
 
 def _row(table: dict, name: str) -> tuple[float, ...]:
     """Estimate, half width of the 95 % interval, degrees of freedom, and both ends of the range."""
-    if name not in NAMES:
-        raise InputError(f"parameters: found {name!r}, expected one of {', '.join(NAMES)}")
+    try:
+        parameter_name(name)
+    except ValueError as error:
+        raise InputError(f"parameters: {error}") from error
     row, parameter = table["parameters"][name], parameter_named(name)
     low, high = row[INTERVAL]
     if low is None or high is None or not low <= high or (low <= 0 and not parameter.signed):

@@ -12,11 +12,6 @@ def unity_position(position: ArrayLike) -> np.ndarray:
     return np.asarray(position)[..., [0, 2, 1]]
 
 
-def unity_quaternion(wxyz: np.ndarray) -> np.ndarray:
-    """Quaternions (..., 4), w first, as Unity's (x, y, z, w): (x, z, y, -w)."""
-    return np.asarray(wxyz)[..., [1, 3, 2, 0]] * [1, 1, 1, -1]
-
-
 def unity_obj(vertices: np.ndarray, faces: np.ndarray) -> bytes:
     """An OBJ file that Unity imports at the right place, with its faces outwards.
 

@@ -14,7 +14,7 @@ SLACK = 1e-4  # m, of every tendon at first: at none, the last digit decides whe
 
 
 @dataclass
-class Motion:
+class ReplayedMotion:
     """What a model did.
 
     Attributes:
@@ -45,7 +45,7 @@ def curl(model: mujoco.MjModel, duration: float, pull: float) -> np.ndarray:
     return rest + SLACK - pull * np.sin(np.pi * phase)[:, None] ** 2 * direction
 
 
-def simulate(model: mujoco.MjModel, commands: np.ndarray, tilt: float) -> Motion:
+def simulate(model: mujoco.MjModel, commands: np.ndarray, tilt: float) -> ReplayedMotion:
     """Step a model from rest in its straight shape.
 
     Args:
@@ -58,9 +58,9 @@ def simulate(model: mujoco.MjModel, commands: np.ndarray, tilt: float) -> Motion
     hold(batch, model, sent[0])
     recorded = move(batch, sent[None], ("xpos", "site_xpos", "qpos", "qvel"))
     positions, sites, angles, speeds = (recorded[name][0] for name in ("xpos", "site_xpos", "qpos", "qvel"))
-    return Motion(positions, sites[:, model.site("tip").id], angles, speeds, int(batch.warning.sum()))
+    return ReplayedMotion(positions, sites[:, model.site("tip").id], angles, speeds, int(batch.warning.sum()))
 
 
-def deviation(first: Motion, second: Motion) -> np.ndarray:
+def deviation(first: ReplayedMotion, second: ReplayedMotion) -> np.ndarray:
     """Largest distance between corresponding bodies at each step, m. Shape (steps,)."""
     return np.linalg.norm(first.positions - second.positions, axis=-1).max(axis=-1)

@@ -3,7 +3,6 @@
 The importer reads what libmujoco saves, so that is what is checked here.
 """
 
-import struct
 import warnings
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
@@ -36,7 +35,7 @@ class Violation:
         return f"{self.element}: {self.rule}: {self.detail}"
 
 
-def save_as_mujoco(xml: str, assets: dict[str, bytes] | None = None) -> tuple[str, list[str]]:
+def save_as_mujoco(xml: str) -> tuple[str, list[str]]:
     """The file that libmujoco saves after loading `xml`, and the warnings of its compiler.
 
     Raises:
@@ -45,7 +44,7 @@ def save_as_mujoco(xml: str, assets: dict[str, bytes] | None = None) -> tuple[st
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
-            spec = mujoco.MjSpec.from_string(xml, assets=assets or {})
+            spec = mujoco.MjSpec.from_string(xml)
             spec.compile()
             saved = spec.to_xml()
         except ValueError as error:
@@ -53,13 +52,9 @@ def save_as_mujoco(xml: str, assets: dict[str, bytes] | None = None) -> tuple[st
     return saved, sorted({str(warning.message) for warning in caught})
 
 
-def lint_mjcf(xml: str, assets: dict[str, bytes] | None = None) -> list[Violation]:
-    """Check a model against every rule.
-
-    Args:
-        xml: MJCF text. assets: mesh files that it names, by the name it uses.
-    """
-    saved, complaints = save_as_mujoco(xml, assets)
+def lint_mjcf(xml: str) -> list[Violation]:
+    """Check a model, MJCF text that names no other file, against every rule."""
+    saved, complaints = save_as_mujoco(xml)
     root = ET.fromstring(saved)
     violations = [
         Violation("compiler", "warning", text) for text in complaints
@@ -72,8 +67,7 @@ def lint_mjcf(xml: str, assets: dict[str, bytes] | None = None) -> list[Violatio
         violations += _attributes(element)
         violations += _values(element)
     violations += _axes(root)
-    for mesh in root.iter("mesh"):
-        violations += _mesh_file(mesh, assets or {})
+    violations += [Violation(_label(mesh), "mesh", "vertices in the MJCF, expected none") for mesh in root.iter("mesh")]
     return violations
 
 
@@ -172,16 +166,3 @@ def _axes(root: ET.Element) -> Iterator[Violation]:
             yield Violation(
                 _label(joint), "axis", "0 0 1, left out when saved; turn the body so that it differs"
             )
-
-
-def _mesh_file(mesh: ET.Element, assets: dict[str, bytes]) -> Iterator[Violation]:
-    name = mesh.get("file")
-    if name is None:
-        yield Violation(_label(mesh), "mesh", "vertices in the MJCF, expected a file")
-    elif name.lower().endswith(".stl"):
-        data = assets.get(name, b"")
-        triangles = struct.unpack_from("<I", data, 80)[0] if len(data) >= 84 else -1
-        if data[:5] == b"solid" or len(data) != 84 + 50 * triangles:
-            yield Violation(_label(mesh), "mesh", f"{name} is not a binary STL")
-    elif not name.lower().endswith(".obj"):
-        yield Violation(_label(mesh), "mesh", f"{name}, expected a binary STL or an OBJ")

@@ -11,8 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from trunkline.ar.session import binary, binary_table, messages
+from trunkline.ar.session import binary, messages
 from trunkline.errors import InputError
+from upkeep import wire_table
 
 ROOT = Path(__file__).parents[3]
 
@@ -95,10 +96,10 @@ def test_every_number_of_a_message_is_its_own():
 
 
 def test_the_client_s_table_is_this_one():
-    assert (ROOT / binary_table.MODULE).read_text(encoding="utf-8") == binary_table.module()
+    assert (ROOT / wire_table.MODULE).read_text(encoding="utf-8") == wire_table.module()
 
 
 def test_the_page_s_tables_are_these():
-    page = (ROOT / binary_table.PAGE).read_text(encoding="utf-8")
-    assert binary_table.written(page) == page
+    page = (ROOT / wire_table.PAGE).read_text(encoding="utf-8")
+    assert wire_table.written(page) == page
     assert re.findall(r"^Version (\d+),", page, re.MULTILINE) == [str(binary.VERSION)]

@@ -7,9 +7,10 @@ import pytest
 from omegaconf import OmegaConf
 
 from trunkline.ar.teleop.config import TeleoperationConfig
-from trunkline.ar.teleop.transitions import TRANSITIONS, diagram
+from trunkline.ar.teleop.transitions import TRANSITIONS
 from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT, SHARED, load_folder
+from upkeep.state_diagram import diagram
 
 PAGE = (Path(__file__).parents[3] / "docs/teleoperation.md").read_text(encoding="utf-8")
 

@@ -36,7 +36,6 @@ def test_units_add_up_and_shrink_by_one_ratio(base, taper, slenderness, units):
     assert chain.widths[-1] * chain.ratio == pytest.approx(
         tip
     )  # the tip's width is the last unit's distal one
-    np.testing.assert_allclose(chain.scaling, chain.widths / base)
 
 
 def test_the_length_is_that_of_the_spiral_s_centre_line():
@@ -76,4 +75,3 @@ def test_dimensions_of_no_spiral_are_refused(length, base, tip, message):
 def test_a_chain_of_equal_units_needs_no_spiral():
     chain = ChainGeometry(np.full(5, 0.02), np.full(5, 0.03), np.full(5, 0.4), 1.0)
     assert (chain.units, chain.length) == (5, pytest.approx(0.1))
-    assert chain.scaling.tolist() == [1.0] * 5

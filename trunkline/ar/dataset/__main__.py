@@ -5,7 +5,6 @@ executed, or a stretch of following. Each frame has the joints and pulls as meas
 operator's rays, and as its action what was sent. LeRobotDataset("any/name", root="FOLDER") opens it.
 """
 
-import argparse
 import sys
 from pathlib import Path
 
@@ -14,17 +13,14 @@ from trunkline.ar.dataset.episodes import Episode, episodes
 from trunkline.ar.dataset.recording import read_recording
 from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.stage import output_folder
-from trunkline.program import program_name
+from trunkline.program import command_parser
 
 ROBOT = "panda_with_soft_arm"
 
 
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(
-        prog=program_name("export-dataset"), description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )  # fmt: skip
+    parser = command_parser("export-dataset", __doc__)
     parser.add_argument("logs", type=Path, nargs="+", metavar="LOG")
     parser.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="of the dataset; it must not exist")
     parser.add_argument("--fps", type=int, default=30, help="frames a second")

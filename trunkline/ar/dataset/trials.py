@@ -6,7 +6,6 @@ action what was commanded; a session that lacks one of the two has the other in 
 are left out. `LeRobotDataset("any/name", root="FOLDER")` opens it.
 """
 
-import argparse
 import sys
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from trunkline.ar.dataset.recording import AxisSeries
 from trunkline.errors import InputError, in_one_line
 from trunkline.identification.simulate.experiment import SLACK
 from trunkline.pipeline.stage import output_folder
-from trunkline.program import program_name
+from trunkline.program import add_settings, command_parser
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_static
 from trunkline.recordings.trials.splits import DECIDING
 from trunkline.recordings.trials.trial import Trial
@@ -70,17 +69,12 @@ def _of_all(trial: Trial, values: np.ndarray, tendons: tuple[str, ...]) -> np.nd
 
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(
-        prog=program_name("export-trials"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = command_parser("export-trials", __doc__)
     parser.add_argument("sessions", type=Path, nargs="+", metavar="SESSION")
     parser.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="of the dataset; it must not exist")
     parser.add_argument("--fps", type=int, default=30, help="frames a second")
     parser.add_argument("--robot", default="soft_arm", metavar="NAME", help="what the dataset calls the arm")
-    parser.add_argument(
-        "--settings", type=Path, metavar="FOLDER", default=Path("."),
-        help="whose params.yaml says how to filter logs; default: the current folder",
-    )  # fmt: skip
+    add_settings(parser)
     args = parser.parse_args(arguments)
     if args.fps < 1:
         raise InputError(f"--fps: found {args.fps}, expected 1 or more")

@@ -5,8 +5,8 @@ from pathlib import Path
 from trunkline.ar.drivers.driver_client import PandaSettings
 from trunkline.ar.drivers.motors import MotorSettings
 from trunkline.ar.drivers.ros_settings import RosSettings
-from trunkline.pipeline.config import PROJECT, compose_settings, validated
-from trunkline.settings import rename_keys, settings
+from trunkline.pipeline.config import PROJECT, load_folder
+from trunkline.settings import settings
 
 RENAMED = {"arm": "panda"}  # keys of the release before
 
@@ -21,11 +21,5 @@ class ExecutionConfig:
 
 
 def read_execution_config(folder: Path = PROJECT / "conf/execution") -> ExecutionConfig:
-    """The settings of a folder, also under the names of the release before.
-
-    Raises:
-        InputError: one line that names the folder and key, what was found and what was expected.
-    """
-    values = compose_settings(folder, {}, str(folder))
-    rename_keys(values, RENAMED, str(folder))
-    return validated(ExecutionConfig, values, folder)
+    """The settings of a folder, also under the names of the release before; errors as of `load_folder`."""
+    return load_folder(ExecutionConfig, folder, RENAMED)

@@ -7,7 +7,7 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from trunkline.ar.teleop.messages import Pose, Vector
-from trunkline.errors import InputError
+from trunkline.errors import InputError, first_problem
 from trunkline.files import written_whole
 
 MOST = 8  # a headset keeps no more of one page
@@ -43,9 +43,7 @@ class Anchors:
         try:
             self.stored = tuple(_FILE.validate_json(path.read_bytes()))
         except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join(map(str, first["loc"])) or "the whole"
-            raise InputError(f"{path}: {where}: {first['msg']}, expected anchors of live sessions") from error
+            raise InputError(f"{path}: {first_problem(error)}, expected anchors of live sessions") from error
 
     def find(self, id: str) -> Anchor | None:
         return next((anchor for anchor in self.stored if anchor.id == id), None)

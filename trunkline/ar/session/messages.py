@@ -4,13 +4,13 @@ Positions in m and quaternions (w, x, y, z), in the rigid base frame unless said
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError
 
 from trunkline.ar.session.binary import VERSION
 from trunkline.ar.teleop.messages import Mode, Motion, Offer, Pose, Targets, World
-from trunkline.errors import InputError
+from trunkline.errors import InputError, first_problem
 
 STRICT = {"extra": "forbid", "ser_json_inf_nan": "null"}
 LONGEST = 64  # characters of a name
@@ -279,22 +279,11 @@ ServerMessage = (
     | WorldMessage
 )
 
-CLIENT_MESSAGES: tuple[type, ...] = (Hello, Pong, LeaseRequest, AlignmentByEye, TouchRequest, AnchorPose, PreviewShown)
-SERVER_MESSAGES: tuple[type, ...] = (
-    Welcome,
-    Refusal,
-    Ping,
-    Clock,
-    Lease,
-    AlignmentProgress,
-    StateMessage,
-    PreviewMessage,
-    PredictionMessage,
-    WorldMessage,
-)
+CLIENT_MESSAGES: tuple[type, ...] = get_args(ClientMessage)
+SERVER_MESSAGES: tuple[type, ...] = get_args(ServerMessage)
 
 _CLIENT_MESSAGE: TypeAdapter[ClientMessage] = TypeAdapter(Annotated[ClientMessage, Field(discriminator="type")])
-_SERVER_MESSAGES = {kind: TypeAdapter(kind) for kind in SERVER_MESSAGES}
+_SERVER_MESSAGES: dict[type, TypeAdapter[Any]] = {kind: TypeAdapter(kind) for kind in SERVER_MESSAGES}
 
 
 def hear(text: str) -> ClientMessage:
@@ -306,9 +295,7 @@ def hear(text: str) -> ClientMessage:
     try:
         return _CLIENT_MESSAGE.validate_json(text)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"])) or "the whole"
-        raise InputError(f"message: {where}: {first['msg']}") from error
+        raise InputError(f"message: {first_problem(error)}") from error
     except (RecursionError, UnicodeError) as error:
         raise InputError("message: found what is no JSON") from error
 

@@ -20,7 +20,7 @@ from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.messages import Input, from_json, to_json
 from trunkline.ar.teleop.reach import MapReach, Reach
 from trunkline.ar.teleop.settings import Teleop
-from trunkline.errors import InputError, in_one_line
+from trunkline.errors import InputError, first_problem, in_one_line
 from trunkline.twin import package
 from trunkline.unity import unpacked
 
@@ -65,9 +65,7 @@ def core_of(log: LogReader, package: str, reach: Reach) -> Teleoperation:
     try:
         settings = TypeAdapter(Teleop).validate_python(begin["settings"])
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise InputError(f"{log.path}: settings: {where}: {first['msg']}, of version {begin['version']}") from error
+        raise InputError(f"{log.path}: settings: {first_problem(error)}, of version {begin['version']}") from error
     return Teleoperation(settings, reach, package, begin["mount_offset"])
 
 

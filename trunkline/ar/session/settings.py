@@ -8,8 +8,8 @@ from pydantic import Field
 
 from trunkline.ar.preview.settings import Previewing
 from trunkline.ar.teleop.messages import Obstacle, WorldObject
-from trunkline.pipeline.config import PROJECT, compose_settings, validated
-from trunkline.settings import rename_keys, settings
+from trunkline.pipeline.config import PROJECT, load_folder
+from trunkline.settings import settings
 
 RENAMED = {"boxes": "obstacles", "thing": "object"}  # keys of the release before
 Metres = Annotated[float, Field(ge=-5, le=5)]
@@ -56,11 +56,5 @@ class SessionConfig:
 
 
 def read_session_config(folder: Path = PROJECT / "conf/live") -> SessionConfig:
-    """The settings of a folder, also under the names of the release before.
-
-    Raises:
-        InputError: one line that names the folder and key, what was found and what was expected.
-    """
-    values = compose_settings(folder, {}, str(folder))
-    rename_keys(values, RENAMED, str(folder))
-    return validated(SessionConfig, values, folder)
+    """The settings of a folder, also under the names of the release before; errors as of `load_folder`."""
+    return load_folder(SessionConfig, folder, RENAMED)

@@ -4,7 +4,6 @@ It steps as a preview does (`trunkline/ar/hybrid/rollouts.py`): the same model, 
 servos that bear the arm. So what was previewed is what happens.
 """
 
-import copy
 import math
 import os
 import time
@@ -20,7 +19,7 @@ from threadpoolctl import threadpool_limits
 
 from trunkline.ar.hybrid.compose import panda_joints
 from trunkline.ar.hybrid.rollouts import ComposedTwin
-from trunkline.ar.hybrid.torques import servo_commands
+from trunkline.ar.hybrid.torques import bare, servo_commands
 from trunkline.ar.session.bodies import BodyPoses
 from trunkline.ar.session.robot_process import DEAD_MAN, MODES, PERMIT, PERMITTED, STOPS, TELLS, Goal, RobotChannel
 from trunkline.ar.teleop.executor import FOLLOWS, PlanFollower
@@ -69,11 +68,7 @@ class TwinPlant:
         self._joints, self._motors = panda_joints(model), ArmModel(model).actuators
         self._servos = [model.actuator(f"{name}_position").id for name in JOINTS]
         self._ratio = -model.actuator_biasprm[self._servos, 2] / model.actuator_gainprm[self._servos, 0]
-        off = mujoco.mjtDisableBit
-        self._bare = copy.copy(model)  # the Panda bears the arm alone, as in `hybrid.torques.joint_torques`
-        self._bare.opt.disableflags |= (
-            off.mjDSBL_CONTACT | off.mjDSBL_FRICTIONLOSS | off.mjDSBL_EQUALITY | off.mjDSBL_LIMIT
-        )
+        self._bare = bare(model)
         self._data = mujoco.MjData(self._bare)
         self._poses, self._object = BodyPoses(model, simulation.bodies), BodyPoses(model, ("object",))
         self._last = np.tile(simulation.joints, (2, 1))

@@ -12,7 +12,7 @@ from typing import Annotated, Literal, TypeVar
 from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationError
 
 from trunkline.ar.hybrid.basket import Basket
-from trunkline.errors import InputError
+from trunkline.errors import InputError, first_problem
 
 STRICT = ConfigDict(extra="forbid", ser_json_inf_nan="null", serialize_by_alias=True)
 # JSON has no NaN: it is written as null, and read back, so that recorded faults are vectors too.
@@ -252,6 +252,4 @@ def from_json(kind: type[Message], text: str | bytes) -> Message:
     try:
         return _ADAPTERS[kind].validate_json(text)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"])) or "the whole"
-        raise InputError(f"{kind.__name__}: {where}: {first['msg']}") from error
+        raise InputError(f"{kind.__name__}: {first_problem(error)}") from error

@@ -1,7 +1,4 @@
-"""The state machine as a table: which event leads from which mode to which. What is not in it is forbidden.
-
-`python -m trunkline.ar.teleop.transitions` prints the diagram of docs/teleoperation.md, made from the same table.
-"""
+"""The state machine as a table: which event leads from which mode to which. What is not in it is forbidden."""
 
 from typing import Literal, get_args
 
@@ -61,23 +58,3 @@ TRANSITIONS |= {(mode, "stop"): "stopped" for mode in MODES if mode != "stopped"
 def first_event(mode: Mode, events: dict[Event, bool]) -> Event | None:
     """Of the `events` that are true, the first that `mode` answers to."""
     return next((event for event in EVENTS if events.get(event) and (mode, event) in TRANSITIONS), None)
-
-
-def diagram() -> str:
-    """The table as a Mermaid state diagram; what leads to a stop or a hold from nearly everywhere is drawn once."""
-    groups = {"stop": ("every mode", "stopped"), "lost": ("every mode but stopped", "hold")}
-    lines = ["stateDiagram-v2", "  [*] --> hold"]
-    for (mode, event), after in TRANSITIONS.items():
-        if event not in groups:
-            lines.append(f"  {mode} --> {after}: {event}")
-    for event, (where, after) in groups.items():
-        lines += [f"  note right of {after}", f"    {event}, from {where}", "  end note"]
-    return "\n".join(lines)
-
-
-def main() -> None:
-    print(diagram())
-
-
-if __name__ == "__main__":
-    main()

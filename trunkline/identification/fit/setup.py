@@ -8,8 +8,8 @@ from trunkline.errors import InputError
 from trunkline.identification.fit.fit import Fit
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.settings import IdentificationSettings
-from trunkline.identification.parameters.parameters import EVERY, MASS, names_of, parameter_named
-from trunkline.identification.parameters.per_session import names_in
+from trunkline.identification.parameters.parameters import EVERY, MASS, names_of, parameter_named, parameter_of
+from trunkline.identification.parameters.per_session import add_sessions, names_in
 from trunkline.identification.simulate.experiment import Experiment, prepare
 from trunkline.identification.simulate.markers import with_measured_markers
 from trunkline.identification.simulate.resting import resting_shape
@@ -19,6 +19,24 @@ from trunkline.recordings.trials.splits import IDENTIFY
 from trunkline.recordings.trials.trial import Trial, sessions_of
 
 EVERY_ANGLE = f"tendon_angle{EVERY}"
+
+
+def check_stage(
+    stage: str, config: IdentificationSettings, spec: mujoco.MjSpec, trials: list[Trial]
+) -> tuple[IdentificationSettings, mujoco.MjModel]:
+    """The settings of a stage as `with_every` has them, and the model with room for what each session of `trials` has
+    for itself.
+
+    Raises:
+        InputError: a parameter is of what the arm has not got, or the trials do not determine it.
+    """
+    model = spec.compile()
+    config = with_every(config, model)
+    check_parameters(stage, config, model)
+    lines = add_sessions(spec, list(config.parameters), config.per_session, config.experiments, trials)
+    for line in lines + unidentifiable_mass(config, trials):
+        raise InputError(f"{stage}.{line}")
+    return config, spec.compile()
 
 
 def set_up(
@@ -79,10 +97,7 @@ def unidentifiable_mass(config: IdentificationSettings, trials: list[Trial]) -> 
 def check_parameters(stage: str, config: IdentificationSettings, model: mujoco.MjModel) -> None:
     """Refuse parameters of what the arm has not got: tendons, motors, joints' elements, units of some length."""
     for name in config.parameters:
-        parameter, where = parameter_named(name), f"params.yaml: {stage}.parameters.{name}"
-        if not parameter.belongs_to(model):
-            raise InputError(f"{where}: {parameter.part.lacking}")
         try:
-            parameter.read(model)
+            parameter_of(model, name).read(model)
         except InputError as error:
-            raise InputError(f"{where}: {error}") from error
+            raise InputError(f"params.yaml: {stage}.parameters.{name}: {error}") from error

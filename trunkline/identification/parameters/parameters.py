@@ -1,13 +1,16 @@
 """Identifiable parameters by name, and models of many candidates with other values of them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal
+from itertools import count, takewhile
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import mujoco
 import numpy as np
+from pydantic import AfterValidator
 from scipy.spatial.transform import Rotation
 
+from trunkline.errors import InputError, nearest
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.identification.parameters.joints import (
     DAMPING_FIELDS,
@@ -67,14 +70,27 @@ NUMBERED: dict[str, tuple[Callable[[int], Parameter], int]] = {
 # what a factor of each unit's own may scale: the fields, and how
 PER_JOINT = {"stiffness": (STIFFNESS_FIELDS, scale_stiffness), "damping": (DAMPING_FIELDS, scale_damping)}
 
-MOST = 24  # tendons, and sections, that params.yaml may name
-NAMES = (*PARAMETERS, *(f"{stem}_{k}" for stem, (_, first) in NUMBERED.items() for k in range(first, MOST + 1)))
 EVERY_NAME = tuple(f"{stem}{EVERY}" for stem in NUMBERED)
+
+
+def parameter_name(name: str) -> str:
+    """The name itself, of a parameter that some arm has; an arm's own are those of `parameters_of`.
+
+    Raises:
+        ValueError: it is none, with the nearest that is.
+    """
+    try:
+        parameter_named(name)
+    except KeyError:
+        names = [*PARAMETERS, *EVERY_NAME, *(f"{stem}_{first}" for stem, (_, first) in NUMBERED.items())]
+        raise ValueError(f"found {name!r}, expected the name of a parameter{nearest(name, names)}") from None
+    return name
+
+
+ParameterName = Annotated[str, AfterValidator(parameter_name)]
 if TYPE_CHECKING:
-    ParameterName = str
     PerJointName = str
-else:  # so that whoever names another is told which there are
-    ParameterName = Literal[(*NAMES, *EVERY_NAME)]
+else:
     PerJointName = Literal[tuple(PER_JOINT)]
 
 
@@ -92,9 +108,9 @@ def parameter_named(name: str) -> Parameter:
     if name in PARAMETERS:
         return PARAMETERS[name]
     stem, _, last = name.rpartition("_")
-    if stem not in NUMBERED or not (last == "*" or last.isdecimal()):
+    make, first = NUMBERED.get(stem, (None, 0))
+    if make is None or not (last == "*" or (last.isdecimal() and last == str(int(last)) and int(last) >= first)):
         raise KeyError(name)
-    make, first = NUMBERED[stem]
     return make(first if last == "*" else int(last))
 
 
@@ -104,13 +120,36 @@ def names_of(name: str, model: mujoco.MjModel) -> list[str]:
         return [name]
     stem = name.removesuffix(EVERY)
     make, first = NUMBERED[stem]
-    return [f"{stem}_{k}" for k in range(first, MOST + 1) if make(k).belongs_to(model)]
+    return [f"{stem}_{k}" for k in takewhile(lambda k: make(k).belongs_to(model), count(first))]
 
 
 def parameters_of(model: mujoco.MjModel) -> dict[str, Parameter]:
     """Those that an arm has, in the order in which they are written."""
     names = [name for entry in (*PARAMETERS, *EVERY_NAME) for name in names_of(entry, model)]
     return {name: parameter_named(name) for name in names if parameter_named(name).belongs_to(model)}
+
+
+def parameter_of(model: mujoco.MjModel, name: str) -> Parameter:
+    """An arm's parameter of this name.
+
+    Raises:
+        InputError: the arm lacks the part; of a numbered name, with the nearest that it has.
+    """
+    parameter, names = parameter_named(name), list(parameters_of(model))
+    if name not in names:
+        raise InputError(parameter.part.lacking + (nearest(name, names) if name[-1].isdecimal() else ""))
+    return parameter
+
+
+def in_writing_order(names: Iterable[str]) -> list[str]:
+    """Names of parameters, none of them per session, in the order in which they are written."""
+    recipes = [*PARAMETERS, *NUMBERED]
+
+    def place(name: str) -> tuple[int, int]:
+        stem, _, last = name.rpartition("_")
+        return (recipes.index(stem), int(last)) if stem in NUMBERED else (recipes.index(name), 0)
+
+    return sorted(names, key=place)
 
 
 def candidate_fields(
@@ -132,8 +171,9 @@ def candidate_fields(
     names = {f for p in values for f in parameter_named(p).fields} | {f for p in factors for f in PER_JOINT[p][0]}
     names -= {"tendon_stiffness"} if not model.ntendon else set()
     fields = {name: np.repeat(np.array(getattr(model, name))[None], candidates, axis=0) for name in sorted(names)}
+    shared = dict.fromkeys(name for name in (*values, *factors) if SESSION_MARK not in name)
     per_session = [name for name in values if SESSION_MARK in name and len(arm.places(name))]
-    for name in (*NAMES, *per_session):
+    for name in (*in_writing_order(shared), *per_session):
         if name in values:
             parameter_named(name).write(fields, np.asarray(values[name], dtype=float), model)
         if name in factors:

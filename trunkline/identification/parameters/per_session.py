@@ -3,6 +3,8 @@
 The model is the first session's. What another has is a number in the MJCF, called `parameter@session`.
 """
 
+from collections.abc import Container
+
 import mujoco
 import numpy as np
 
@@ -37,11 +39,12 @@ def per_session_names(parameters: list[str], per_session: list[str], sessions: l
     return {f"{name}{SESSION_MARK}{session}": name for session in sessions for name in selected}
 
 
-def names_in(model: mujoco.MjModel, parameters) -> dict[str, str]:
-    """Names of the per-session parameters in a model that belong to `parameters`, with the shared names."""
+def names_in(model: mujoco.MjModel, parameters: Container[str] | None = None) -> dict[str, str]:
+    """Names of the per-session parameters in a model, of those alone that belong to `parameters`, with the shared
+    names."""
     numbers = [model.numeric(index).name for index in range(model.nnumeric)]
     shared = {name: name.partition(SESSION_MARK)[0] for name in numbers if SESSION_MARK in name}
-    return {name: parameter for name, parameter in shared.items() if parameter in parameters}
+    return {name: parameter for name, parameter in shared.items() if parameters is None or parameter in parameters}
 
 
 def make_room(spec: mujoco.MjSpec, names: dict[str, str]) -> None:
@@ -52,13 +55,21 @@ def make_room(spec: mujoco.MjSpec, names: dict[str, str]) -> None:
             spec.add_numeric(name=name, size=1, data=[parameter_named(shared).read(model)])
 
 
-def unidentifiable_per_session(names: dict[str, str], trials: list[Trial], kinds: list[str]) -> list[str]:
-    """A line for each session of `trials` whose own trials to identify from do not determine one of its per-session
-    parameters; `names` is from `per_session_names`.
+def add_sessions(
+    spec: mujoco.MjSpec, parameters: list[str], per_session: list[str], kinds: list[str], trials: list[Trial]
+) -> list[str]:
+    """As `make_room`, for all sessions of `trials` but the first, whose model it is.
 
     Args:
-        kinds: of experiment, to identify from.
+        parameters: of a stage. per_session: those that each session has for itself. kinds: of experiment, to identify
+            from.
+
+    Returns:
+        A line for each session whose own trials to identify from do not determine one of its per-session parameters.
     """
+    names = per_session_names(parameters, per_session, sessions_of(trials)[1:])
+    if names:
+        make_room(spec, names)
     identified = {trial.session for trial in trials if trial.split == IDENTIFY and trial.experiment in kinds}
     return [
         f"per_session: {shared}: found no {' or '.join(kinds)} of the session {session} with split identify to tell "

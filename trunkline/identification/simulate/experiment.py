@@ -68,8 +68,9 @@ class Experiment:
 
     def shortened(self, frames: int) -> "Experiment":
         """Its first `frames` frames."""
-        parts = {name: getattr(self, name)[:frames] for name in ("controls", "positions", "measured")}
-        return replace(self, **parts)
+        return replace(
+            self, controls=self.controls[:frames], positions=self.positions[:frames], measured=self.measured[:frames]
+        )
 
 
 def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: float = 0.0) -> Experiment:

@@ -31,11 +31,6 @@ class ChainGeometry:
     def length(self) -> float:
         return float(self.lengths.sum())
 
-    @property
-    def scaling(self) -> np.ndarray:
-        """α^(i-1) of every unit, the first being 1. Shape (n,)."""
-        return self.ratio ** np.arange(self.units)
-
     def unit_at(self, distance: float) -> int:
         """Number, from 0, of the unit at `distance` (m) from the mount along the straight arm; the last one's end
         belongs to it."""

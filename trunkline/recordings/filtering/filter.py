@@ -1,6 +1,6 @@
 """A raw trial becomes a trial: outliers out, gaps bridged, one uniform clock, filtered, in the base frame."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Annotated, Literal, NamedTuple
 
@@ -16,6 +16,7 @@ from trunkline.recordings.signals.base_frame import BasePose, average_base, grav
 from trunkline.recordings.signals.smoothing import bridged, fill_gaps, low_pass, outliers, resample
 from trunkline.recordings.trials.experiments import EXPERIMENTS, ExperimentKind, is_held
 from trunkline.recordings.trials.raw_trial import RawTrial
+from trunkline.recordings.trials.recording import PlannedTrial
 from trunkline.recordings.trials.trial import Trial
 
 BEYOND, BEYOND_LEAST = 0.5, 5e-3  # share of the way that samples go, and m, by which filtered ones may go beyond them
@@ -105,12 +106,7 @@ def _trial(
 ) -> Trial:  # fmt: skip
     """What the raw trial was planned as, with these samples, shapes as in `Trial`."""
     return Trial(
-        name=raw.name,
-        experiment=raw.experiment,
-        split=raw.split,
-        level=raw.level,
-        load=raw.load,
-        session=raw.session,
+        **{field.name: getattr(raw, field.name) for field in fields(PlannedTrial)},
         gravity=gravity,
         time=time,
         markers=raw.markers,

@@ -13,6 +13,12 @@ float64 x
 float64 y
 float64 z
 """
+QUATERNION = f"""{SEPARATOR}MSG: geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+"""
 MARKER = f"""{SEPARATOR}MSG: mocap4r2_msgs/Marker
 int8 USE_NAME=0
 int8 USE_INDEX=1
@@ -55,18 +61,7 @@ uint32 frame_number
 string[] rigid_body_names
 geometry_msgs/Point[] positions
 geometry_msgs/Quaternion[] orientations
-{HEADER}{POINT}{SEPARATOR}MSG: geometry_msgs/Quaternion
-float64 x
-float64 y
-float64 z
-float64 w
-"""
-QUATERNION = f"""{SEPARATOR}MSG: geometry_msgs/Quaternion
-float64 x
-float64 y
-float64 z
-float64 w
-"""
+{HEADER}{POINT}{QUATERNION}"""
 POSE = f"""{SEPARATOR}MSG: geometry_msgs/Pose
 geometry_msgs/Point position
 geometry_msgs/Quaternion orientation

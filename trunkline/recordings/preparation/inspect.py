@@ -4,12 +4,11 @@ Prints of each log its topics with their rates, its bodies with how often they a
 session.yaml in which you have to check each trial's experiment, level and split. Writes nothing.
 """
 
-import argparse
 import sys
 from pathlib import Path
 
 from trunkline.errors import InputError, in_one_line
-from trunkline.program import program_name
+from trunkline.program import command_parser
 from trunkline.recordings.preparation.proposal import propose
 from trunkline.recordings.preparation.survey import describe, survey
 from trunkline.recordings.session.session import logs_in, unreadable_in
@@ -17,10 +16,7 @@ from trunkline.recordings.session.session import logs_in, unreadable_in
 
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(
-        prog=program_name("inspect"), description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )  # fmt: skip
+    parser = command_parser("inspect", __doc__)
     parser.add_argument("logs", nargs="+", type=Path, metavar="LOG",
                         help="an MCAP log, or a folder of them, or of folders with one each")  # fmt: skip
     surveys, code, places = [], 0, parser.parse_args(arguments).logs

@@ -5,7 +5,6 @@ Rigid bodies become `mocap4r2_msgs/msg/RigidBodies`, and where an export has non
 `mocap4r2_msgs/msg/Markers`. A session.yaml is proposed unless there is one; up in it is +y, or what the arm shows.
 """
 
-import argparse
 import sys
 import tempfile
 from pathlib import Path
@@ -15,7 +14,7 @@ from mcap_ros2.writer import Writer
 
 from trunkline.errors import InputError, in_one_line
 from trunkline.files import written_whole
-from trunkline.program import program_name
+from trunkline.program import command_parser
 from trunkline.recordings.logs.definitions import MARKERS, RIGID_BODIES
 from trunkline.recordings.logs.pose_stream import PoseStream
 from trunkline.recordings.preparation.export import METRES, read_export
@@ -54,11 +53,7 @@ def _body(poses: PoseStream, frame: int, body: int) -> dict:
 
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(
-        prog=program_name("import-motive"),
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = command_parser("import-motive", __doc__)
     parser.add_argument("exports", nargs="+", type=Path, metavar="CSV", help="an export of Motive's, a trial each")
     parser.add_argument("--session", required=True, type=Path, help="folder that becomes the session")
     parser.add_argument("--unit", choices=METRES, help="of exports whose header has no Length Units")

@@ -316,8 +316,11 @@ def named_logs(path: Path) -> set[str]:
     return {str(trial.get("file")) for trial in entries if isinstance(trial, dict)}
 
 
-def read_session(folder: Path) -> Session:
+def read_session(folder: Path, files: set[str] | None = None) -> Session:
     """Read and check `folder`/session.yaml.
+
+    Args:
+        files: logs that are there so far; others, and the trials of them, are left out. By default all logs must be.
 
     Raises:
         InputError: naming the file and key, what was found and what was expected.
@@ -336,6 +339,9 @@ def read_session(folder: Path) -> Session:
     content = OmegaConf.to_container(read_yaml(path), resolve=False)
     assert isinstance(content, dict)
     rename_keys(content, RENAMED, str(path))
+    if files is not None:
+        logs = [log for log in logs if log in files]
+        content["trials"] = [trial for trial in content["trials"] if trial["file"] in files]
     try:
         session = Session.model_validate(content)
     except ValidationError as error:

@@ -5,10 +5,19 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from trunkline.recordings.trials.recording import TrialRecording
-from trunkline.recordings.trials.tables import long_table, pose_table, read_tables, stack, with_sessions
+from trunkline.recordings.trials.tables import (
+    COUNT,
+    NUMBER,
+    VECTOR,
+    long_table,
+    planned,
+    pose_table,
+    read_tables,
+    stack,
+    write_tables,
+)
 
 BASE = "base"  # the base body's name in poses.parquet
 
@@ -36,50 +45,15 @@ class RawTrial(TrialRecording):
     repairs: int = 0
 
 
-SCHEMA = pa.schema(
-    {
-        "trial": pa.string(),
-        "experiment": pa.string(),
-        "split": pa.string(),
-        "level": pa.float64(),
-        "load": pa.float64(),
-        "up": pa.list_(pa.float64()),
-        "clock_offset": pa.float64(),
-        "repairs": pa.int64(),
-        "frames": pa.int64(),
-        "commands": pa.int64(),
-        "tendon_positions": pa.int64(),
-        "markers": pa.list_(pa.string()),
-        "tendons": pa.list_(pa.string()),
-        "orientations": pa.bool_(),
-    }
-)
+COLUMNS = {"up": VECTOR, "clock_offset": NUMBER, "repairs": COUNT}
+COUNTS = {"frames": "time", "commands": "command_time", "tendon_positions": "tendon_time"}
 
 
 def write_raw_trials(folder: Path, raw_trials: list[RawTrial]) -> None:
     """Write trials.parquet (a row a trial), poses.parquet (a row a frame and body, the base first) and
     commands.parquet (a row a tendon and time; `stream` is "command" or "position")."""
-    rows, poses, commands = [], [], []
+    poses, commands = [], []
     for raw in raw_trials:
-        rows.append(
-            {
-                "trial": raw.name,
-                "experiment": raw.experiment,
-                "split": raw.split,
-                "level": raw.level,
-                "load": raw.load,
-                "session": raw.session,
-                "up": raw.up.tolist(),
-                "clock_offset": float(raw.clock_offset),
-                "repairs": raw.repairs,
-                "frames": len(raw.time),
-                "commands": len(raw.command_time),
-                "tendon_positions": len(raw.tendon_time),
-                "markers": list(raw.markers),
-                "tendons": list(raw.tendons),
-                "orientations": raw.quaternions is not None,
-            }
-        )
         quaternions = raw.quaternions
         if quaternions is None:
             quaternions = np.full((*raw.positions.shape[:2], 4), np.nan)
@@ -92,11 +66,7 @@ def write_raw_trials(folder: Path, raw_trials: list[RawTrial]) -> None:
         ):
             table = long_table(raw.name, time, "tendon", raw.tendons, {"pull": values})
             commands.append(table.append_column("stream", pa.array([stream] * len(table), pa.string())))
-    folder = Path(folder)
-    schema = with_sessions(SCHEMA, [raw.session for raw in raw_trials])
-    pq.write_table(pa.Table.from_pylist(rows, schema), folder / "trials.parquet")
-    pq.write_table(pa.concat_tables(poses), folder / "poses.parquet")
-    pq.write_table(pa.concat_tables(commands), folder / "commands.parquet")
+    write_tables(folder, raw_trials, COLUMNS, COUNTS, poses, commands)
 
 
 def read_raw_trials(folder: Path, splits: tuple[str, ...]) -> list[RawTrial]:
@@ -122,26 +92,16 @@ def read_raw_trials(folder: Path, splits: tuple[str, ...]) -> list[RawTrial]:
         quaternions = stack(pose, ("qw", "qx", "qy", "qz"), shape)
         raw_trials.append(
             RawTrial(
-                name=row["trial"],
-                experiment=row["experiment"],
-                split=row["split"],
-                level=row["level"],
-                load=row["load"],
-                session=row.get("session", ""),
-                up=np.array(row["up"]),
+                **planned(row, COLUMNS),
                 time=pose["time"].reshape(shape)[:, 0].copy(),
-                markers=tuple(row["markers"]),
                 positions=positions[:, 1:],
                 quaternions=quaternions[:, 1:] if row["orientations"] else None,
                 base_positions=positions[:, 0],
                 base_quaternions=quaternions[:, 0],
-                tendons=tuple(row["tendons"]),
                 command_time=motors["command"][0],
                 commands=motors["command"][1],
                 tendon_time=motors["tendon"][0],
                 tendon_positions=motors["tendon"][1],
-                clock_offset=row["clock_offset"],
-                repairs=row["repairs"],
             )
         )
     return [raw for raw in raw_trials if raw.split in splits]

@@ -1,12 +1,53 @@
-"""Signals as Parquet tables in long form: a row a frame and name."""
+"""Trials as Parquet tables: a row a trial, and signals in long form, a row a frame and name."""
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from trunkline.errors import InputError
+from trunkline.recordings.trials.recording import TrialRecording
+
+FLAG, COUNT, NUMBER, VECTOR = pa.bool_(), pa.int64(), pa.float64(), pa.list_(pa.float64())
+NAME, NAMES = pa.string(), pa.list_(pa.string())
+PLANNED = {"experiment": NAME, "split": NAME, "level": NUMBER, "load": NUMBER}
+
+
+def write_tables(
+    folder: Path, trials: Sequence[TrialRecording], columns: dict[str, pa.DataType], counts: dict[str, str],
+    poses: list[pa.Table], commands: list[pa.Table],
+) -> None:  # fmt: skip
+    """Write trials.parquet, poses.parquet and commands.parquet into `folder`; `planned` reads a row of the first back.
+
+    Args:
+        columns: of a trial's row beside what was planned, the fields of its class by name.
+        counts: further columns, each with the field of whose rows it is the number.
+    """
+    kinds = PLANNED | columns
+    rows = [
+        {"trial": trial.name, "session": trial.session, "orientations": trial.quaternions is not None}
+        | {name: getattr(trial, name) for name in ("markers", "tendons", *kinds)}
+        | {name: len(getattr(trial, field)) for name, field in counts.items()}
+        for trial in trials
+    ]
+    kinds = {"trial": NAME} | kinds | dict.fromkeys(counts, COUNT)
+    kinds |= {"markers": NAMES, "tendons": NAMES, "orientations": FLAG}
+    if any(trial.session for trial in trials):  # a single session's are without a column that names it
+        kinds["session"] = NAME
+    pq.write_table(pa.Table.from_pylist(rows, pa.schema(kinds)), Path(folder) / "trials.parquet")
+    pq.write_table(pa.concat_tables(poses), Path(folder) / "poses.parquet")
+    pq.write_table(pa.concat_tables(commands), Path(folder) / "commands.parquet")
+
+
+def planned(row: dict, columns: dict[str, pa.DataType]) -> dict[str, Any]:
+    """Arguments of a trial's class that its row of trials.parquet holds: what was planned, names, and `columns`."""
+    fields = {name: row[name] for name in (*PLANNED, *columns)}
+    vectors = {name: np.array(row[name]) for name, kind in columns.items() if kind == VECTOR}
+    names = {"markers": tuple(row["markers"]), "tendons": tuple(row["tendons"])}
+    return fields | vectors | names | {"name": row["trial"], "session": row.get("session", "")}
 
 
 def read_tables(folder: Path, stage: str) -> tuple[list[dict], dict[str, np.ndarray], dict[str, np.ndarray]]:
@@ -27,11 +68,6 @@ def read_tables(folder: Path, stage: str) -> tuple[list[dict], dict[str, np.ndar
             raise InputError(f"{path}: not readable as Parquet, {expected}") from error
     trials, poses, commands = tables
     return trials.to_pylist(), columns_of(poses), columns_of(commands)
-
-
-def with_sessions(schema: pa.Schema, sessions: list[str]) -> pa.Schema:
-    """The schema of trials.parquet, of which a single session's, "", is without a column that names it."""
-    return schema.append(pa.field("session", pa.string())) if any(sessions) else schema
 
 
 def pose_table(

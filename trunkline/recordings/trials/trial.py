@@ -9,10 +9,25 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from trunkline.recordings.trials.recording import TrialRecording
-from trunkline.recordings.trials.tables import long_table, pose_table, read_tables, stack, with_sessions
+from trunkline.recordings.trials.tables import (
+    COUNT,
+    FLAG,
+    NUMBER,
+    VECTOR,
+    long_table,
+    planned,
+    pose_table,
+    read_tables,
+    stack,
+    write_tables,
+)
+
+COLUMNS = {
+    "gravity": VECTOR, "start": NUMBER, "start_sigma": NUMBER, "in_motion": FLAG, "swaying": FLAG, "repairs": COUNT,
+    "approach": COUNT,
+}  # fmt: skip
 
 
 @dataclass(kw_only=True)
@@ -53,62 +68,17 @@ def sessions_of(trials: list[Trial]) -> list[str]:
 def write_trials(folder: Path, trials: list[Trial]) -> None:
     """Write trials.parquet (a row a trial), poses.parquet (a row a frame and marker) and commands.parquet
     (a row a frame and tendon) into `folder`, in the order of `trials`."""
-    rows = [
-        {
-            "trial": trial.name,
-            "experiment": trial.experiment,
-            "split": trial.split,
-            "level": trial.level,
-            "load": trial.load,
-            "session": trial.session,
-            "gravity": list(map(float, trial.gravity)),
-            "start": float(trial.start),
-            "start_sigma": float(trial.start_sigma),
-            "in_motion": trial.in_motion,
-            "swaying": trial.swaying,
-            "repairs": trial.repairs,
-            "approach": trial.approach,
-            "frames": len(trial.time),
-            "markers": list(trial.markers),
-            "tendons": list(trial.tendons),
-            "orientations": trial.quaternions is not None,
-        }
-        for trial in trials
-    ]
-    schema = pa.schema(
-        {
-            "trial": pa.string(),
-            "experiment": pa.string(),
-            "split": pa.string(),
-            "level": pa.float64(),
-            "load": pa.float64(),
-            "gravity": pa.list_(pa.float64()),
-            "start": pa.float64(),
-            "start_sigma": pa.float64(),
-            "in_motion": pa.bool_(),
-            "swaying": pa.bool_(),
-            "repairs": pa.int64(),
-            "approach": pa.int64(),
-            "frames": pa.int64(),
-            "markers": pa.list_(pa.string()),
-            "tendons": pa.list_(pa.string()),
-            "orientations": pa.bool_(),
-        }
-    )
-    schema = with_sessions(schema, [trial.session for trial in trials])
-    pq.write_table(pa.Table.from_pylist(rows, schema), Path(folder) / "trials.parquet")
     poses = [
         pose_table(t.name, t.time, t.markers, t.positions, t.quaternions).append_column(
             "measured", pa.array(t.measured.ravel())
         )
         for t in trials
     ]
-    pq.write_table(pa.concat_tables(poses), Path(folder) / "poses.parquet")
     commands = [
         long_table(t.name, t.time, "tendon", t.tendons, {"command": t.commands, "position": t.tendon_positions})
         for t in trials
     ]
-    pq.write_table(pa.concat_tables(commands), Path(folder) / "commands.parquet")
+    write_tables(folder, trials, COLUMNS, {"frames": "time"}, poses, commands)
 
 
 def read_trials(folder: Path, splits: tuple[str, ...]) -> list[Trial]:
@@ -128,27 +98,13 @@ def read_trials(folder: Path, splits: tuple[str, ...]) -> list[Trial]:
         command_row += count
         trials.append(
             Trial(
-                name=row["trial"],
-                experiment=row["experiment"],
-                split=row["split"],
-                level=row["level"],
-                load=row["load"],
-                session=row.get("session", ""),
-                gravity=np.array(row["gravity"]),
+                **planned(row, COLUMNS),
                 time=pose["time"].reshape(shape)[:, 0].copy(),
-                markers=tuple(row["markers"]),
                 positions=stack(pose, ("x", "y", "z"), shape),
                 quaternions=stack(pose, ("qw", "qx", "qy", "qz"), shape) if row["orientations"] else None,
                 measured=pose["measured"].reshape(shape),
-                tendons=tuple(row["tendons"]),
                 commands=command["command"].reshape(command_shape),
                 tendon_positions=command["position"].reshape(command_shape),
-                start=row["start"],
-                start_sigma=row["start_sigma"],
-                in_motion=row["in_motion"],
-                swaying=row["swaying"],
-                repairs=row["repairs"],
-                approach=row["approach"],
             )
         )
     return [trial for trial in trials if trial.split in splits]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from trunkline.identification.evaluation.error_tables import LABELS
-from trunkline.identification.stages import model_name
+from trunkline.identification.stages import last_stages, model_name
 from trunkline.recordings.trials.conditions import Conditions
 from trunkline.report.certificate.budget import COVERAGE, LEAST, Budget
 from trunkline.report.certificate.words import certainty_words, open_lines, strong_pairs, telling
@@ -43,7 +43,7 @@ def parameter_facts(tables: dict[str, dict]) -> dict[str, dict]:
     trades off, what is told least, and what is open. A parameter that several stages identify is in the last of them
     alone, whose value the model has."""
     facts, keys = {}, ("parameters", "per_session")
-    last = {name: stage for stage, table in tables.items() for key in keys for name in table.get(key, {})}
+    last = last_stages(tables, *keys)
     for stage, whole in tables.items():
         table = whole | {
             key: {name: row for name, row in whole[key].items() if last[name] == stage} for key in keys if key in whole

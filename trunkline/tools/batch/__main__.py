@@ -5,13 +5,12 @@ again, and an arm that fails does not stop the others. Then prints errors and pa
 drift, and writes fleet.csv, fleet.md and fleet.png. Ends with 1 where an arm failed.
 """
 
-import argparse
 import sys
 import time
 from pathlib import Path
 
 from trunkline.errors import InputError, in_one_line
-from trunkline.program import program_name
+from trunkline.program import command_parser
 from trunkline.tools.batch.listing import Listing, read_listing
 from trunkline.tools.batch.results import Results, drift, read_results
 from trunkline.tools.batch.running import prepare, run
@@ -20,9 +19,7 @@ from trunkline.tools.batch.words import error_table, long_table, parameter_table
 
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(
-        prog=program_name("batch"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = command_parser("batch", __doc__)
     parser.add_argument("list", type=Path, metavar="LIST.yaml", help="the arms: docs/lab-tools.md")
     parser.add_argument("--out", type=Path, metavar="FOLDER", default=Path("build/fleet"), help="default: build/fleet")
     parser.add_argument("--until", metavar="STAGE", default="score", help="the last stage to run; default: score")

@@ -5,14 +5,13 @@ moment arms, its tracked points, and what no log can identify; with --session, w
 the arm.
 """
 
-import argparse
 import sys
 from pathlib import Path
 
 from trunkline.errors import in_one_line
 from trunkline.model.arm_model import ArmModel
 from trunkline.model.statics.chain import read_chain
-from trunkline.program import program_name
+from trunkline.program import command_parser
 from trunkline.recordings.session.session import read_session
 from trunkline.report.figures.arm import arm_figure
 from trunkline.report.figures.style import save_figure
@@ -24,11 +23,7 @@ DRAWINGS = Path("artifacts/describe")  # below the current folder; Git ignores p
 
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(
-        prog=program_name("describe"),
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = command_parser("describe", __doc__)
     parser.add_argument("arm", type=Path, metavar="ARM", help="an arm's YAML, or a model in MJCF")
     parser.add_argument("--session", type=Path, metavar="FOLDER", help="of logs and session.yaml")
     parser.add_argument("--out", type=Path, metavar="PNG",

@@ -22,7 +22,7 @@ from trunkline.identification.stages import STAGES, final_model
 from trunkline.model.arm.kinds import described_arm
 from trunkline.model.places import marker_places
 from trunkline.pipeline.config import load_folder, own_or_project, settings_of
-from trunkline.program import program_name
+from trunkline.program import add_settings, command_parser
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.recordings.trials.splits import IDENTIFY
 from trunkline.recordings.trials.trial import Trial, sessions_of
@@ -50,9 +50,7 @@ Stages = list[StageInformation]
 
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(
-        prog=program_name("suggest"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = command_parser("suggest", __doc__)
     parser.add_argument("session", type=Path, metavar="SESSION",
                         help="folder of logs and session.yaml, or of filtered trials")  # fmt: skip
     parser.add_argument("--model", type=Path, metavar="MODEL",
@@ -63,8 +61,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--per-minute", action="store_true", help="choose by gain a minute, not by gain a trial")
     parser.add_argument("--error", type=float, default=0.5, metavar="PERCENT",
                         help="by which the fitted model will be off, of a point's distance from the base")  # fmt: skip
-    parser.add_argument("--settings", type=Path, metavar="FOLDER", default=Path("."),
-                        help="whose params.yaml describes arm and stages; default: the current folder")  # fmt: skip
+    add_settings(parser, "describes arm and stages")
     args = parser.parse_args(arguments)
     _check(args)
     grid = load_folder(Recordable, own_or_project(args.settings, "conf") / "suggest")

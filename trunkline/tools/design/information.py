@@ -41,13 +41,12 @@ SAME = 0.02  # of a point's distance from the base, within which a candidate is 
 class StageInformation:
     """The information that a stage has on its P parameters, and that candidates would add, in u.
 
-    stage: its name. kinds: of experiments that it reads. names: of the parameters. half: of each range, on the axis
+    stage: its name. names: of the parameters. half: of each range, on the axis
     that is searched. Shape (P,). recorded: information of the trials that there are and of the ranges. Shape (P, P).
     added: by name of a candidate, its information. Each (P, P). repeated: candidates that the session holds.
     """
 
     stage: str
-    kinds: tuple[str, ...]
     names: list[str]
     half: np.ndarray
     recorded: np.ndarray
@@ -122,7 +121,7 @@ def stage_information(
     low, high = fit.problem(model, [e for _, e in done] or experiments).bounds()
     recorded = information(fit, model, experiments, share).sum(axis=0)
     return StageInformation(
-        stage, tuple(config.experiments), list(fit.parameters), 0.5 * (high - low),
+        stage, list(fit.parameters), 0.5 * (high - low),
         PRIOR * np.eye(len(recorded)) + recorded,
         {candidate.name: matrix for (candidate, _), matrix in zip(done, matrices, strict=True)},
         {candidate.name for candidate, e in done if any(_same(e, other) for other in experiments)},

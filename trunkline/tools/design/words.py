@@ -5,6 +5,7 @@ import yaml
 
 from trunkline.identification.diagnostics.identifiability import TWO_SIDED, Identifiability
 from trunkline.identification.parameters.parameters import parameter_named
+from trunkline.program import aligned
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.recordings.trials.splits import IDENTIFY
 from trunkline.tools.design.candidates import Candidate
@@ -42,7 +43,7 @@ def table_lines(goal: Goal, suggestions: list[Suggestion]) -> list[str]:
     for number, suggestion in enumerate(suggestions, 1):
         candidate, left = suggestion.candidate, loss_words(goal, suggestion.after)
         rows.append([f"{number}", candidate.name, left, *_numbers(suggestion.gain, candidate)])
-    return aligned(rows)
+    return aligned(rows, 2)
 
 
 def kind_lines(goal: Goal, before: float, after: np.ndarray, offered: list[Candidate]) -> list[str]:
@@ -60,7 +61,7 @@ def kind_lines(goal: Goal, before: float, after: np.ndarray, offered: list[Candi
         label = EXPERIMENTS[kind].plural + (", loaded" if loaded else "")
         numbers = _numbers(float(gains[index]), offered[index])
         rows.append([label, offered[index].name, loss_words(goal, after[index]), *numbers])
-    return aligned(rows)
+    return aligned(rows, 2)
 
 
 def why_words(stages: list[StageInformation], weights: list[np.ndarray], suggestion: Suggestion) -> str:
@@ -108,16 +109,6 @@ def entry_lines(chosen: list[Candidate], taken: set[str]) -> list[str]:
         text = yaml.safe_dump(entry | {"split": IDENTIFY}, default_flow_style=True, sort_keys=False, width=1000)
         lines.append(f"  - {text.strip()}")
     return lines
-
-
-def aligned(rows: list[list[str]]) -> list[str]:
-    """Columns of equal width: the first two to the left, the others to the right."""
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    return [
-        "  ".join(cell.ljust(width) if column < 2 else cell.rjust(width)
-                  for column, (cell, width) in enumerate(zip(row, widths, strict=True))).rstrip()
-        for row in rows
-    ]  # fmt: skip
 
 
 def _numbers(gain: float, candidate: Candidate) -> list[str]:

@@ -17,7 +17,7 @@ from trunkline.identification.results.scoring import evaluate
 from trunkline.identification.simulate.checks import check_trials
 from trunkline.model.places import marker_places
 from trunkline.pipeline.stage import output_folder, write_metrics
-from trunkline.program import program_name
+from trunkline.program import add_settings, command_parser
 from trunkline.tools.evaluate.model import written_beside
 from trunkline.tools.evaluate.report import change_lines, kind_lines, read_reference, trial_lines
 from trunkline.tools.evaluate.session import trials_of
@@ -26,11 +26,7 @@ from trunkline.twin.twin import Twin
 
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(
-        prog=program_name("evaluate"),
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = command_parser("evaluate", __doc__)
     parser.add_argument("model", type=Path, metavar="MODEL", help="MJCF of the arm")
     parser.add_argument(
         "session", type=Path, metavar="SESSION",
@@ -39,10 +35,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--cad", type=Path, metavar="MODEL", help="another MJCF to stand beside, such as the CAD model")
     parser.add_argument("--reference", type=Path, metavar="EVALUATION", help="folder or metrics.json of an earlier one")
     parser.add_argument("--out", type=Path, metavar="FOLDER", help="where to write; default: evaluation/<session>")
-    parser.add_argument(
-        "--settings", type=Path, metavar="FOLDER", default=Path("."),
-        help="whose params.yaml says how to filter logs; default: the current folder",
-    )  # fmt: skip
+    add_settings(parser)
     args = parser.parse_args(arguments)
     with threadpool_limits(1, user_api="blas"):  # as the stages: sums depend on how many cores there are
         return _run(args)

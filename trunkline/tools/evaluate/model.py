@@ -5,7 +5,7 @@ from pathlib import Path
 
 import mujoco
 
-from trunkline.identification.parameters.parameters import NAMES, SESSION_MARK
+from trunkline.identification.parameters.parameters import SESSION_MARK
 from trunkline.identification.parameters.per_session import names_in
 from trunkline.identification.results.scoring import fingerprint
 from trunkline.pipeline.config import settings_of
@@ -45,7 +45,7 @@ class Written:
 
     def namesakes(self, model: mujoco.MjModel, trials: list[Trial]) -> list[str]:
         """Sessions of `trials` of whose names `model` has numbers, though it was fitted to none of their trials."""
-        named = {name.partition(SESSION_MARK)[2] for name in names_in(model, NAMES)}
+        named = {name.partition(SESSION_MARK)[2] for name in names_in(model)}
         fitted_sessions = {trial.session for trial in trials if self.saw(trial)}
         return [session for session in sessions_of(trials) if self.fitted_to and session in named - fitted_sessions]
 

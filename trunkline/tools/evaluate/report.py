@@ -7,6 +7,7 @@ import pandas as pd
 
 from trunkline.errors import InputError
 from trunkline.identification.evaluation.error_tables import LABELS, REFERENCES, number, pair
+from trunkline.program import aligned
 
 ERRORS = ("e_internal_mm", "e_position_mm", "e_tip_mm")
 
@@ -21,7 +22,7 @@ def trial_lines(trials: pd.DataFrame, fitted: set[str]) -> list[str]:
         scores = errors["model"]
         label = f"{trial} *" if trial in fitted else trial
         rows.append([label, scores["experiment"], scores["split"], *_cells(errors, models)])
-    return _aligned(rows, 3)
+    return aligned(rows, 3)
 
 
 def kind_lines(metrics: dict) -> list[str]:
@@ -34,7 +35,7 @@ def kind_lines(metrics: dict) -> list[str]:
         repeat = repeats.get(kind, {})
         scatter = pair(repeat.get("mean_mm"), repeat.get("tip_mm"))
         rows.append([kind, str(table["trials"]), *_cells(errors, models), scatter])
-    return _aligned(rows, 1)
+    return aligned(rows, 1)
 
 
 def read_reference(path: Path) -> dict:
@@ -61,7 +62,7 @@ def change_lines(before: dict, now: dict) -> list[str]:
     old, new = (metrics["model"]["by_experiment"] for metrics in (before, now))
     for kind in sorted(old.keys() & new.keys()):
         rows.append([kind, *(_change(old[kind].get(error), new[kind].get(error)) for error in ERRORS)])
-    lines = _aligned(rows, 1)
+    lines = aligned(rows, 1)
     alone = [f"{kind} in the {where} alone" for kinds, where in ((old.keys() - new.keys(), "reference"),
              (new.keys() - old.keys(), "session")) for kind in sorted(kinds)]  # fmt: skip
     lines += [f"not compared: {', '.join(alone)}"] if alone else []
@@ -90,13 +91,3 @@ def _change(old: float | None, new: float | None) -> str:
     if old is None or new is None:
         return "–"
     return f"{number(old)} → {number(new)} mm ({round(100 * (new / old - 1)):+d} %)"
-
-
-def _aligned(rows: list[list[str]], words: int) -> list[str]:
-    """Columns of equal width: the first `words` to the left, numbers to the right."""
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    return [
-        "  ".join(cell.ljust(width) if column < words else cell.rjust(width)
-                  for column, (cell, width) in enumerate(zip(row, widths, strict=True))).rstrip()
-        for row in rows
-    ]  # fmt: skip

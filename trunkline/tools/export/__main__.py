@@ -16,7 +16,7 @@ from trunkline.errors import InputError, in_one_line, nearest
 from trunkline.files import written_whole
 from trunkline.identification.simulate.checks import check_trials
 from trunkline.model.places import marker_places
-from trunkline.program import program_name
+from trunkline.program import add_settings, command_parser
 from trunkline.recordings.trials.trial import Trial
 from trunkline.tools.evaluate.model import written_beside
 from trunkline.tools.evaluate.session import trials_of
@@ -29,17 +29,12 @@ LAYOUT = ".foxglove.json"  # ends the name of the layout's file
 
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(
-        prog=program_name("export"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = command_parser("export", __doc__)
     parser.add_argument("model", type=Path, metavar="MODEL", help="a twin: artifacts, an MJCF or a Unity package")
     parser.add_argument("session", type=Path, metavar="SESSION", help="as of `trunkline evaluate`")
     parser.add_argument("out", type=Path, metavar="OUT.mcap", help="is written; must not be there yet")
     parser.add_argument("--trial", action="append", default=[], metavar="NAME", help="this one alone; may be repeated")
-    parser.add_argument(
-        "--settings", type=Path, metavar="FOLDER", default=Path("."),
-        help="whose params.yaml says how to filter logs; default: the current folder",
-    )  # fmt: skip
+    add_settings(parser)
     args = parser.parse_args(arguments)
     if args.out.suffix != ".mcap" or args.out.exists():
         actual = "a file" if args.out.exists() else "another ending"

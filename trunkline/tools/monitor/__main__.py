@@ -14,7 +14,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from trunkline.errors import in_one_line
-from trunkline.program import program_name
+from trunkline.program import add_settings, command_parser
 from trunkline.tools.monitor.monitor import LEARN, DriftMonitor
 
 UNCHANGED, CHANGED, UNUSABLE = 0, 1, 2
@@ -22,11 +22,7 @@ ENDED = 10  # apart from what `in_one_line` returns after a mistake
 
 
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(
-        prog=program_name("monitor"),
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = command_parser("monitor", __doc__)
     parser.add_argument("model", type=Path, metavar="MODEL", help="MJCF of the arm")
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="into which sessions are dropped, or a session")
     parser.add_argument("--reference", type=Path, metavar="SESSION",
@@ -35,8 +31,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--once", action="store_true", help="look once and end")
     parser.add_argument("--every", type=float, default=10.0, metavar="SECONDS", help="between two looks; default: 10")
     parser.add_argument("--out", type=Path, metavar="FOLDER", help="where to write; default: watch/<folder>")
-    parser.add_argument("--settings", type=Path, metavar="FOLDER", default=Path("."),
-                        help="whose params.yaml says how to filter logs; default: the current folder")  # fmt: skip
+    add_settings(parser)
     args = parser.parse_args(arguments)
     ended = _run(args)
     return ended - ENDED if ended >= ENDED else UNUSABLE

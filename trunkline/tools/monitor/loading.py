@@ -1,13 +1,7 @@
 """From the logs of a session that are there to filtered trials, as the stages `ingest` and `filter` make them."""
 
-import os
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-
-from omegaconf import OmegaConf
 
 from trunkline.errors import InputError
 from trunkline.pipeline.config import settings_of
@@ -15,9 +9,8 @@ from trunkline.recordings.cleaning.described_arm import Places
 from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.cleaning.session_checks import check_session
 from trunkline.recordings.filtering.filter import filter_raw_trial
-from trunkline.recordings.session.session import Session, read_session
+from trunkline.recordings.session.session import read_session
 from trunkline.recordings.trials.trial import Trial
-from trunkline.settings import read_yaml
 
 
 @dataclass
@@ -38,39 +31,17 @@ def load_logs(session: Path, files: set[str], root: Path, arm: Places | None = N
     Raises:
         InputError: session.yaml has a mistake, or the logs cannot be of the arm.
     """
-    with _so_far(session, files) as (folder, read):
-        ingest, settings = settings_of("ingest", root), settings_of("filter", root)
-        taken = list(load_raw_trials(folder, read, ingest.limits, arm))
-        unreadable = {trial.name: str(result) for trial, result, _ in taken if isinstance(result, InputError)}
-        loaded = LoadedTrials(refused=unreadable)
-        if len(loaded.refused) < len(taken):
-            gathered = check_session(taken, read, ingest.plausible, "leave_out", f"{session}", arm)
-            loaded.refused |= gathered.refused
-            for raw, findings in zip(gathered.raw_trials, gathered.findings, strict=True):
-                raw.repairs = len(findings.repairs)
-                try:
-                    loaded.trials[raw.name] = filter_raw_trial(raw, settings)[0]
-                except InputError as error:
-                    loaded.refused[raw.name] = str(error)
-        loaded.refused = {name: reason.replace(f"{folder}", f"{session}") for name, reason in loaded.refused.items()}
+    ingest, settings, read = settings_of("ingest", root), settings_of("filter", root), read_session(session, files)
+    taken = list(load_raw_trials(session, read, ingest.limits, arm))
+    loaded = LoadedTrials(refused={t.name: str(result) for t, result, _ in taken if isinstance(result, InputError)})
+    if len(loaded.refused) == len(taken):
         return loaded
-
-
-@contextmanager
-def _so_far(session: Path, files: set[str]) -> Iterator[tuple[Path, Session]]:
-    """A folder with links to a session's logs that are there and a session.yaml of their trials alone."""
-    path = session / "session.yaml"
-    content = OmegaConf.to_container(read_yaml(path), resolve=False)
-    assert isinstance(content, dict)  # as `incoming.planned` has seen
-    content["trials"] = [trial for trial in content["trials"] if trial["file"] in files]
-    with tempfile.TemporaryDirectory(prefix="trunkline-watch-") as name:
-        folder = Path(name) / session.resolve().name
-        folder.mkdir()
-        for file in sorted(files):
-            (folder / file).parent.mkdir(exist_ok=True)
-            os.symlink((session / file).resolve(), folder / file)
-        OmegaConf.save(OmegaConf.create(content), folder / "session.yaml")
+    gathered = check_session(taken, read, ingest.plausible, "leave_out", f"{session}", arm)
+    loaded.refused |= gathered.refused
+    for raw, findings in zip(gathered.raw_trials, gathered.findings, strict=True):
+        raw.repairs = len(findings.repairs)
         try:
-            yield folder, read_session(folder)
+            loaded.trials[raw.name] = filter_raw_trial(raw, settings)[0]
         except InputError as error:
-            raise InputError(str(error).replace(f"{folder}", f"{session}")) from error
+            loaded.refused[raw.name] = str(error)
+    return loaded

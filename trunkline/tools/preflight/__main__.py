@@ -5,7 +5,6 @@ params.yaml can be identified if the fitted model is off by half a percent of ea
 and writes nothing.
 """
 
-import argparse
 import sys
 from pathlib import Path
 
@@ -17,20 +16,15 @@ from trunkline.identification.diagnostics.identifiability import (
     unidentifiable,
 )
 from trunkline.identification.fit.setup import check_parameters, unidentifiable_mass
-from trunkline.identification.parameters.per_session import (
-    make_room,
-    per_session_names,
-    unidentifiable_per_session,
-)
+from trunkline.identification.parameters.per_session import add_sessions
 from trunkline.identification.simulate.checks import check_trials
 from trunkline.identification.stages import STAGES
 from trunkline.model.arm.kinds import described_arm
 from trunkline.model.places import marker_places
 from trunkline.pipeline.config import own_or_project, settings_of
-from trunkline.program import program_name
+from trunkline.program import add_settings, command_parser
 from trunkline.recordings.trials.inventory import missing_lines, recorded_of_each
 from trunkline.recordings.trials.splits import DECIDING, IDENTIFY
-from trunkline.recordings.trials.trial import sessions_of
 from trunkline.settings import read_yaml
 from trunkline.tools.evaluate.session import read_trials_of
 from trunkline.tools.preflight.up_axis import other_ups, up_lines
@@ -38,17 +32,12 @@ from trunkline.tools.preflight.up_axis import other_ups, up_lines
 
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(
-        prog=program_name("check"),
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = command_parser("check", __doc__)
     parser.add_argument("session", type=Path, metavar="SESSION",
                         help="folder of logs and session.yaml, or of several such, or of filtered trials")  # fmt: skip
     parser.add_argument("--error", type=float, default=0.5, metavar="PERCENT",
                         help="by which the fitted model will be off, of a point's distance from the base")  # fmt: skip
-    parser.add_argument("--settings", type=Path, metavar="FOLDER", default=Path("."),
-                        help="whose params.yaml describes arm and stages; default: the current folder")  # fmt: skip
+    add_settings(parser, "describes arm and stages")
     args = parser.parse_args(arguments)
     description = settings_of("build_mjcf", args.settings)
     spec = described_arm(description, own_or_project(args.settings, "conf")).spec
@@ -65,12 +54,9 @@ def main(arguments: list[str] | None = None) -> int:
     ups = other_ups(raw_trials)
     for stage, config in configs.items():
         check_parameters(stage, config, model)
-        names = per_session_names(list(config.parameters), config.per_session, sessions_of(trials)[1:])
-        make_room(spec, names)
+        lines = add_sessions(spec, list(config.parameters), config.per_session, config.experiments, trials)
         model = spec.compile()
-        lacking = unidentifiable(config, trials) or [
-            *unidentifiable_per_session(names, trials, config.experiments), *unidentifiable_mass(config, trials),
-        ]  # fmt: skip
+        lacking = unidentifiable(config, trials) or [*lines, *unidentifiable_mass(config, trials)]
         chosen = [t for t in trials if t.experiment in config.experiments and t.split == IDENTIFY]
         print(f"{stage}, from {len(chosen)} trials:", flush=True)
         for line in lacking:

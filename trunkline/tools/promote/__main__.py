@@ -24,7 +24,7 @@ from trunkline.identification.results.scoring import evaluate
 from trunkline.identification.simulate.checks import check_trials
 from trunkline.model.places import marker_places
 from trunkline.pipeline.stage import write_json
-from trunkline.program import program_name
+from trunkline.program import add_settings, command_parser, program_name
 from trunkline.recordings.trials.splits import VALIDATE
 from trunkline.tools.evaluate.model import written_beside
 from trunkline.tools.evaluate.session import trials_of
@@ -36,16 +36,11 @@ BEFORE, DECISIONS = ".before", ".promotion.json"  # end the names of what is wri
 
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(
-        prog=program_name("promote"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = command_parser("promote", __doc__)
     parser.add_argument("old", type=Path, metavar="OLD", help="the twin in use")
     parser.add_argument("new", type=Path, metavar="NEW", help="what is to take its place; it is copied")
     parser.add_argument("sessions", type=Path, nargs=2, metavar="SESSION", help="OLD's, then NEW's")
-    parser.add_argument(
-        "--settings", type=Path, metavar="FOLDER", default=Path("."),
-        help="whose params.yaml says how to filter logs; default: the current folder",
-    )  # fmt: skip
+    add_settings(parser)
     args = parser.parse_args(arguments)
     paths = (args.old, args.new)
     kinds = ["a folder" if path.is_dir() else path.suffix if path.is_file() else "nothing" for path in paths]

@@ -6,7 +6,6 @@ arms or sessions, it is what differs between them, about their mean; the model i
 beside it has the fields of so many drawn models, for programs that know nothing of Trunkline.
 """
 
-import argparse
 import io
 import json
 import sys
@@ -20,7 +19,7 @@ import numpy as np
 from trunkline.errors import InputError, in_one_line
 from trunkline.files import written_whole
 from trunkline.identification.parameters.parameters import parameter_named
-from trunkline.program import program_name
+from trunkline.program import command_parser
 from trunkline.tools.randomize.fields import changed_fields, check_model, drawn_fields
 from trunkline.tools.randomize.file import to_table
 from trunkline.tools.randomize.population import of_population
@@ -29,11 +28,7 @@ from trunkline.twin.twin import Twin
 
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(
-        prog=program_name("randomize"),
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = command_parser("randomize", __doc__)
     parser.add_argument("artifacts", type=Path, nargs="*", metavar="ARTIFACTS", default=[Path("artifacts")])
     parser.add_argument("--out", type=Path, metavar="JSON", default=Path("randomisation.json"))
     parser.add_argument("--widen", type=float, metavar="FACTOR", default=1.0,

@@ -47,12 +47,11 @@ def check_model(twin: Twin) -> None:
     Raises:
         InputError: naming the first such parameter, or one that the model has not.
     """
-    where, tables = twin.provenance.model, twin.provenance.tables.values()
+    where = twin.provenance.model
     if not twin.posterior.names:
         raise InputError(f"{where}: found no parameters.json beside it, expected the artifacts of identification")
-    stated = {name: row["value"] for table in tables for name, row in table["parameters"].items()}
-    for name, expected in stated.items():
-        parameter = parameter_named(name)
+    for name in twin.posterior.names:
+        parameter, expected = parameter_named(name), twin.posterior.value(name)
         if not parameter.belongs_to(twin.arm.model):
             problem = "found an arm without its part, expected the model that was identified"
             raise InputError(f"{where}: {name}: {problem}")

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from trunkline.errors import InputError
-from trunkline.identification.parameters.parameters import NAMES, parameter_named
+from trunkline.identification.parameters.parameters import parameter_name, parameter_named
 from trunkline.tools.randomize.fields import OWN
 from trunkline.twin.posterior import Posterior
 
@@ -60,9 +60,7 @@ def read_randomization(path: Path) -> tuple[Posterior, dict[str, str]]:
             raise InputError(f"{path}: format: found {table['format']!r}, expected {FORMAT!r}")
         rows = table["parameters"]
         names = [name for group in table["groups"].values() for name in group["parameters"]]
-        if unknown := [name for name in names if name not in NAMES]:
-            raise InputError(f"{path}: parameters: found {unknown[0]!r}, expected one that can be identified")
-        units = np.array([parameter_named(name).scale for name in names])
+        units = np.array([parameter_named(parameter_name(name)).scale for name in names])
         matrix, degrees = np.zeros((len(names), len(names))), np.zeros(len(names))
         for group in table["groups"].values():
             members = [names.index(name) for name in group["parameters"]]
@@ -76,5 +74,7 @@ def read_randomization(path: Path) -> tuple[Posterior, dict[str, str]]:
         return Posterior(names, stages, estimate, deviation, degrees, correlation, low, high), table["model"]
     except OSError as error:
         raise InputError(f"{path}: {(error.strerror or str(error)).lower()}, expected a randomisation.json") from error
-    except (ValueError, KeyError, TypeError) as error:
+    except ValueError as error:
+        raise InputError(f"{path}: {error}, in place of what `trunkline randomize` writes") from error
+    except (KeyError, TypeError) as error:
         raise InputError(f"{path}: {error!r}, expected what `trunkline randomize` writes") from error

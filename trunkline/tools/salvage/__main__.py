@@ -5,7 +5,6 @@ along. What was lost is said, a line each, and the exit code is then 1. The stag
 same rules; this is for other programs, which give up at the first damaged record.
 """
 
-import argparse
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,7 +15,7 @@ from mcap.writer import Writer
 
 from trunkline.errors import InputError, in_one_line
 from trunkline.files import written_whole
-from trunkline.program import COMMAND, program_name
+from trunkline.program import COMMAND, command_parser
 from trunkline.recordings.logs.mcap_log import read_contents
 from trunkline.recordings.logs.records import Contents, stream_of
 
@@ -75,9 +74,7 @@ def write_whole(path: Path, contents: WholeRecords) -> None:
 
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(
-        prog=program_name("salvage"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = command_parser("salvage", __doc__)
     parser.add_argument("damaged", type=Path, metavar="DAMAGED.mcap")
     parser.add_argument("whole", type=Path, metavar="WHOLE.mcap", help="is written; must not be there yet")
     chosen = parser.parse_args(arguments)

@@ -1,6 +1,6 @@
 """The wire's table for others: a module of the client, and the tables of docs/live-sessions.md.
 
-    python -m trunkline.ar.session.binary_table [CHECKOUT]
+    python -m upkeep.wire_table [CHECKOUT]
 
 writes `client/src/wire_table.js` and the generated blocks of `docs/live-sessions.md` of a checkout, by default this
 one.
@@ -17,7 +17,7 @@ from trunkline.ar.session.binary import BinaryMessage
 from trunkline.errors import InputError, in_one_line
 
 MODULE, PAGE = Path("client/src/wire_table.js"), Path("docs/live-sessions.md")
-COMMAND = "python -m trunkline.ar.session.binary_table"
+COMMAND = "python -m upkeep.wire_table"
 
 
 def table() -> dict:
@@ -120,7 +120,7 @@ def _choice(kind: object) -> str:
 
 @in_one_line
 def main(arguments: list[str]) -> int:
-    root = Path(arguments[0]) if arguments else Path(__file__).parents[3]
+    root = Path(arguments[0]) if arguments else Path(__file__).parents[1]
     page = root / PAGE
     if not page.is_file():
         raise InputError(f"{page}: no such file, expected a checkout of Trunkline")
