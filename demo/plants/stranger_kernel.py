@@ -92,7 +92,7 @@ class LinkState(NamedTuple):
     winches: np.ndarray
 
 
-class StepBuffers(NamedTuple):
+class Work(NamedTuple):
     """What a step computes on its way; allocated once. Spatial vectors first angular, then linear, at the origin."""
 
     frames: np.ndarray  # (M, 3, 3), columns: a link's axes
@@ -116,7 +116,7 @@ class StepBuffers(NamedTuple):
 @njit(cache=True, nogil=True, error_model="numpy")
 def work_for(links, tendons):
     m, u = len(links.lengths), len(links.hole_link)
-    return StepBuffers(
+    return Work(
         np.zeros((m, 3, 3)), np.zeros((m + 1, 3)), np.zeros((m, 2, 6)), np.zeros((m, 6)), np.zeros((m, 6)),
         np.zeros((m, 6)), np.zeros((m, 2)), np.zeros((m, 3)), np.zeros((m, 2, 6)), np.zeros((m, 3)), np.zeros((m, 2)),
         np.zeros((u + 1, 3)), np.zeros((u + 1, 3)), np.zeros((u, 3)), np.zeros(u), np.zeros(tendons),
