@@ -1,1 +1,1 @@
-"""The edge: settings, files, the lock, the gate, the README."""
+"""The edge: settings and files of the stages, and the identifying stages."""

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from trunkline.ar.teleop.headset_silence import silence_fault
+from trunkline.ar.teleop.client_silence import silence_reason
 from trunkline.ar.teleop.input_validation import clock_fault, fault_of, setting_fault, swapped
 from trunkline.ar.teleop.messages import Controller, Pose
 from trunkline.ar.teleop.tracked_controller import Hand
@@ -83,7 +83,7 @@ def test_time_goes_on_in_finite_steps(last, stamp, dt, fault):
     ],
 )
 def test_a_client_is_silent_by_its_stamps_or_by_what_does_not_come(last, stamp, silent, fault):
-    assert silence_fault(last, stamp, silent, SimpleNamespace(silence=0.25)) == fault
+    assert silence_reason(last, stamp, silent, SimpleNamespace(silence=0.25)) == fault
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,8 @@ import math
 from dataclasses import dataclass, replace
 
 from trunkline.ar.teleop.alignment import Aligned, wrist_of
+from trunkline.ar.teleop.client_silence import silence_reason
 from trunkline.ar.teleop.events import Ends, detect_events, looked_back, stopped_by
-from trunkline.ar.teleop.headset_silence import silence_fault
 from trunkline.ar.teleop.input_validation import clock_fault, fault_of, setting_fault, swapped
 from trunkline.ar.teleop.messages import Input, Intent, Motion, Pose, Request, Targets
 from trunkline.ar.teleop.reach import Reach
@@ -75,7 +75,7 @@ class Teleoperation:
         same = message.stamp == state.stamp
         silent = state.silent + dt if same and math.isfinite(dt) else 0.0
         fault = clock_fault(state.stamp, message, dt)
-        quiet = "" if fault else silence_fault(state.stamp, message.stamp, silent, self.settings.safety)
+        quiet = "" if fault else silence_reason(state.stamp, message.stamp, silent, self.settings.safety)
         if fault or quiet:
             left, right = (missed(hand, math.inf, 0.0) for hand in state.hands)
             stamp = message.stamp if math.isfinite(message.stamp) else state.stamp  # from which time counts anew

@@ -90,7 +90,7 @@ def limits_of(conditions: Conditions, loads: list[float]) -> list[str]:
 
 
 def certainty_words(name: str, row: dict) -> str:
-    """How well a parameter of `parameters.json` is told, in the words of `trunkline.tools.preflight`."""
+    """How well a parameter of `parameters.json` is told, in the words of `trunkline.tools.check`."""
     axis = parameter_named(name).coordinate
     low, high = axis(row["interval_95_given_model"])
     searched = np.diff(axis(row["range"]))[0]

@@ -27,8 +27,8 @@ from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.recordings.trials.inventory import missing_lines, recorded_lines
 from trunkline.recordings.trials.raw_trial import RawTrial
 from trunkline.recordings.trials.trial import Trial, write_trials
-from trunkline.tools.preflight.__main__ import main
-from trunkline.tools.preflight.up_axis import other_ups, up_lines
+from trunkline.tools.check.__main__ import main
+from trunkline.tools.check.up_axis import other_ups, up_lines
 
 
 @pytest.fixture(scope="module")
@@ -263,7 +263,7 @@ def test_of_several_sessions_each_is_told_and_what_it_has_for_itself(model, tmp_
             for session in ("monday", "friday") for trial in rested]  # fmt: skip
     write_trials(tmp_path, days)
     monkeypatch.setattr(
-        "trunkline.tools.preflight.__main__.described_arm", lambda *_: SimpleNamespace(spec=small_spec(4))
+        "trunkline.tools.check.__main__.described_arm", lambda *_: SimpleNamespace(spec=small_spec(4))
     )
     assert main(["."]) == 0
     output = capsys.readouterr().out

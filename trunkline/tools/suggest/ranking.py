@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trunkline.tools.design.candidates import Candidate
-from trunkline.tools.design.information import StageInformation
+from trunkline.tools.suggest.candidates import Candidate
+from trunkline.tools.suggest.information import StageInformation
 
 
 @dataclass

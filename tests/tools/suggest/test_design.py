@@ -21,13 +21,13 @@ from trunkline.model.arm.joints import Joints, add_elements
 from trunkline.pipeline.config import load_folder
 from trunkline.recordings.session.session import read_session
 from trunkline.report.certificate.arms import arm_of
-from trunkline.tools.design.__main__ import DESCRIBED, main, twin, with_room
-from trunkline.tools.design.candidates import candidates
-from trunkline.tools.design.goals import GOALS, tip_moves, weights_for, workspace
-from trunkline.tools.design.information import StageInformation, information, shares_of, stage_information
-from trunkline.tools.design.ranking import after_each, expected_loss, suggest
-from trunkline.tools.design.settings import Recordable
-from trunkline.tools.design.words import entry_lines, why_words
+from trunkline.tools.suggest.__main__ import DESCRIBED, main, twin, with_room
+from trunkline.tools.suggest.candidates import candidates
+from trunkline.tools.suggest.goals import GOALS, tip_moves, weights_for, workspace
+from trunkline.tools.suggest.information import StageInformation, information, shares_of, stage_information
+from trunkline.tools.suggest.ranking import after_each, expected_loss, suggest
+from trunkline.tools.suggest.settings import Recordable
+from trunkline.tools.suggest.words import entry_lines, why_words
 
 SHARE, FRAMES = 0.005, 60
 ELASTIC = {"stiffness": (0.1, 20.0), "rest_bend_y": (-0.1, 0.1)}

@@ -26,8 +26,8 @@ from trunkline.program import add_settings, command_parser
 from trunkline.recordings.trials.inventory import missing_lines, recorded_of_each
 from trunkline.recordings.trials.splits import DECIDING, IDENTIFY
 from trunkline.settings import read_yaml
+from trunkline.tools.check.up_axis import other_ups, up_lines
 from trunkline.tools.evaluate.session import read_trials_of
-from trunkline.tools.preflight.up_axis import other_ups, up_lines
 
 
 @in_one_line

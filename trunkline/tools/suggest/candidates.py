@@ -11,7 +11,7 @@ from trunkline.identification.simulate.experiment import SLACK
 from trunkline.kinematics.dataset.sampling import around_the_arm
 from trunkline.model.arm_model import ArmModel
 from trunkline.model.statics.chain import read_chain
-from trunkline.tools.design.settings import Recordable
+from trunkline.tools.suggest.settings import Recordable
 
 UPRIGHT = np.array([0.0, 0.0, -STANDARD_GRAVITY])
 CURL_ENDS = (0.1, 0.7, 1.2, 1.8)  # s, of the ramp to the pull and of that back

@@ -12,7 +12,7 @@ from trunkline.identification.simulate.pose_fit import PoseFit
 from trunkline.model.arm_model import ArmModel
 from trunkline.recordings.trials.experiments import is_static
 from trunkline.recordings.trials.splits import IDENTIFY
-from trunkline.tools.design.candidates import Candidate
+from trunkline.tools.suggest.candidates import Candidate
 
 MOST_OF_RANGE = 0.95  # of a joint's range, up to which a hand bends it
 

@@ -27,12 +27,13 @@ from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.recordings.trials.splits import IDENTIFY
 from trunkline.recordings.trials.trial import Trial, sessions_of
 from trunkline.settings import read_yaml
-from trunkline.tools.design.candidates import Candidate, candidates
-from trunkline.tools.design.goals import GOALS, Goal, weights_for
-from trunkline.tools.design.information import FRAMES, StageInformation, stage_information
-from trunkline.tools.design.ranking import Suggestion, after_each, expected_loss, suggest
-from trunkline.tools.design.settings import Recordable
-from trunkline.tools.design.words import (
+from trunkline.tools.evaluate.session import trials_of
+from trunkline.tools.suggest.candidates import Candidate, candidates
+from trunkline.tools.suggest.goals import GOALS, Goal, weights_for
+from trunkline.tools.suggest.information import FRAMES, StageInformation, stage_information
+from trunkline.tools.suggest.ranking import Suggestion, after_each, expected_loss, suggest
+from trunkline.tools.suggest.settings import Recordable
+from trunkline.tools.suggest.words import (
     TITLES,
     entry_lines,
     kind_lines,
@@ -41,7 +42,6 @@ from trunkline.tools.design.words import (
     why_words,
     widest_words,
 )
-from trunkline.tools.evaluate.session import trials_of
 from trunkline.twin.twin import Twin
 
 DESCRIBED = "as described in params.yaml, as no stage has identified one yet: suggestions are only as good as it is"

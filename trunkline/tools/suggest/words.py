@@ -8,10 +8,10 @@ from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.program import aligned
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.recordings.trials.splits import IDENTIFY
-from trunkline.tools.design.candidates import Candidate
-from trunkline.tools.design.goals import Goal
-from trunkline.tools.design.information import StageInformation
-from trunkline.tools.design.ranking import Suggestion
+from trunkline.tools.suggest.candidates import Candidate
+from trunkline.tools.suggest.goals import Goal
+from trunkline.tools.suggest.information import StageInformation
+from trunkline.tools.suggest.ranking import Suggestion
 
 LEAST = 0.15  # of what a trial gains, from which on the parameter by which it does is named
 NAMED = 3  # parameters that are named, at most

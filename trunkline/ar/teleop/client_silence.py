@@ -1,4 +1,4 @@
-"""The reason that a silent headset gives to hold: no new stamp of its clock has come for `Safety.silence` s.
+"""The reason to hold that a silent client, such as a headset, gives: no new stamp of its clock for `Safety.silence` s.
 
 It only words the reason. In a mode in which something moves, the core then holds (`core.py`), and the session
 controller stops the robot (`ar/session/controller.py`). Behind it, each with a timeout of its own: control passes from
@@ -9,7 +9,7 @@ a client that is silent (`ar/session/lease.py`), the robot's process brakes with
 from trunkline.ar.teleop.settings import Safety
 
 
-def silence_fault(last: float | None, stamp: float, silent: float, safety: Safety) -> str:
+def silence_reason(last: float | None, stamp: float, silent: float, safety: Safety) -> str:
     """Why the client counts as silent, "" where it does not; `silent` s is how long no new stamp has come."""
     gap = silent if last is None else max(silent, stamp - last)
     return f"client silent for {gap:.2f} s; holding" if gap > safety.silence else ""

@@ -28,9 +28,9 @@ from trunkline.recordings.trials.splits import IDENTIFY
 from trunkline.recordings.trials.trial import Trial
 from trunkline.report.certificate.arms import arm_of
 from trunkline.report.certificate.poses import StaticPoses
-from trunkline.tools.design.candidates import Candidate
-from trunkline.tools.design.settings import Recordable
-from trunkline.tools.design.simulated import simulated
+from trunkline.tools.suggest.candidates import Candidate
+from trunkline.tools.suggest.settings import Recordable
+from trunkline.tools.suggest.simulated import simulated
 
 PRIOR = 3.0  # information of "somewhere within its range": the variance of an even distribution over ±1 is 1/3
 FRAMES = 120  # of a moving trial that are looked at, recorded or not

@@ -14,8 +14,8 @@ from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.recordings.trials.conditions import Conditions
 from trunkline.report.certificate.arms import arm_of, arms_with
 from trunkline.report.certificate.poses import StaticPoses, draw_poses
-from trunkline.tools.design.information import StageInformation
-from trunkline.tools.design.settings import Recordable
+from trunkline.tools.suggest.information import StageInformation
+from trunkline.tools.suggest.settings import Recordable
 
 Goal = Literal["intervals", "tip", "grasp"]
 GOALS: tuple[Goal, ...] = ("intervals", "tip", "grasp")
