@@ -17,7 +17,7 @@ from trunkline.identification.fit.fit import Fit
 from trunkline.identification.fit.identify import Identification, identify, with_parameters
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.settings import IdentificationSettings
-from trunkline.identification.fit.setup import check_stage, set_up
+from trunkline.identification.fit.setup import check_parameters, set_up, with_every, with_sessions
 from trunkline.identification.parameters.parameters import MASS
 from trunkline.identification.parameters.per_session import make_room, names_in
 from trunkline.identification.parameters.saving import save_model
@@ -86,8 +86,11 @@ def load(stage: str, config: IdentificationSettings, model_path: Path) -> FitInp
     """
     print(f"{stage}: reading the model and the trials", flush=True)
     spec = read_spec(model_path)
+    model = spec.compile()
+    config = with_every(config, model)
+    check_parameters(stage, config, model)  # first: an arm without a part lacks the trials of it too
     reported, every = read_reported(config), read_trials(TRIALS, DECIDING)
-    config, model = check_stage(stage, config, spec, every)
+    model = with_sessions(stage, config, spec, every)
     # of an arm with tendons also the trials of later stages: a wrong name is an error now, not after minutes
     check_trials(every if model.nu else reported, model)
     model, experiments, settings = set_up(config, reported, model)

@@ -21,22 +21,18 @@ from trunkline.recordings.trials.trial import Trial, sessions_of
 EVERY_ANGLE = f"tendon_angle{EVERY}"
 
 
-def check_stage(
+def with_sessions(
     stage: str, config: IdentificationSettings, spec: mujoco.MjSpec, trials: list[Trial]
-) -> tuple[IdentificationSettings, mujoco.MjModel]:
-    """The settings of a stage as `with_every` has them, and the model with room for what each session of `trials` has
-    for itself.
+) -> mujoco.MjModel:
+    """The model with room for what each session of `trials` has for itself, which `spec` gets too.
 
     Raises:
-        InputError: a parameter is of what the arm has not got, or the trials do not determine it.
+        InputError: the trials do not determine a parameter.
     """
-    model = spec.compile()
-    config = with_every(config, model)
-    check_parameters(stage, config, model)
     lines = add_sessions(spec, list(config.parameters), config.per_session, config.experiments, trials)
     for line in lines + unidentifiable_mass(config, trials):
         raise InputError(f"{stage}.{line}")
-    return config, spec.compile()
+    return spec.compile()
 
 
 def set_up(
