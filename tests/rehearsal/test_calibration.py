@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rehearsal.experiments.calibration import base_brier, brier, draw_reliability, reliability, stated
+from rehearsal.experiments.calibration import base_brier, brier, stated
 from rehearsal.experiments.result import Result
 
 
@@ -22,13 +22,10 @@ def test_the_base_rate_is_the_best_constant():
     assert brier(outcome, outcome) == 0.0
 
 
-def test_true_probabilities_lie_on_the_diagonal_and_beat_the_base_rate():
+def test_true_probabilities_beat_the_base_rate():
     rng = np.random.default_rng(0)
     probability = rng.uniform(size=20_000)
     outcome = (rng.uniform(size=20_000) < probability).astype(float)
-    for row in reliability(probability, outcome):
-        assert row.share == pytest.approx(row.stated, abs=0.02)
-        assert row.interval[0] < row.share < row.interval[1]
     assert brier(probability, outcome) < base_brier(outcome)
     assert brier(1 - probability, outcome) > base_brier(outcome)
 
@@ -37,9 +34,3 @@ def test_runs_without_a_preview_do_not_count():
     results = [*runs(0.9, 9, 1), Result("grasp", 99, False)]
     probability, outcome = stated(results)
     assert len(outcome) == 10
-    assert [row.runs for row in reliability(probability, outcome)] == [10]
-
-
-def test_the_picture_is_drawn(tmp_path):
-    draw_reliability([*runs(0.9, 9, 1), *runs(0.3, 1, 3)], tmp_path / "reliability.png")
-    assert (tmp_path / "reliability.png").stat().st_size > 1000
