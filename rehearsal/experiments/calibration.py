@@ -10,6 +10,7 @@ import numpy as np
 
 from rehearsal.experiments.result import Result
 
+
 def stated(results: list[Result]) -> tuple[np.ndarray, np.ndarray]:
     """Probabilities and outcomes of the runs that have one. Shape (n,) each."""
     probable = [result for result in results if np.isfinite(result.probability)]
