@@ -70,7 +70,7 @@ PATIENCE = 5.0  # s for which a client may be silent
 CENTRE, REACH = (0.0, 0.0, 0.333), 0.85  # m, of the ball in which the mount can be
 AROUND, ALONG = 32, 10
 CERTIFICATE = b"""<!doctype html><title>Certificate</title><style>p { color: green }</style><p>of the twin</p>
-<script type="module">document.title = "Replay"; fetch("/").catch(() => document.title = "Replay, no requests");</script>"""
+<script type="module">fetch("/").catch(() => document.title = "Replay, no requests");</script>"""
 TABLE = Obstacle("the table", (0.35, -0.5, -0.05), (0.95, 0.5, -0.02))
 CUP = WorldObject("the cup", "cylinder", 0.05, 0.12, 0.1, (0.65, 0.3, 0.04), support="standing")
 

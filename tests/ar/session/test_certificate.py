@@ -21,7 +21,7 @@ OF_ANOTHER = f"<code>{hashlib.sha256(b'another').hexdigest()}</code>".encode()
 
 
 @pytest.mark.parametrize(
-    "beside, in_artifacts, expected",
+    ("beside", "in_artifacts", "expected"),
     [
         (None, None, b""),
         (None, OF_THIS, OF_THIS),

@@ -70,7 +70,7 @@ class Routes:
         return web.Response(body=self._page[name], content_type=TYPES[Path(name).suffix], charset="utf-8")
 
     async def _get_certificate(self, request: web.Request) -> web.Response:
-        if not self._certificate or not same(request.match_info["secret"], self._secret):
+        if not same(request.match_info["secret"], self._secret):
             raise web.HTTPNotFound
         headers = certified.HEADERS
         return web.Response(body=self._certificate, content_type="text/html", charset="utf-8", headers=headers)
