@@ -20,7 +20,7 @@ const ARROWS = { ArrowLeft: [-1, 0, 0], ArrowRight: [1, 0, 0], ArrowUp: [0, 1, 0
 
 export class DesktopHands {
   /**
-   * `acts`: what else keys do: `stop`, `reach`, `trigger`; `held(on)` is told of the dead man's key, `pressed(code)` of
+   * `acts`: what else keys do: `stop`, `reach`; `held(on)` is told of the dead man's key, `pressed(code)` of
    * each key. Positions are in the base frame, z up.
    */
   constructor(canvas, camera, orbit, base, marks, handles, rigidHand, acts) {
@@ -154,7 +154,7 @@ export class DesktopHands {
     if (code in ARROWS && !(event.target instanceof HTMLInputElement)) return this.arrow(event);
     if (event.repeat) return;
     if (code === "Digit1" || code === "Digit2") this.chosen = code === "Digit1" ? this.rigid : 1 - this.rigid;
-    else if (code === "Enter" && !isButton) this.acts.trigger();
+    else if (code === "Enter" && !isButton) this.press("trigger");
     else if (code === "KeyR") this.accept();
     else if (code === "KeyF") this.press("stick_pressed");
     else if (code === "KeyH") this.acts.reach();

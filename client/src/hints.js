@@ -8,6 +8,7 @@ const BY_KEYS = [
   [/grips let go/g, "G was let go"],
   [/hold a grip to set each/g, "drag each marker, or move it by arrows"],
   [/hold a grip to follow/g, "hold G, and press F meanwhile"],
+  [/Pull the trigger again/g, "Press Enter again"],
   [/\brigid target/g, "the mount’s target"],
   [/\btip target/g, "the tip’s target"],
 ];
@@ -96,7 +97,7 @@ const DOUBTFUL = 0.75; // share of futures in which a grasp must hold, else conf
 export const isDoubtful = (told) => (told?.probability ?? 1) < DOUBTFUL;
 
 /** What is asked when a doubtful grasp is confirmed for the first time. */
-export const askedTwice = (told) => `The grasp is foreseen to hold in only ${Math.round(100 * told.probability)} % of cases. Press Enter again to confirm it all the same, or move a target.`;
+export const askedTwice = (told) => `Foreseen to hold in only ${Math.round(100 * told.probability)} % of cases. Pull the trigger again to confirm it all the same.`;
 
 /** What a motion that has arrived has brought about, by the `phases` of its plan and what is believed of the `things`. */
 export function success(phases, things) {

@@ -4,6 +4,7 @@ import { ACESFilmicToneMapping, Color, PerspectiveCamera, Quaternion, SRGBColorS
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import styles from "./page.css";
 import { BACK } from "./colours.js";
+import { Confirming } from "./confirming.js";
 import { DesktopHands } from "./desktop.js";
 import { Handles } from "./handles.js";
 import { askedTwice, isDoubtful, lasts, ofDevice, success, whyLost, whyNothing } from "./hints.js";
@@ -58,13 +59,13 @@ class Page {
     this.desktop = new DesktopHands(this.renderer.domElement, this.camera, this.orbit, this.drawn.base, this.marks, this.handles, RIGID_HAND, {
       stop: () => this.wire.stop(),
       reach: () => this.chooseReach(),
-      trigger: () => this.trigger(),
       held: (on) => find("grip").setAttribute("aria-pressed", String(on)),
       pressed: (code) => this.explain(code),
     });
+    this.confirming = new Confirming((told) => this.warn(askedTwice(told), () => this.state?.mode !== "ready", Infinity));
     this.immersive = new Immersive(this.renderer, (type, fields) => this.wire?.say(type, fields), () => this.leftHeadset());
     Object.assign(this, { state: null, lease: null, reason: null, frame: null, playback: null, told: null, recording: null });
-    Object.assign(this, { lost: "", arrived: null, asked: "", inputAt: null, worst: { gap: 0, at: -Infinity }, hiddenAt: -Infinity });
+    Object.assign(this, { lost: "", arrived: null, inputAt: null, worst: { gap: 0, at: -Infinity }, hiddenAt: -Infinity });
     this.reaches = { rigid: null, tip: null };
     this.ready = Promise.resolve(); // when the scene is there, whose sizes a preview needs
     this.connect();
@@ -140,13 +141,17 @@ class Page {
     find("pairing").hidden = true;
     this.reason = null;
     if (this.immersive.session) this.ask();
-    if (this.loaded !== digest) this.ready = this.load(digest, token);
+    if (this.loaded !== digest || this.token !== token) this.ready = this.load(digest, token);
+    this.token = token;
   }
 
   async load(digest, token) {
     const answer = await fetch("scene.json", { headers: { Authorization: `Bearer ${token}` } });
     if (!answer.ok) return this.warn(`The scene was refused: ${answer.status}.`);
-    this.drawn.load(await answer.json());
+    const { certificate, ...scene } = await answer.json();
+    this.drawn.load(scene);
+    find("certificate").hidden = !certificate;
+    find("certificate").href = certificate ?? "";
     this.drawn.everythingOnce(() => this.renderer.render(this.drawn.scene, this.camera));
     this.loaded = digest;
   }
@@ -174,15 +179,6 @@ class Page {
     const now = { up: Boolean(wire?.up), controls: Boolean(wire?.controls), holder: lease?.holder ?? "", mode: state?.mode, gripped: this.desktop.dead, offers };
     const why = whyNothing(code, now), { mode } = now;
     if (why) this.warn(why, () => this.state?.mode !== mode || (Boolean(this.wire?.controls) !== now.controls) || this.desktop.dead !== now.gripped);
-  }
-
-  /** Asks for a plan or confirms it; a doubtful one is confirmed by the second time alone. */
-  trigger() {
-    if (this.state?.mode === "ready" && this.desktop.dead && isDoubtful(this.told) && this.asked !== this.digest) {
-      this.asked = this.digest;
-      return this.warn(askedTwice(this.told), () => this.state?.mode !== "ready", Infinity);
-    }
-    this.desktop.press("trigger");
   }
 
   chooseReach() {
@@ -252,7 +248,7 @@ class Page {
     find("stop").addEventListener("click", () => this.wire?.stop());
     tapped("plan", () => {
       this.explain("Enter");
-      this.trigger();
+      this.desktop.press("trigger");
       find("view").focus();
     });
     tapped("go", () => this.desktop.accept());
@@ -425,7 +421,7 @@ class Page {
     if (!immersed && !document.hidden) this.quality.input(gap, now);
     this.inputAt = now;
     const visible = immersed ? this.immersive.visible : !document.hidden;
-    this.wire.input(hands, visible, now);
+    this.wire.input(this.confirming.heard(hands, this.state?.mode, this.told), visible, now);
   }
 
   play(dt) {

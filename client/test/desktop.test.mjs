@@ -266,6 +266,16 @@ test("the tip's marker that is dragged onto a thing marks it, and a handle moves
   assert.ok(after[2] - before[2] > 0.02, `rose by ${after[2] - before[2]} m`);
 });
 
+test("the twin's certificate is linked, and opens as a page that runs its own script and reaches nothing", async (t) => {
+  const { page, wrongs } = await open(t, browser, server, { drawn: false });
+  await loaded(page);
+  const [certificate] = await Promise.all([page.waitForEvent("popup"), page.click("#certificate")]);
+  await until(certificate, () => document.title === "Replay, no requests", null, "the certificate's script");
+  const { origin, opener, colour } = await certificate.evaluate(() => ({ origin: globalThis.origin, opener: globalThis.opener, colour: getComputedStyle(document.querySelector("p")).color }));
+  assert.deepEqual([origin, opener, colour], ["null", null, "rgb(0, 128, 0)"]);
+  assert.deepEqual(wrongs, []);
+});
+
 test("a doubtful grasp looks so, and its first confirmation only asks again", async (t) => {
   const server = await anew(t);
   await server.tell("doubtful");

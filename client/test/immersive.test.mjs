@@ -75,6 +75,27 @@ test("a cycle with two controllers: aim, plan, preview, confirm, execute, done",
   await set(page, "left", "squeeze", 0);
 });
 
+test("a doubtful grasp is confirmed by the second pull of the trigger alone", async (t) => {
+  await server.tell("doubtful");
+  t.after(() => server.tell("sure"));
+  const { page } = await aligned(t);
+  await aim(page);
+  for (const side of ["left", "right"]) await set(page, side, "squeeze", 0);
+  await frames(page);
+  await press(page, "right", "trigger");
+  await inMode(page, "ready");
+  await set(page, "left", "squeeze", 1);
+  await frames(page);
+  await press(page, "right", "trigger");
+  await until(page, () => /only 40 % of cases. Pull the trigger again/.test(globalThis.trunkline.warning?.text));
+  await frames(page, 5);
+  await picture(page, "9-headset-doubtful");
+  assert.equal(await page.evaluate(() => globalThis.trunkline.state.mode), "ready");
+  await press(page, "right", "trigger");
+  await passed(page, server, ["ready", "delay", "execute", "aim"]);
+  await set(page, "left", "squeeze", 0);
+});
+
 test("the hand that moves to the edge of reach feels a tick, once", async (t) => {
   const { page } = await aligned(t);
   await page.evaluate(() => {

@@ -11,6 +11,7 @@ import { axisOf, onAxis, thingAt } from "../src/handles.js";
 import { askedTwice, isDoubtful, lasts, ofDevice, success, whyLost, whyNothing } from "../src/hints.js";
 import { LEVELS, Quality } from "../src/quality.js";
 import { matrixOf } from "../src/geoms.js";
+import { Confirming } from "../src/confirming.js";
 import { freeArea } from "../src/views.js";
 import { foreseenWords, remedy, words } from "../src/panel.js";
 
@@ -196,7 +197,36 @@ test("why control was lost is what happened here of late", () => {
 test("a grasp that is likely to fail looks so and is asked of twice, one that is likely to hold is not", () => {
   assert.ok(isDoubtful({ probability: 0.4 }) && !isDoubtful({ probability: 0.84 }) && !isDoubtful({ probability: null }) && !isDoubtful(null));
   assert.match(foreseenWords({ ...FORESEEN, probability: 0.4, low: 0.2, high: 0.6, unknown: "x" }), /^Grasp holds in only 40 %/);
-  assert.match(askedTwice({ probability: 0.4 }), /only 40 % of cases. Press Enter again/);
+  const question = askedTwice({ probability: 0.4 });
+  assert.match(question, /only 40 % of cases. Pull the trigger again/);
+  assert.match(ofDevice(question, "keys"), /only 40 % of cases. Press Enter again/);
+  assert.match(ofDevice(question, "touch"), /only 40 % of cases. tap “Confirm” again/);
+});
+
+/** What a server hears of the right trigger, and how often the user was asked, at each of `steps`: [mode, what is foreseen, trigger, grip]. */
+function heardOf(...steps) {
+  let asked = 0;
+  const confirming = new Confirming(() => (asked += 1));
+  return steps.map(([mode, told, trigger, grip = true]) => {
+    const hands = { left: { ...noHand(), grip }, right: { ...noHand(), trigger } };
+    return `${confirming.heard(hands, mode, told).right.trigger ? "heard" : "not"} ${asked}`;
+  });
+}
+
+test("a press that would confirm a doubtful grasp only asks, however long it lasts; the next one confirms, of this plan alone", () => {
+  const bad = { digest: "a", probability: 0.4 }, worse = { digest: "b", probability: 0.3 }, good = { digest: "c", probability: 0.9 };
+  const [up, down] = [false, true];
+  assert.deepEqual(heardOf(["ready", bad, up], ["ready", bad, down], ["ready", bad, down], ["ready", bad, up], ["ready", bad, down]),
+    ["not 0", "not 1", "not 1", "not 1", "heard 1"]);
+  assert.deepEqual(heardOf(["ready", bad, down], ["ready", bad, up], ["ready", worse, down]), ["not 1", "not 1", "not 2"]);
+  assert.deepEqual(heardOf(["ready", good, down], ["ready", { digest: "d", probability: null }, down]), ["heard 0", "heard 0"]);
+  assert.deepEqual(heardOf(["ready", bad, down, false]), ["heard 0"]); // the server says that a grip is missing
+  assert.deepEqual(heardOf(["aim", null, down], ["plan", null, down], ["ready", bad, down]), ["heard 0", "heard 0", "heard 0"]); // it asks for a plan, and is no fresh press
+});
+
+test("a press that begins before a preview's end confirms nothing that was not read", () => {
+  const good = { digest: "c", probability: 0.9 };
+  assert.deepEqual(heardOf(["preview", null, true], ["ready", good, true], ["ready", good, false], ["ready", good, true]), ["not 0", "not 0", "not 0", "heard 0"]);
 });
 
 test("what was done is said: lifted, put down, arrived", () => {

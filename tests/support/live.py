@@ -118,7 +118,9 @@ def patient(**seconds):
 class Laid:
     """A server, its parts, and its log."""
 
-    def __init__(self, port, page=Path("nowhere"), log_writer=None, anchors=None, settings=None, rate=RATE):
+    def __init__(
+        self, port, page=Path("nowhere"), log_writer=None, anchors=None, settings=None, rate=RATE, certificate=b""
+    ):
         self.robot, self.planning, self.log = PlainRobot(), PlainPlanning(), []
         core = Teleoperation(settings or patient(), Everywhere(), PACKAGE, OFFSET)
         self.controller = SessionController(core, self.robot, self.planning, make_world(()), 0.1, log_writer)
@@ -127,7 +129,7 @@ class Laid:
         origins = Origins.of(["127.0.0.1"], port, tls=False)
         self.server = Server(Composition(
             self.controller, TOKEN, origins, PACKAGE, scene, None, rate, page, self.log.append,
-            live().alignment, anchors,
+            live().alignment, anchors, certificate,
         ))  # fmt: skip
         self.url, self.origin = f"http://127.0.0.1:{port}", f"http://127.0.0.1:{port}"
 
@@ -216,10 +218,10 @@ def hand(place, **buttons):
 
 
 @asynccontextmanager
-async def laid(page=Path("nowhere"), log_writer=None, anchors=None, settings=None, rate=RATE):
+async def laid(page=Path("nowhere"), log_writer=None, anchors=None, settings=None, rate=RATE, certificate=b""):
     """A server that runs, and how to come to it."""
     port = unused_port()
-    here = Laid(port, page, log_writer, anchors, settings, rate)
+    here = Laid(port, page, log_writer, anchors, settings, rate, certificate)
     served = TestServer(here.server.app(), host="127.0.0.1", port=port)
     async with served, ClientSession() as session:
 

@@ -69,6 +69,8 @@ TICK = 0.005  # s
 PATIENCE = 5.0  # s for which a client may be silent
 CENTRE, REACH = (0.0, 0.0, 0.333), 0.85  # m, of the ball in which the mount can be
 AROUND, ALONG = 32, 10
+CERTIFICATE = b"""<!doctype html><title>Certificate</title><style>p { color: green }</style><p>of the twin</p>
+<script type="module">fetch("/").catch(() => document.title = "Replay, no requests");</script>"""
 TABLE = Obstacle("the table", (0.35, -0.5, -0.05), (0.95, 0.5, -0.02))
 CUP = WorldObject("the cup", "cylinder", 0.05, 0.12, 0.1, (0.65, 0.3, 0.04), support="standing")
 
@@ -227,7 +229,7 @@ async def obey(
         word = line.strip()
         robot.is_silent = word == "silent" or (robot.is_silent and word != "speak")
         robot.fault = {"fault": "joint 4: torque", "well": ""}.get(word, robot.fault)
-        planning.probability = {"doubtful": 0.4}.get(word, planning.probability)
+        planning.probability = {"doubtful": 0.4, "sure": 0.84}.get(word, planning.probability)
         if word == "drop":
             await site.stop()
             for client in list(server.clients.values()):
@@ -252,7 +254,8 @@ async def serve(port: int, folder: Path) -> None:
     alignment = load_folder(SessionConfig, PROJECT / "conf/live").alignment
     anchors = Anchors(folder / "anchors.json")
     server = Server(Composition(
-        controller, token, origins, PACKAGE, drawing(figure), Bowl(), RATE, page, log.append, alignment, anchors
+        controller, token, origins, PACKAGE, drawing(figure), Bowl(), RATE, page, log.append, alignment, anchors,
+        CERTIFICATE,
     ))  # fmt: skip
     tick = server.tick
 

@@ -10,6 +10,7 @@ from trunkline.ar.preview.preview_twin import compose_twin, robot_model_of
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import preview_process, simulated
 from trunkline.ar.session.bodies import drawn_bodies
+from trunkline.ar.session.certificate import certificate_of
 from trunkline.ar.session.controller import SessionController
 from trunkline.ar.session.hardware import Hardware
 from trunkline.ar.session.log_format import SIMULATED, Subject
@@ -36,7 +37,7 @@ BELOW, AROUND = 1.0, 3.0  # m, of the floor as an obstacle
 
 @dataclass(frozen=True)
 class SessionParts:
-    """What a server serves, and the processes behind it."""
+    """What a server serves, and the processes behind it. certificate: the twin's page, empty without one."""
 
     controller: SessionController
     package: str
@@ -45,6 +46,7 @@ class SessionParts:
     robot: RobotProcess
     previewer: PreviewProcess
     log_writer: LogWriterProcess
+    certificate: bytes
 
     def close(self) -> None:
         self.robot.close()  # first: it may be moving
@@ -78,7 +80,8 @@ def make(
     controller = SessionController(core, robot, previewer, world, lift, log_writer, package.period)
     controller.begin(config.rate, __version__)
     log_writer.await_begun()
-    return SessionParts(controller, package.digest, drawing, Shells.of(maps), robot, previewer, log_writer)
+    certificate = certificate_of(path, package.files)
+    return SessionParts(controller, package.digest, drawing, Shells.of(maps), robot, previewer, log_writer, certificate)
 
 
 def subject_of(simulation: Simulation, hardware: Hardware | None = None) -> Subject:

@@ -1,5 +1,5 @@
-"""What a live session serves to a browser before it is connected: the page's files, and the scene to whom has the
-token. Nothing else of the disk is served."""
+"""What a live session serves to a browser before it is connected: the page's files, and to whom has the token the scene
+and the twin's certificate. Nothing else of the disk is served."""
 
 import gzip
 import json
@@ -8,7 +8,8 @@ from pathlib import Path
 
 from aiohttp import web
 
-from trunkline.ar.session.auth import HEADERS, Origins, same
+from trunkline.ar.session import certificate as certified
+from trunkline.ar.session.auth import HEADERS, Origins, make_token, same
 from trunkline.ar.session.connections import IdleConnections
 
 TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
@@ -16,10 +17,16 @@ ABSENT = b"<!doctype html><title>Trunkline</title><p>error: the page is not buil
 
 
 class Routes:
-    """scene: as `scene.scene` has it. folder: of the page."""
+    """scene: as `scene.scene` has it. folder: of the page. certificate: the twin's, empty without one. A link sends no
+    token, so the certificate has a name that nobody guesses, which the scene tells."""
 
-    def __init__(self, origins: Origins, token: str, scene: dict, folder: Path, log: Callable[[str], None]) -> None:
+    def __init__(
+        self, origins: Origins, token: str, scene: dict, folder: Path, log: Callable[[str], None], certificate: bytes
+    ) -> None:
         self._origins, self._token, self._log = origins, token, log
+        self._certificate, self._secret = certificate, make_token()
+        if certificate:
+            scene = scene | {"certificate": f"certificate/{self._secret}"}
         self._scene = json.dumps(scene, separators=(",", ":")).encode()
         self._zipped = gzip.compress(self._scene)
         self._page = read_page(folder)
@@ -28,6 +35,7 @@ class Routes:
     def add_routes(self, app: web.Application) -> None:
         """After all others: the page's takes every name."""
         app.router.add_get("/scene.json", self._get_scene)
+        app.router.add_get("/certificate/{secret}", self._get_certificate)
         app.router.add_get("/{name:.*}", self._get_page)
 
     @web.middleware
@@ -49,7 +57,8 @@ class Routes:
         finally:
             self.idle.busy.discard(transport)
         if not response.prepared:
-            response.headers.update(HEADERS)
+            for name, value in HEADERS.items():
+                response.headers.setdefault(name, value)
         return response
 
     async def _get_page(self, request: web.Request) -> web.Response:
@@ -59,6 +68,12 @@ class Routes:
         if name not in self._page:
             raise web.HTTPNotFound
         return web.Response(body=self._page[name], content_type=TYPES[Path(name).suffix], charset="utf-8")
+
+    async def _get_certificate(self, request: web.Request) -> web.Response:
+        if not same(request.match_info["secret"], self._secret):
+            raise web.HTTPNotFound
+        headers = certified.HEADERS
+        return web.Response(body=self._certificate, content_type="text/html", charset="utf-8", headers=headers)
 
     async def _get_scene(self, request: web.Request) -> web.Response:
         scheme, _, token = request.headers.get("Authorization", "").partition(" ")

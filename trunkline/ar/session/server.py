@@ -48,7 +48,7 @@ PREVIEWED = ("plan", "preview", "ready", "delay")  # modes in which who comes is
 @dataclass(frozen=True)
 class Composition:
     """What a server is made of. scene: as `scene.scene` has it. alignment: how clients in a room are aligned, None
-    where there are none; anchors: what is known of their rooms."""
+    where there are none; anchors: what is known of their rooms. certificate: the twin's page, empty without one."""
 
     controller: SessionController
     token: str
@@ -61,6 +61,7 @@ class Composition:
     log: Callable[[str], None] = print
     alignment: AlignmentSettings | None = None
     anchors: Anchors | None = None
+    certificate: bytes = b""
 
 
 class Server:
@@ -75,8 +76,9 @@ class Server:
         self._waiting: list[web.WebSocketResponse] = []
         self.broadcast = Broadcast(composition.controller, composition.shells)
         self._routes = Routes(
-            composition.origins, composition.token, composition.scene, composition.page, composition.log
-        )
+            composition.origins, composition.token, composition.scene, composition.page, composition.log,
+            composition.certificate,
+        )  # fmt: skip
         self._world, self._unwritten, self._gc_policy = None, "", GCPolicy()
         self._ticked = now()
 

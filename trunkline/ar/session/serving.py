@@ -142,7 +142,7 @@ async def opened(
     try:
         composition = Composition(
             made.controller, make_token(), address.origins, made.package, made.scene, made.shells, config.rate, PAGE,
-            log, alignment, anchors,
+            log, alignment, anchors, made.certificate,
         )  # fmt: skip
         while not (made.robot.ready and made.previewer.ready.is_set()):
             if not (made.robot.alive and made.previewer.alive):
