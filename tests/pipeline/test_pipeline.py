@@ -64,9 +64,10 @@ def test_one_name_everywhere():
     "file", ["dvc.yaml", "demo/dvc.yaml", "rehearsal/dvc.yaml", *sorted({e.partition(":")[0] for e in EXAMPLES})]
 )
 def test_a_pipeline_can_be_read_like_a_table_of_contents(file):
-    lines = (ROOT / file).read_text().splitlines()
+    text = (ROOT / file).read_text()
+    lines, most = text.splitlines(), max(40, 22 * len(yaml.safe_load(text)["stages"]))
     assert [line for line in lines if len(line) > 120] == []
-    assert len(lines) < 250, "too long for a table of contents: write its stages in fewer lines"
+    assert len(lines) <= most, f"too long for a table of contents, expected {most} lines at most: fill them up"
 
 
 @pytest.mark.parametrize("address", [*STAGES, *EXAMPLES])
