@@ -21,11 +21,14 @@ from trunkline.errors import in_one_line
 from trunkline.identification.evaluation.evaluation import replay, scores
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.settings import IdentificationSettings
+from trunkline.identification.simulate.loss import Loss
 from trunkline.model_files import read_spec
+from trunkline.pipeline.config import PROJECT
 from trunkline.pipeline.identify import CAD_MODEL, TRIALS
 from trunkline.recordings.trials.experiments import is_static
 from trunkline.recordings.trials.splits import VALIDATE
 from trunkline.recordings.trials.trial import Trial
+from trunkline.settings import read_yaml
 
 JOINT_FRICTION = Bounds(low=1e-4, high=0.1)  # rad of a joint's own spring
 MOUNT = Bounds(low=-0.1, high=0.1)  # rad by which the mount is turned in the tracked base frame
@@ -36,8 +39,9 @@ ERRORS = {"E_internal": "e_internal_mm", "position": "e_position_mm", "tip": "e_
 
 @dataclass
 class ModelChoice:
-    """A row. changes, parameters: in the settings of `stage`, of every one if it is "". loss: its kind, in all. moving:
-    trials begin with the velocity that the arm has in the frame of its start pose, in place of none."""
+    """A row. changes, parameters: in the settings of `stage`, of every one if it is "". loss: its file in
+    conf/shared/loss/, for all. moving: trials begin with the velocity that the arm has in the frame of its start pose,
+    in place of none."""
 
     title: str
     stage: str = ""
@@ -50,7 +54,7 @@ class ModelChoice:
         """Those of a stage."""
         config = committed(stage)
         if self.loss:
-            config = replace(config, loss=replace(config.loss, kind=self.loss))
+            config = replace(config, loss=Loss(**read_yaml(PROJECT / f"conf/shared/loss/{self.loss}.yaml")))
         if self.stage in ("", stage):
             config = replace(config, parameters=config.parameters | self.parameters, **self.changes)
         return config

@@ -1,5 +1,7 @@
 """The table of experiments says enough about each kind for every room that reads it."""
 
+import runpy
+
 import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
@@ -7,6 +9,7 @@ from pydantic import TypeAdapter, ValidationError
 from demo.experiments import PLANS
 from trunkline.recordings.trials.experiments import EXPERIMENTS, ExperimentName, is_static
 from trunkline.recordings.trials.trial import Trial
+from trunkline.report.figures import data
 
 
 @pytest.mark.parametrize("name", EXPERIMENTS)
@@ -35,6 +38,11 @@ def test_a_name_that_is_no_experiment_is_told_which_there_are():
 
 def test_the_stand_in_lab_plans_every_kind_by_its_name():
     assert set(PLANS) <= set(EXPERIMENTS)
+
+
+def test_a_kind_that_is_declared_tomorrow_has_a_color_in_pictures(monkeypatch):
+    monkeypatch.setitem(EXPERIMENTS, "tomorrow", EXPERIMENTS["curl"])
+    assert set(runpy.run_path(data.__file__)["COLORS"]) == set(EXPERIMENTS)
 
 
 def test_starts_are_found_in_the_signal_that_tells_them():

@@ -2,6 +2,7 @@
 
 import textwrap
 from collections.abc import Sequence
+from itertools import cycle
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -24,7 +25,7 @@ from trunkline.report.figures.style import IDENTIFIED, INITIAL, MEASURED, PARTLY
 BIN = 1 / 30  # s, of the coverage picture
 LEAST_JITTER = 0.1  # ms, of the axis: less is none
 SHADES = (MEASURED, IDENTIFIED, VALIDATE, INITIAL, "#cc79a7", "#009e73")  # the last two of Okabe and Ito's palette
-COLORS = dict(zip(EXPERIMENTS, SHADES, strict=True))
+COLORS = dict(zip(EXPERIMENTS, cycle(SHADES), strict=False))  # more kinds than shades begin anew
 
 
 def quality_figure(qualities: list[Quality], gathered: CheckedSession) -> Figure:
