@@ -129,8 +129,9 @@ def _metadata(folder: str, source: Log, parts: dict[str, list], kind: Kind) -> d
     """As version `kind.metadata` has it."""
     def span(rows):
         start = rows[0][0] if rows else 0
-        return {"starting_time": {"nanoseconds_since_epoch": start},
-                "duration": {"nanoseconds": (rows[-1][0] if rows else 0) - start}, "message_count": len(rows)}  # fmt: skip
+        end = rows[-1][0] if rows else 0
+        return {"starting_time": {"nanoseconds_since_epoch": start}, "duration": {"nanoseconds": end - start},
+                "message_count": len(rows)}  # fmt: skip
 
     rows = [row for some in parts.values() for row in some]
     version = kind.metadata

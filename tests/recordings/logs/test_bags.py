@@ -26,6 +26,7 @@ from tests.recordings.logs.test_schemas import (
     point,
     pose,
     ros_transform,
+    rotation,
     stamped_poses,
 )
 from tests.support.bags import KINDS, Kind, as_bag
@@ -113,7 +114,7 @@ def test_one_bag_may_be_inspected_by_itself_and_a_folder_that_is_one_is_a_sessio
         assert main([str(place), str(place)]) == 0
         assert capsys.readouterr().out.count("rosbag2: sqlite3, 3 files: tilt_30_0.db3") == 1
     assert main([str(bag)]) == 0
-    assert "  - {file: tilt_30, experiment: static_tilt, level: 30" in capsys.readouterr().out
+    assert "  - {file: tilt_30, experiment: static_tilt, split: identify" in capsys.readouterr().out
     assert logs_in(bag) == ["metadata.yaml"]
     text = (lab / "session.yaml").read_text().replace("tilt_30.mcap", "metadata.yaml, name: tilt_30")
     lines = [line for line in text.splitlines(keepends=True) if ".mcap" not in line]
@@ -267,33 +268,62 @@ def bag(tmp_path):
     return as_bag(log, tmp_path / "bag", SPLIT)
 
 
-def test_a_file_that_is_cut_off_gives_what_is_before_and_says_so(bag):
-    file = bag / "bag_2.db3"
+@pytest.fixture(scope="module")
+def long_log(tmp_path_factory):
+    """Of many pages, of numbers that do not compress."""
+    rng = np.random.default_rng(1)
+    pose = [{"position": point(place), "orientation": rotation(turn)}
+            for place, turn in zip(rng.normal(size=(6000, 3)), rng.normal(size=(6000, 4)), strict=True)]  # fmt: skip
+    messages = [
+        ("/poses", {"header": header(stamp), "poses": [{"name": n, "pose": pose.pop()} for n in BODIES]}, stamp)
+        for stamp in (STAMPS[0] + 8_333_333 * np.arange(2000)).tolist()
+    ]
+    return in_ros(tmp_path_factory.mktemp("long") / "log.mcap", *ROS["named"][:2], messages)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.9])
+def test_a_file_that_is_cut_off_gives_what_is_before_and_says_so(tmp_path, long_log, share):
+    bag = as_bag(long_log, tmp_path / "bag", Kind(parts=2))
+    whole = read_recording(bag).topics["/poses"]
+    file = bag / "bag_1.db3"
     data = file.read_bytes()
-    file.write_bytes(data[: len(data) * 2 // 3])
+    size = int(len(data) * share)
+    file.write_bytes(data[:size])
     log = read_recording(bag)
-    assert log.damage[0] == f"bag_2.db3: cut off at byte {len(data) * 2 // 3} of {len(data)}"
-    assert any("before and behind it are read" in line for line in log.damage)
-    assert log.damage[-1] == f"{COUNT - log.count} of {COUNT} messages lost"
-    assert COUNT * 2 // 3 < log.count < COUNT
-    np.testing.assert_array_equal(log.topics["/poses"].log_times, STAMPS[: log.count])
+    assert log.damage[0] == f"bag_1.db3: cut off at byte {size} of {len(data)}"
+    assert any(" messages before and behind it are read" in line for line in log.damage)
+    assert log.damage[-1] == f"{2000 - log.count} of 2000 messages lost"
+    assert 0.5 + 0.5 * share - 0.1 < log.count / 2000 < 1
+    assert log.topics["/poses"].messages == whole.messages[: log.count]
 
 
-def test_a_damaged_page_costs_its_messages_alone(tmp_path):
-    log = in_ros(tmp_path / "log.mcap", *ROS["named"][:2], at_stamps(named_poses))
-    file = as_bag(log, tmp_path / "bag", Kind(metadata=0))
+def test_a_damaged_page_costs_its_messages_alone(tmp_path, long_log):
+    file = as_bag(long_log, tmp_path / "bag", Kind(metadata=0))
+    whole = read_recording(file).topics["/poses"]
+    data = bytearray(file.read_bytes())
+    page = int.from_bytes(data[16:18], "big")
+    start = data.index(whole.messages[1000][:100]) // page * page
+    data[start : start + page] = b"\xff" * page
+    file.write_bytes(data)
+    log = read_recording(file)
+    assert any("database disk image is malformed" in line for line in log.damage)
+    assert 1980 < log.count < 2000
+    assert log.topics["/poses"].messages[-900:] == whole.messages[-900:]
+
+
+def test_definitions_that_are_lost_are_the_usual_ones(tmp_path, lab):
+    file = as_bag(lab / "tilt_30.mcap", tmp_path / "bag", Kind(metadata=0))
+    whole = open_log(lab / "tilt_30.mcap", read_session(lab))
     data = bytearray(file.read_bytes())
     page = int.from_bytes(data[16:18], "big")
     with closing(sqlite3.connect(file)) as database:
-        (middle,) = database.execute("SELECT data FROM messages WHERE id = 20").fetchone()
-    start = data.index(middle) // page * page
-    data[start : start + page] = b"\xff" * page
+        query = "SELECT rootpage FROM sqlite_master WHERE name = 'message_definitions'"
+        ((root,),) = database.execute(query)
+    data[(root - 1) * page : root * page] = b"\xff" * page
     file.write_bytes(data)
-    result = read_recording(file)
-    assert any("database disk image is malformed" in line for line in result.damage)
-    times = result.topics["/poses"].log_times
-    assert COUNT - 12 < len(times) < COUNT
-    assert (times[0], times[-1]) == (STAMPS[0], STAMPS[-1])
+    source = open_log(file, read_session(lab))
+    assert any("definitions of messages lost" in line for line in source.log.damage)
+    np.testing.assert_array_equal(source.poses.positions, whole.poses.positions)
 
 
 def test_a_file_of_which_nothing_is_readable_is_left_out_of_its_recording(bag):
@@ -337,16 +367,16 @@ def test_what_the_recorder_did_not_close_is_read_with_what_lies_beside_it(tmp_pa
 
 
 @pytest.mark.parametrize("storage", ["sqlite3", "mcap"])
-def test_a_compressed_file_that_is_cut_off_gives_what_it_has(tmp_path, storage):
-    log = in_ros(tmp_path / "log.mcap", *ROS["named"][:2], at_stamps(named_poses))
-    file = as_bag(log, tmp_path / "bag", Kind(storage, metadata=0, packed="file"))
-    packed = file.read_bytes()
-    file.write_bytes(packed[: len(packed) // 10])
+def test_a_compressed_file_that_is_cut_off_gives_what_it_has(tmp_path, long_log, storage):
+    file = as_bag(long_log, tmp_path / "bag", Kind(storage, metadata=0, packed="file"))
+    whole, packed = read_recording(file), file.read_bytes()
+    file.write_bytes(packed[:10])
     with pytest.raises(InputError, match=r"bag\.(db3|mcap)\.zstd: "):
         read_recording(file)
     file.write_bytes(packed[:-10])
-    result = read_recording(file)
-    assert "cut off: unpacked to " in result.damage[0]
+    log = read_recording(file)
+    assert "cut off: unpacked to " in log.damage[0]
+    assert 0.1 * whole.count < log.count < whole.count
     file.write_bytes(b"no zstd at all")
     with pytest.raises(InputError, match=rf"bag\.(db3|mcap)\.zstd: .*expected a recording of rosbag2 in {storage}"):
         read_recording(file)

@@ -278,10 +278,13 @@ def _read_database(database: sqlite3.Connection, contents: Contents) -> list[str
     tables = {name for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
     if not {"topics", "messages"} <= tables:
         raise ValueError(f"found the tables {', '.join(sorted(tables)) or '(none)'} without topics and messages")
-    definitions = {}
+    definitions, damage = {}, []
     if "message_definitions" in tables:  # since schema version 4
         query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
-        definitions = {schema: (encoding, text) for schema, encoding, text in database.execute(query)}
+        try:
+            definitions = {schema: (encoding, text) for schema, encoding, text in database.execute(query)}
+        except sqlite3.DatabaseError as error:
+            damage.append(f"definitions of messages lost: {error}")
     for number, name, schema, encoding in database.execute("SELECT id, name, type, serialization_format FROM topics"):
         kind, text = definitions.get(schema, ("", ""))
         contents.schemas[number] = Schema(number, text.encode(), kind if text else "", schema)
@@ -298,20 +301,26 @@ def _read_database(database: sqlite3.Connection, contents: Contents) -> list[str
     ]  # fmt: skip
     contents.messages += good
     contents.unchecked += len(good)
-    damage = [f"{problem}: {len(rows)} messages before and behind it are read"] if problem else []
-    return damage + ([f"{len(rows) - len(good)} messages that are none lost"] if len(good) < len(rows) else [])
+    if problem:
+        damage.append(f"{problem}: {len(rows)} messages before and behind it are read")
+    if len(good) < len(rows):
+        damage.append(f"{len(rows) - len(good)} messages of no topic, or without data, lost")
+    return damage
 
 
 def _rows(database: sqlite3.Connection, query: str) -> tuple[list[tuple], str]:
     """Rows in the order of their number, which comes first, without it: all, or those before and behind what is
     damaged, and what SQLite says of that."""
     rows, problem = {}, ""
-    for order in ("ASC", "DESC"):
+    for order, sign in (("ASC", 1), ("DESC", -1)):
+        last = None
         try:
             for number, *row in database.execute(f"{query} ORDER BY id {order}"):
-                if number in rows:  # read from the other end
+                if sign < 0 and number in rows:  # read from the other end
                     break
-                rows[number] = tuple(row)
+                if last is not None and sign * (number - last) <= 0:
+                    raise sqlite3.DatabaseError("rows out of order")
+                rows[number], last = tuple(row), number
         except sqlite3.DatabaseError as error:
             problem = str(error)
         if not problem:
