@@ -298,7 +298,7 @@ def unreadable_in(folder: Path) -> str:
     """What else is there of which logs can be made, and how, as the end of a sentence; empty where nothing is."""
     remedies = {
         "*.mcap.lz4": "decompress them, as by `lz4 -d`",
-        "*.bag": "`mcap convert` makes MCAP of them",
+        "*.bag": "`rosbags-convert` of the package rosbags makes bags of ROS 2 of them",
     }
     for pattern, remedy in remedies.items():
         if files := [file for level in ("", "[!.]*/") for file in folder.glob(level + pattern)]:
