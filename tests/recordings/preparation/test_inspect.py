@@ -141,10 +141,13 @@ def test_logs_one_folder_down_are_found(tmp_path, capsys):
 
 def test_what_holds_nothing_is_an_error(tmp_path, capsys):
     assert main([str(tmp_path)]) == 1
-    assert "found no MCAP log, nor one folder down" in capsys.readouterr().err
-    (tmp_path / "tilt.mcap.zstd").write_bytes(b"")
+    assert "found no log, nor one folder down" in capsys.readouterr().err
+    (tmp_path / "tilt.bag").write_bytes(b"")
     assert main([str(tmp_path)]) == 1
-    assert "found 1 files such as tilt.mcap.zstd: decompress them, as by `zstd -d`" in capsys.readouterr().err
+    assert "found 1 files such as tilt.bag: `rosbags-convert` of the package rosbags" in capsys.readouterr().err
+    (tmp_path / "tilt.mcap.lz4").write_bytes(b"")
+    assert main([str(tmp_path)]) == 1
+    assert "found 1 files such as tilt.mcap.lz4: decompress them, as by `lz4 -d`" in capsys.readouterr().err
     with open(tmp_path / "empty.mcap", "wb") as file:
         writer = Writer(file)
         writer.start()

@@ -9,6 +9,7 @@ from trunkline.errors import InputError
 from trunkline.files import file_digest
 from trunkline.recordings.cleaning.session_checks import CheckedSession
 from trunkline.recordings.cleaning.usual_distances import usual_distances
+from trunkline.recordings.logs.bag2 import data_files
 from trunkline.recordings.session.session import Session, read_session
 
 
@@ -71,10 +72,11 @@ def require_distinct_logs(folders: dict[str, Path], sessions: dict[str, Session]
     first_use: dict[str, tuple[str, str]] = {}
     for name, session in sessions.items():
         for file in sorted({trial.file for trial in session.trials}):
-            first = first_use.setdefault(file_digest(folders[name] / file), (name, file))
-            if first[0] != name:
-                problem = f"session {name}: found {file} with the bytes of {first[1]} of the session {first[0]}"
-                raise InputError(f"{problem}, expected no log in two sessions")
+            for part in data_files(folders[name] / file):
+                first = first_use.setdefault(file_digest(part), (name, file))
+                if first[0] != name:
+                    problem = f"session {name}: found {file} with the bytes of {first[1]} of the session {first[0]}"
+                    raise InputError(f"{problem}, expected no log in two sessions")
 
 
 def _along(gathered: CheckedSession) -> np.ndarray:

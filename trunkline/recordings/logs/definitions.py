@@ -19,6 +19,11 @@ float64 y
 float64 z
 float64 w
 """
+VECTOR3 = f"""{SEPARATOR}MSG: geometry_msgs/Vector3
+float64 x
+float64 y
+float64 z
+"""
 MARKER = f"""{SEPARATOR}MSG: mocap4r2_msgs/Marker
 int8 USE_NAME=0
 int8 USE_INDEX=1
@@ -49,6 +54,13 @@ MARKERS = f"""std_msgs/Header header
 uint32 frame_number
 mocap4r2_msgs/Marker[] markers
 {HEADER}{MARKER}{POINT}"""
+OLDER_MARKERS = f"""std_msgs/Header header
+uint32 frame_number
+mocap4r2_msgs/Marker[] markers
+{HEADER}{SEPARATOR}MSG: mocap4r2_msgs/Marker
+int64 index
+geometry_msgs/Point translation
+{POINT}"""
 JOINT_STATE = f"""std_msgs/Header header
 string[] name
 float64[] position
@@ -66,6 +78,30 @@ POSE = f"""{SEPARATOR}MSG: geometry_msgs/Pose
 geometry_msgs/Point position
 geometry_msgs/Quaternion orientation
 {POINT}{QUATERNION}"""
+NAMED_POSE = f"""{SEPARATOR}MSG: motion_capture_tracking_interfaces/NamedPose
+string name
+geometry_msgs/Pose pose
+{POSE}"""
+# of vicon_receiver, OPT4SMART/ros2-vicon-receiver, below a header since its later versions
+POSITION = """float32 x_trans
+float32 y_trans
+float32 z_trans
+float32 x_rot
+float32 y_rot
+float32 z_rot
+float32 w
+string segment_name
+string subject_name
+int32 frame_number
+string translation_type
+"""
+# of Foxglove's package for ROS 2
+FRAME_TRANSFORM = f"""builtin_interfaces/Time timestamp
+string parent_frame_id
+string child_frame_id
+geometry_msgs/Vector3 translation
+geometry_msgs/Quaternion rotation
+{VECTOR3}{QUATERNION}"""
 LAYOUT = f"""std_msgs/MultiArrayLayout layout
 {{kind}}[] data
 {SEPARATOR}MSG: std_msgs/MultiArrayLayout
@@ -86,10 +122,28 @@ KNOWN = {
     "interfaces/TrunkRigidBodies": TRUNK_RIGID_BODIES,
     "motion_capture_tracking_interfaces/NamedPoseArray": f"""std_msgs/Header header
 motion_capture_tracking_interfaces/NamedPose[] poses
-{HEADER}{SEPARATOR}MSG: motion_capture_tracking_interfaces/NamedPose
-string name
+{HEADER}{NAMED_POSE}""",
+    "motion_capture_tracking_interfaces/NamedPoseArrayV2": f"""std_msgs/Header header
+uint64 timestamp
+motion_capture_tracking_interfaces/LatencyInfo[] latencies
+motion_capture_tracking_interfaces/NamedPose[] poses
+{HEADER}{SEPARATOR}MSG: motion_capture_tracking_interfaces/LatencyInfo
+string source
+uint32 latency
+{NAMED_POSE}""",
+    "vicon_receiver/Position": f"std_msgs/Header header\n{POSITION}{HEADER}",
+    "foxglove_msgs/PoseInFrame": f"""builtin_interfaces/Time timestamp
+string frame_id
 geometry_msgs/Pose pose
 {POSE}""",
+    "foxglove_msgs/PosesInFrame": f"""builtin_interfaces/Time timestamp
+string frame_id
+geometry_msgs/Pose[] poses
+{POSE}""",
+    "foxglove_msgs/FrameTransform": FRAME_TRANSFORM,
+    "foxglove_msgs/FrameTransforms": f"""foxglove_msgs/FrameTransform[] transforms
+{SEPARATOR}MSG: foxglove_msgs/FrameTransform
+{FRAME_TRANSFORM}""",
     "geometry_msgs/PoseStamped": f"""std_msgs/Header header
 geometry_msgs/Pose pose
 {HEADER}{POSE}""",
@@ -104,13 +158,15 @@ geometry_msgs/Transform transform
 {HEADER}{SEPARATOR}MSG: geometry_msgs/Transform
 geometry_msgs/Vector3 translation
 geometry_msgs/Quaternion rotation
-{SEPARATOR}MSG: geometry_msgs/Vector3
-float64 x
-float64 y
-float64 z
-{QUATERNION}""",
+{VECTOR3}{QUATERNION}""",
     "std_msgs/Float64MultiArray": LAYOUT.format(kind="float64"),
     "std_msgs/Float32MultiArray": LAYOUT.format(kind="float32"),
     "std_msgs/Float64": "float64 data\n",
     "std_msgs/Float32": "float32 data\n",
+}
+# what it was in versions before
+BEFORE = {
+    "vicon_receiver/Position": POSITION,
+    "mocap4r2_msgs/Markers": OLDER_MARKERS,
+    "mocap_msgs/Markers": OLDER_MARKERS,
 }

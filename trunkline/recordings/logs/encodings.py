@@ -13,7 +13,7 @@ from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
 
 from trunkline.recordings.logs import cdr
-from trunkline.recordings.logs.definitions import KNOWN
+from trunkline.recordings.logs.definitions import BEFORE, KNOWN
 from trunkline.recordings.logs.mcap_log import Topic
 from trunkline.recordings.logs.records import LARGEST_EXPANSION
 
@@ -65,12 +65,21 @@ def readable_topic(topic: Topic) -> tuple[Topic, list[str]]:
         raise ValueError(f"found messages in the encapsulation {name}, expected plain CDR, which ROS 2 writes unless a "
                          "QoS profile of the middleware sets another data representation: set XCDR1 there")  # fmt: skip
     if topic.schema_encoding in ("", "ros2msg") and not topic.definition.strip():
-        usual = KNOWN.get(cdr.short_name(topic.schema))
+        name = cdr.short_name(topic.schema)
+        usual = KNOWN.get(name)
         if usual is None:
-            raise ValueError(f"found no text in the schema {topic.schema}, expected its definition")
+            raise ValueError(f"found no text in the schema {topic.schema}, expected its definition: where ROS knows "
+                             "it, `ros2 bag convert` to MCAP writes it beside the messages")  # fmt: skip
+        if name in BEFORE and not _fits(topic, usual):
+            usual = BEFORE[name]
         topic = replace(topic, definition=usual.encode(), schema_encoding="ros2msg")
         notes.append(f"{topic.name}: the schema {topic.schema} has no text in the log: read by its usual definition")
     return topic, notes
+
+
+def _fits(topic: Topic, definition: str) -> bool:
+    """Whether some of the first messages are of a definition."""
+    return any(cdr.decode(topic.messages[:10], topic.schema, cdr.parse_definition(topic.schema, definition)))
 
 
 def _unpacked(data: bytes) -> bytes:

@@ -37,6 +37,7 @@ class Log:
     """topics by name; `damage`: one sentence for each thing that was lost, empty for an intact log.
 
     count: messages read. unchecked: those of them that no checksum covers, so that a flipped bit would go unseen.
+    kind: what it is, for people to read, where that is no MCAP file by itself.
     """
 
     path: Path
@@ -44,6 +45,7 @@ class Log:
     damage: list[str] = field(default_factory=list)
     count: int = 0
     unchecked: int = 0
+    kind: str = ""
 
 
 def read_log(path: Path, wanted: Collection[str] | None = None) -> Log:
@@ -58,19 +60,21 @@ def read_log(path: Path, wanted: Collection[str] | None = None) -> Log:
     """
     contents = Contents(wanted)
     damage = read_contents(path, contents)
-    topics = _by_topic(contents, damage)
+    topics = by_topic(contents, damage)
     return Log(Path(path), topics, damage, len(contents.messages), contents.unchecked)
 
 
-def read_contents(path: Path, contents: Contents) -> list[str]:
+def read_contents(path: Path, contents: Contents, unpacked: Path | None = None) -> list[str]:
     """Fill `contents` with what a log has that can be trusted; a sentence for each thing that was lost.
+
+    Args: unpacked: where its bytes are, if `path` holds them compressed.
 
     Raises:
         InputError: as for `read_log`.
     """
     damage: list[str] = []
     try:
-        with open(path, "rb") as file:
+        with open(unpacked or path, "rb") as file:
             size = file.seek(0, SEEK_END)
             file.seek(0)
             if file.read(len(MAGIC)) != MAGIC:
@@ -94,7 +98,7 @@ def read_contents(path: Path, contents: Contents) -> list[str]:
     return damage
 
 
-def _by_topic(contents: Contents, damage: list[str]) -> dict[str, Topic]:
+def by_topic(contents: Contents, damage: list[str]) -> dict[str, Topic]:
     """Messages by topic, of all its channels: a recorder opens one for each publisher.
 
     A topic has one schema and encoding, those of most of its messages; others are left out, and that is said.

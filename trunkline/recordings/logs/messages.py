@@ -100,6 +100,15 @@ def pose_in_frame(message) -> DecodedPoses:
     return _unnamed(moment(message.timestamp)[..., None], [message.pose])
 
 
+@poses("vicon_receiver/Position", topic_per_body=True)
+def vicon_position(message) -> DecodedPoses:
+    """In mm; older versions have no header, and so the recorder's time."""
+    place = np.stack([message.x_trans, message.y_trans, message.z_trans], axis=-1)[..., None, :]
+    turn = np.stack([message.w, message.x_rot, message.y_rot, message.z_rot], axis=-1)[..., None, :]
+    time = moment(message.header.stamp) if hasattr(message, "header") else None
+    return DecodedPoses(time, None, place.astype(float), turn.astype(float), np.asarray(message.frame_number))
+
+
 @poses("geometry_msgs/PoseArray")
 def pose_array(message) -> DecodedPoses:
     return _unnamed(moment(message.header.stamp), message.poses)

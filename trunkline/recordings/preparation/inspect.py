@@ -9,6 +9,7 @@ from pathlib import Path
 
 from trunkline.errors import InputError, in_one_line
 from trunkline.program import command_parser
+from trunkline.recordings.logs.bag2 import bag_folder
 from trunkline.recordings.preparation.proposal import propose
 from trunkline.recordings.preparation.survey import describe, survey
 from trunkline.recordings.session.session import logs_in, unreadable_in
@@ -18,7 +19,7 @@ from trunkline.recordings.session.session import logs_in, unreadable_in
 def main(arguments: list[str] | None = None) -> int:
     parser = command_parser("inspect", __doc__)
     parser.add_argument("logs", nargs="+", type=Path, metavar="LOG",
-                        help="an MCAP log, or a folder of them, or of folders with one each")  # fmt: skip
+                        help="an MCAP log, a bag, or a folder of them, or of folders with one each")  # fmt: skip
     surveys, code, places = [], 0, parser.parse_args(arguments).logs
     for path in _logs(places):
         try:
@@ -28,7 +29,7 @@ def main(arguments: list[str] | None = None) -> int:
             code = 1
             continue
         print("\n".join(describe(surveys[-1])))
-    folder = places[0] if len(places) == 1 and places[0].is_dir() else None
+    folder = places[0] if len(places) == 1 and places[0].is_dir() and bag_folder(places[0]) is None else None
     if text := propose(surveys, folder=folder):
         print(f"\nProposed session.yaml:\n\n{text}")
         return code
@@ -45,11 +46,12 @@ def _logs(paths: list[Path]) -> list[Path]:
     """
     logs = []
     for path in paths:
-        inside = [path / name for name in logs_in(path)] if path.is_dir() else [path]
+        whole = not path.is_dir() or bag_folder(path) is not None
+        inside = [path if path.name else path.resolve()] if whole else [path / name for name in logs_in(path)]
         if not inside:
-            raise InputError(f"{path}: found no MCAP log, nor one folder down, expected some{unreadable_in(path)}")
+            raise InputError(f"{path}: found no log, nor one folder down, expected some{unreadable_in(path)}")
         logs += inside
-    return logs
+    return list(dict.fromkeys(logs))
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from trunkline.recordings.logs.bag2 import recording_name
 from trunkline.recordings.logs.joint_stream import JointStream
 from trunkline.recordings.logs.pose_stream import PoseStream
 from trunkline.recordings.preparation.survey import LogSurvey
@@ -69,7 +70,9 @@ def propose(surveys: list[LogSurvey], ups: tuple[Axis, ...] = (), folder: Path |
     lines.append("trials:")
     root = folder or Path(os.path.commonpath([survey.log.path.parent for survey, _ in usable]))
     files = [survey.log.path.relative_to(root) for survey, _ in usable]
-    named = [f"{file.parent.name}_{file.stem}" if sum(o.stem == file.stem for o in files) > 1 else "" for file in files]
+    plain = [recording_name(file.name) for file in files]
+    pairs = zip(files, plain, strict=True)
+    named = [f"{file.parent.name}_{name}" if plain.count(name) > 1 else "" for file, name in pairs]
     # a level that is computed with a guess of the vertical could not contradict it
     trials = [_experiment(survey, stream, base, by_sags, scale) for survey, stream in usable]
     for index, (file, name, (experiment, level)) in enumerate(zip(files, named, trials, strict=True)):

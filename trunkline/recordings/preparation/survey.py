@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from trunkline.errors import InputError
+from trunkline.recordings.logs.bag2 import read_recording
 from trunkline.recordings.logs.cdr import short_name
 from trunkline.recordings.logs.joint_stream import JointStream
-from trunkline.recordings.logs.mcap_log import Log, Topic, read_log
+from trunkline.recordings.logs.mcap_log import Log, Topic
 from trunkline.recordings.logs.messages import JOINTS, POSES
 from trunkline.recordings.logs.pose_stream import PoseStream, pose_stream
 from trunkline.recordings.session.source import (
@@ -50,7 +51,7 @@ def survey(path: Path) -> LogSurvey:
     Raises:
         InputError: it cannot be read at all.
     """
-    result = LogSurvey(read_log(path, POSES.keys() | JOINTS.keys()))
+    result = LogSurvey(read_recording(path, POSES.keys() | JOINTS.keys()))
     arms = _of_the_arm(result.log)
     try:
         result.pose_topics = pose_topics(arms, None)
@@ -86,7 +87,8 @@ def _of_the_arm(log: Log) -> Log:
 def describe(result: LogSurvey) -> list[str]:
     """Lines for people to read."""
     log = result.log
-    lines = [f"{log.path}"] + [f"  damaged: {damage}" for damage in log.damage]
+    lines = [f"{log.path}", *filter(None, [log.kind and f"  {log.kind}"])]
+    lines += [f"  damaged: {damage}" for damage in log.damage]
     if log.unchecked:
         lines.append(f"  {log.unchecked} of {log.count} messages without a checksum: bits that flipped there go unseen")
     width = max((len(name) for name in log.topics), default=0)

@@ -1,4 +1,4 @@
-"""A session: a folder of MCAP logs and the session.yaml that says what they are."""
+"""A session: a folder of logs and the session.yaml that says what they are."""
 
 import difflib
 import re
@@ -21,6 +21,7 @@ from pydantic import (
 )
 
 from trunkline.errors import InputError, nearest
+from trunkline.recordings.logs.bag2 import bag_with, recording_name, recordings_in
 from trunkline.recordings.session.shared_recordings import check_shared
 from trunkline.recordings.signals.held import Between
 from trunkline.recordings.trials.experiments import EXPERIMENTS, LOAD, ExperimentName, Level
@@ -190,7 +191,7 @@ class TrialEntry(Entry):
                 raise ValueError(f"level: missing, expected the nominal level of a {self.experiment}")
             self._check("level", self.level, level)
         self._check("load", self.load, LOAD)
-        self.name = self.name or Path(self.file).stem
+        self.name = self.name or recording_name(self.file)
         return self
 
     def _check(self, key: str, value: float, level: Level) -> None:
@@ -288,19 +289,16 @@ def session_folders(folder: Path, only: list[str] | None = None) -> dict[str, Pa
 
 
 def logs_in(folder: Path) -> list[str]:
-    """The MCAP logs of a session by their paths below it: its own, then those in folders one down, as ROS 2 records a
-    folder for each; none of folders that are sessions themselves."""
-    inside = [log for log in folder.glob("[!.]*/[!.]*.mcap") if not (log.parent / "session.yaml").is_file()]
-    return [log.relative_to(folder).as_posix() for logs in (folder.glob("*.mcap"), inside) for log in sorted(logs)]
+    """The logs of a session by their paths below it: its own, then those one folder down; a folder that ROS 2 recorded
+    is one."""
+    return [log.relative_to(folder).as_posix() for log in recordings_in(folder)]
 
 
 def unreadable_in(folder: Path) -> str:
     """What else is there of which logs can be made, and how, as the end of a sentence; empty where nothing is."""
     remedies = {
-        "*.mcap.zst*": "decompress them, as by `zstd -d`",
         "*.mcap.lz4": "decompress them, as by `lz4 -d`",
-        "*.db3": "`ros2 bag convert` makes MCAP of them",
-        "*.bag": "`mcap convert` makes MCAP of them",
+        "*.bag": "`rosbags-convert` of the package rosbags makes bags of ROS 2 of them",
     }
     for pattern, remedy in remedies.items():
         if files := [file for level in ("", "[!.]*/") for file in folder.glob(level + pattern)]:
@@ -330,7 +328,7 @@ def read_session(folder: Path, files: set[str] | None = None) -> Session:
     logs = logs_in(folder) if folder.is_dir() else None
     if logs is None:
         there = ", ".join(sessions_in(folder.parent)) or "none yet"
-        raise InputError(f"{folder}: no such folder, expected a session of MCAP logs and a session.yaml; found {there}")
+        raise InputError(f"{folder}: no such folder, expected a session of logs and a session.yaml; found {there}")
     if not path.is_file():
         deeper = sum("/" in log for log in logs)
         place = f" ({deeper} of them one folder down)" if deeper else ""
@@ -346,8 +344,9 @@ def read_session(folder: Path, files: set[str] | None = None) -> Session:
         session = Session.model_validate(content)
     except ValidationError as error:
         raise InputError(f"{path}: {_describe(error)}") from error
+    bags = {trial.file: bag_with(folder / trial.file) for trial in session.trials if trial.file not in logs}
     for index, trial in enumerate(session.trials):
-        if trial.file not in logs:
+        if trial.file not in logs and bags[trial.file] is None:
             close = difflib.get_close_matches(trial.file, logs, n=1) or logs[:1]
             expected = f"one of the folder's {len(logs)} logs" + (f", such as {close[0]}" if close else "")
             raise InputError(f"{path}: trials.{index}.file: found {trial.file!r}, expected {expected}")
@@ -356,7 +355,8 @@ def read_session(folder: Path, files: set[str] | None = None) -> Session:
         if name in names[:index]:
             raise InputError(f"{path}: trials.{index}.name: found {name!r} again, expected each name once")
     session._shared = check_shared(folder, session.trials)
-    session._unlisted = sorted(set(logs) - {trial.file for trial in session.trials})
+    of_bags = {bag.relative_to(folder).as_posix() for bag in bags.values() if bag is not None}
+    session._unlisted = sorted(set(logs) - of_bags - {trial.file for trial in session.trials})
     return session
 
 

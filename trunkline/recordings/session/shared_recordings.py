@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from trunkline.errors import InputError
 from trunkline.files import file_digest
+from trunkline.recordings.logs.bag2 import data_files
 
 if TYPE_CHECKING:
     from trunkline.recordings.session.session import TrialEntry
@@ -20,7 +21,7 @@ def check_shared(folder: Path, trials: list["TrialEntry"]) -> dict[str, list[str
     content = _contents(folder, sorted({trial.file for trial in trials}))
     remarks: dict[str, list[str]] = {}
     for first, second in combinations(trials, 2):
-        if content[first.file] != content[second.file]:
+        if not content[first.file] & content[second.file]:
             continue
         whole = (float("-inf"), float("inf"))
         interval, other_interval = first.window or whole, second.window or whole
@@ -46,8 +47,10 @@ def _window(window: tuple[float, float]) -> str:
     return "the whole log" if window[0] == float("-inf") else f"the window [{window[0]:g}, {window[1]:g}] s"
 
 
-def _contents(folder: Path, files: list[str]) -> dict[str, str]:
-    """What tells files apart by what they hold: their names, or a digest where two are of one size."""
-    sizes = {file: (folder / file).stat().st_size for file in files}
+def _contents(folder: Path, logs: list[str]) -> dict[str, set[str]]:
+    """What tells logs apart by what their files hold: names, or a digest where two files are of one size."""
+    files = {log: data_files(folder / log) for log in logs}
+    sizes = {file: file.stat().st_size for some in files.values() for file in some}
     alike = [size for size in sizes.values() if size]
-    return {file: file_digest(folder / file) if alike.count(size) > 1 else file for file, size in sizes.items()}
+    content = {file: file_digest(file) if alike.count(size) > 1 else str(file) for file, size in sizes.items()}
+    return {log: {content[file] for file in some} for log, some in files.items()}

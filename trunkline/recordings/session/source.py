@@ -8,9 +8,10 @@ from typing import TypeVar
 import numpy as np
 
 from trunkline.errors import InputError
+from trunkline.recordings.logs.bag2 import read_recording
 from trunkline.recordings.logs.cdr import short_name
 from trunkline.recordings.logs.joint_stream import JointStream, joined, joint_stream
-from trunkline.recordings.logs.mcap_log import Log, Topic, read_log
+from trunkline.recordings.logs.mcap_log import Log, Topic
 from trunkline.recordings.logs.messages import JOINTS, POSES, TOPIC_PER_BODY
 from trunkline.recordings.logs.pose_stream import PoseStream, pose_stream
 from trunkline.recordings.session.session import NONE, Session
@@ -45,7 +46,7 @@ def open_log(path: Path, session: Session) -> LogSource:
     Raises:
         InputError: naming the file and the topic, where the poses are missing or the topics are not clear.
     """
-    log = read_log(path, POSES.keys() | JOINTS.keys())
+    log = read_recording(path, POSES.keys() | JOINTS.keys())
     topics = pose_topics(log, session.topics.poses)
     if not topics:
         problem = ", ".join(f"{t.name} ({t.schema})" for t in log.topics.values()) or "no readable message"
