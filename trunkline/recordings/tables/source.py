@@ -179,7 +179,7 @@ def _poses(table: Table, layout: TableLayout, rows: np.ndarray, stamps: np.ndarr
         log_times=stamps,
         frames=None if frames is None else frames.astype(np.int64),
         names=names,
-        present=np.isfinite(positions).all(axis=2),
+        present=np.isfinite(positions[..., 0]),
         positions=positions,
         quaternions=quaternions if oriented else None,
     )
