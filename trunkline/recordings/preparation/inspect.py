@@ -11,7 +11,9 @@ from trunkline.errors import InputError, in_one_line
 from trunkline.program import command_parser
 from trunkline.recordings.preparation.proposal import propose
 from trunkline.recordings.preparation.survey import describe, survey
-from trunkline.recordings.session.session import logs_in, unreadable_in
+from trunkline.recordings.preparation.table_survey import survey_table
+from trunkline.recordings.session.layout import TABLES
+from trunkline.recordings.session.session import logs_in, tables_in, unreadable_in
 
 
 @in_one_line
@@ -22,12 +24,13 @@ def main(arguments: list[str] | None = None) -> int:
     surveys, code, places = [], 0, parser.parse_args(arguments).logs
     for path in _logs(places):
         try:
-            surveys.append(survey(path))
+            new = survey_table(path) if path.suffix.lower() in TABLES else [survey(path)]
         except InputError as error:
             print(f"error: {error}", file=sys.stderr)
             code = 1
             continue
-        print("\n".join(describe(surveys[-1])))
+        surveys += new
+        print("\n".join(describe(new[0])))
     folder = places[0] if len(places) == 1 and places[0].is_dir() else None
     if text := propose(surveys, folder=folder):
         print(f"\nProposed session.yaml:\n\n{text}")
@@ -45,7 +48,7 @@ def _logs(paths: list[Path]) -> list[Path]:
     """
     logs = []
     for path in paths:
-        inside = [path / name for name in logs_in(path)] if path.is_dir() else [path]
+        inside = [path / name for name in logs_in(path) or tables_in(path)] if path.is_dir() else [path]
         if not inside:
             raise InputError(f"{path}: found no MCAP log, nor one folder down, expected some{unreadable_in(path)}")
         logs += inside
