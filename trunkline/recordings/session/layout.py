@@ -56,15 +56,22 @@ Column = Annotated[int | str, PlainValidator(_column)]
 MotorColumn = Annotated[int | str | Constant, PlainValidator(_motor)]
 
 
-def _of_several(columns: list[Column]) -> list[Column]:
-    twice = next((column for column in columns if columns.count(column) > 1), None)
-    if twice is not None:
-        raise ValueError(f"found the column {twice!r} twice, expected another for each")
-    return columns
+def _of_several(count: int) -> AfterValidator:
+    """So many columns, each another."""
+
+    def check(columns: list[int | str]) -> list[int | str]:
+        if len(columns) != count:
+            raise ValueError(f"found {len(columns)} columns, expected {count}")
+        twice = next((column for column in columns if columns.count(column) > 1), None)
+        if twice is not None:
+            raise ValueError(f"found the column {twice!r} twice, expected another for each")
+        return columns
+
+    return AfterValidator(check)
 
 
-Three = Annotated[list[Column], Field(min_length=3, max_length=3), AfterValidator(_of_several)]
-Four = Annotated[list[Column], Field(min_length=4, max_length=4), AfterValidator(_of_several)]
+Three = Annotated[list[Column], _of_several(3)]
+Four = Annotated[list[Column], _of_several(4)]
 
 
 class TableTime(Entry):

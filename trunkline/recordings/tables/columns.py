@@ -90,8 +90,8 @@ def _of_text(path: Path, form: TextForm, file: io.TextIOWrapper, numbers: list[K
     body = ((line, cells) for line, cells in lines if any(cell.strip() for cell in cells))
     first = next(body, None)
     if first is None:
-        raise InputError(f"{path}: found no row below {form.header} lines of header, expected `header` in session.yaml "
-                         "to say how many there are")  # fmt: skip
+        raise InputError(f"{path}: found no row below {form.header} lines of header, expected `header` and `encoding` in "
+                         "session.yaml to be as in the file")  # fmt: skip
     width = max(len(names), len(first[1]))
     places = {key: _place(path, key, names, width, form.names or form.header) for key in dict.fromkeys(numbers + texts)}
     table, rows = Table(path, np.empty(0, int), texts={key: [] for key in texts}), []
@@ -183,11 +183,13 @@ def _place(path: Path, key: Key, names: list[str], width: int, line: int) -> int
             raise InputError(f"{where}: found {width} columns, expected column {key} of session.yaml")
         return key - 1
     if names.count(key) != 1:
-        some = ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")
+        some = ", ".join(name[:40] for name in names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")
         if not names:
             problem = "found no names of columns, as `header: 0`"
             raise InputError(f"{path}: {problem}, expected numbers from 1 in place of {key!r} in session.yaml")
         problem = f"column {key!r} {names.count(key)} times" if key in names else f"the columns {some}"
         expected = "its number from 1 in session.yaml" if key in names else f"{key!r} of session.yaml"
+        if len(names) == 1:
+            expected += ": is `separator` right?"
         raise InputError(f"{where}: found {problem}, expected {expected}{nearest(key, names)}")
     return names.index(key)

@@ -82,12 +82,13 @@ class TableReader:
 
 def _wanted(layout: TableLayout, form: TableLayout | MotorsFile) -> tuple[list[Key], list[Key]]:
     """Columns of numbers, and of text, that a file has to have."""
-    motors = [*(layout.commands or {}).values(), *(layout.tendon_positions or {}).values()]
-    numbers: list[Key] = [column for column in motors if not isinstance(column, Constant)]
+    numbers: list[Key] = []
     if form is layout:
-        numbers = numbers if layout.motors_file is None else []
         for body in layout.bodies.values():
             numbers += [*body.position, *(body.quaternion or body.euler or ())]
+    if form is (layout.motors_file or layout):
+        motors = [*(layout.commands or {}).values(), *(layout.tendon_positions or {}).values()]
+        numbers += [column for column in motors if not isinstance(column, Constant)]
     texts: list[Key] = [layout.trial] if form is layout and layout.trial is not None else []
     if (time := form.time) is not None:
         numbers += [] if time.frames is None else [time.frames]
