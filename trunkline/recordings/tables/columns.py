@@ -90,8 +90,8 @@ def _of_text(path: Path, form: TextForm, file: io.TextIOWrapper, numbers: list[K
     body = ((line, cells) for line, cells in lines if any(cell.strip() for cell in cells))
     first = next(body, None)
     if first is None:
-        raise InputError(f"{path}: found no row below {form.header} lines of header, expected `header` and `encoding` in "
-                         "session.yaml to be as in the file")  # fmt: skip
+        raise InputError(f"{path}: found no row below {form.header} lines of header, expected `header` and `encoding` "
+                         "in session.yaml to be as in the file")  # fmt: skip
     width = max(len(names), len(first[1]))
     places = {key: _place(path, key, names, width, form.names or form.header) for key in dict.fromkeys(numbers + texts)}
     table, rows = Table(path, np.empty(0, int), texts={key: [] for key in texts}), []
