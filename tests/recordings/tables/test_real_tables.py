@@ -10,6 +10,8 @@ from examples.asl_trunk.session import make_loaded_session
 from examples.ftdcr.session import make_session as make_path
 from tests.recordings.tables.lab_table import raw_trials, write_declared
 from tests.support.folders import ROOT, SHARED, with_recordings
+from trunkline.recordings.session.session import read_session
+from trunkline.recordings.tables.source import TableReader
 from trunkline.recordings.trials.raw_trial import RawTrial
 
 DISCS = {name: {"position": [f"{axis}{name}" for axis in "xyz"]} for name in ("1", "2", "3")}
@@ -32,6 +34,7 @@ def assert_alike(folder: Path, logs: Path) -> dict[str, RawTrial]:
     ours, theirs = raw_trials(folder), raw_trials(logs)
     assert ours.keys() == theirs.keys()
     for name, raw in ours.items():
+        assert isinstance(raw, RawTrial), raw
         for field in ("time", "positions", "command_time", "commands"):
             np.testing.assert_allclose(getattr(raw, field), getattr(theirs[name], field), atol=2e-6, err_msg=name)
     return ours
@@ -127,7 +130,10 @@ def test_the_tentacle(tmp_path):
                "table": {"bodies": turned}}]  # fmt: skip
     tables = {"header": 0, "time": {"column": 2, "unit": "s", "frames": 1}, "bodies": bodies}
     write_declared(folder, tables, trials, base={"position": [0.2, 0.2, 0.2]})
-    raw = raw_trials(folder)
-    rows = np.loadtxt(source / "m2_u01.csv", delimiter=",")[0]
-    np.testing.assert_allclose(raw["m2_u01"].positions[0, 0], rows[5:8])
-    np.testing.assert_allclose(raw["m1_u01"].time[-1], np.loadtxt(source / "m1_u01.csv", delimiter=",")[-1, 1])
+    session = read_session(folder)
+    reader = TableReader(folder, session)
+    for trial, first in zip(session.trials, ("p1", "p2"), strict=True):
+        poses = reader.open(trial).poses
+        rows = np.loadtxt(source / trial.file, delimiter=",")
+        np.testing.assert_array_equal(poses.positions[:, poses.names.index(first)], rows[:, 2:5])
+        np.testing.assert_allclose(1e-9 * poses.stamps, rows[:, 1], atol=1e-9)
