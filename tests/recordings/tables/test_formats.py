@@ -79,6 +79,15 @@ def test_parquet(tmp_path, right):
     assert_equal(raw_trials(tmp_path)["curl_40"], right["curl_40"])
 
 
+@pytest.mark.parametrize("unit", ["date", "s"])
+def test_parquet_with_dates(tmp_path, right, unit):
+    frame = pd.DataFrame(columns_of(CURL)).assign(t=pd.to_datetime(CURL.stamps))
+    frame.to_parquet(tmp_path / "curl_40.parquet")
+    time = {"column": "t", "unit": unit}
+    write_declared(tmp_path, layout_of(CURL) | {"time": time}, [trial_of(CURL, file="curl_40.parquet")])
+    assert_equal(raw_trials(tmp_path)["curl_40"], right["curl_40"])
+
+
 def in_arrays(where=""):
     """(arrays, the layout that reads them): poses (T, 7) of each body, motors (T, K)."""
     columns, layout, arrays = columns_of(CURL), layout_of(CURL), {}

@@ -3,8 +3,9 @@
 from pathlib import Path
 
 import yaml
+from pydantic import ValidationError
 
-from trunkline.errors import InputError
+from trunkline.errors import InputError, first_problem
 from trunkline.recordings.preparation.survey import LogSurvey
 from trunkline.recordings.session.session import Session
 from trunkline.recordings.signals.units import METRES_PER
@@ -18,16 +19,18 @@ def survey_table(path: Path) -> list[LogSurvey]:
     Raises:
         InputError: it cannot be read, or has no columns of positions.
     """
-    seen = guess(path)
-    text = "\n".join(seen.tables)
-    labels = seen.labels or [None]
+    guessed = guess(path)
+    text = "\n".join(guessed.tables)
+    labels = guessed.labels or [None]
     entries = [
         {"name": str(number), "file": path.name, "label": label, "experiment": "motion", "split": "identify"}
         for number, label in enumerate(labels)
     ]
-    session = Session.model_validate(
-        {"frame": {"up": [0, 0, 1]}, "base": {"position": [0, 0, 0]}, "tables": yaml.safe_load(text), "trials": entries}
-    )
+    content = {"frame": {"up": [0, 0, 1]}, "base": {"position": [0, 0, 0]}, "tables": yaml.safe_load(text)}
+    try:
+        session = Session.model_validate(content | {"trials": entries})
+    except ValidationError as error:
+        raise InputError(f"{path}: guessed: {' '.join(text.split())}, which cannot be: {first_problem(error)}") from error
     reader, surveys = TableReader(path.parent, session), []
     for label, trial in zip(labels, session.trials, strict=True):
         try:
@@ -38,9 +41,9 @@ def survey_table(path: Path) -> list[LogSurvey]:
                                  tendon_positions=source.tendon_positions, label=label))  # fmt: skip
         for stream in (source.commands, source.tendon_positions):
             if stream is not None:
-                stream.positions *= seen.metres
-    surveys[0].notes = seen.why
+                stream.positions *= guessed.metres
+    surveys[0].notes = guessed.why
     for survey in surveys:
-        survey.tables = ["tables:", *(f"  {line}" for line in seen.tables), *seen.motors]
-        survey.unit = seen.unit if seen.unit in METRES_PER else None
+        survey.tables = ["tables:", *(f"  {line}" for line in guessed.tables), *guessed.motors]
+        survey.unit = guessed.unit if guessed.unit in METRES_PER else None
     return surveys

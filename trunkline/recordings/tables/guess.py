@@ -42,7 +42,7 @@ SENTINELS = (0.0, -1.0, -999.0, -9999.0, -99999.0, 999.0, 9999.0, 99999.0, 1e6)
 
 
 @dataclass
-class Seen:
+class LookedAt:
     """A column. name: without unit; label: the same in lower case. values: (n,), NaN where a cell is no number."""
 
     key: Key
@@ -89,7 +89,7 @@ def guess(path: Path) -> Guess:
     return result
 
 
-def _text(path: Path) -> tuple[list[str], list[Seen]]:
+def _text(path: Path) -> tuple[list[str], list[LookedAt]]:
     """Lines of `tables` on how a text is written, and its columns."""
     encoding = _encoding(path)
     with opened(path, encoding) as file:
@@ -124,7 +124,7 @@ def _text(path: Path) -> tuple[list[str], list[Seen]]:
     return text, columns
 
 
-def _arrays(path: Path) -> list[Seen]:
+def _arrays(path: Path) -> list[LookedAt]:
     names, read = array_columns(path)
     columns = []
     for name, array in read(names).items():
@@ -137,10 +137,10 @@ def _arrays(path: Path) -> list[Seen]:
     return columns
 
 
-def _column(key: Key, name: str, values: np.ndarray, texts: list[str], unit: str) -> Seen:
+def _column(key: Key, name: str, values: np.ndarray, texts: list[str], unit: str) -> LookedAt:
     inside, stated = UNIT.search(name), BARE.fullmatch(unit)
     plain = name[: inside.start()].strip() if inside else name
-    return Seen(key, plain, (inside[2] if inside else stated[1] if stated else None) or None, values, texts)
+    return LookedAt(key, plain, (inside[2] if inside else stated[1] if stated else None) or None, values, texts)
 
 
 def _filled(row: list[str]) -> list[str]:
@@ -194,7 +194,7 @@ def _are_names(row: list[str], width: int) -> bool:
     return len(set(row)) == len(row) == width and _words(row, ".") >= width - 1
 
 
-def _time(result: Guess, columns: list[Seen]) -> list[Seen]:
+def _time(result: Guess, columns: list[LookedAt]) -> list[LookedAt]:
     """The columns without those of time and frame numbers."""
     counts = (c for c in columns if COUNTER.fullmatch(c.label) or not c.name)
     counter = next((c for c in counts if np.isin(np.diff(c.values), range(1, 100)).all()), None)
@@ -215,14 +215,14 @@ def _time(result: Guess, columns: list[Seen]) -> list[Seen]:
     return [column for column in left if column is not time]
 
 
-def _runs(column: Seen) -> bool:
+def _runs(column: LookedAt) -> bool:
     """Whether a column is numbers that mostly increase, or dates."""
     if np.isfinite(column.values).all():
         return bool(np.mean(np.diff(column.values) > 0) > 0.5)
     return bool(column.texts) and all(re.match(r"\d{4}-\d\d-\d\d[ T]\d\d:\d\d", text) for text in column.texts)
 
 
-def _time_unit(time: Seen) -> tuple[str, str]:
+def _time_unit(time: LookedAt) -> tuple[str, str]:
     if not np.isfinite(time.values).all():
         return "date", "as its cells are"
     if time.unit in TO_SECONDS:
@@ -235,9 +235,9 @@ def _time_unit(time: Seen) -> tuple[str, str]:
     return unit, f"as rows are {step * TO_SECONDS[unit]:.3g} s apart then"
 
 
-def _bodies(result: Guess, columns: list[Seen], path: Path) -> list[Seen]:
+def _bodies(result: Guess, columns: list[LookedAt], path: Path) -> list[LookedAt]:
     """The columns without those of poses."""
-    positions, turns, angles = (dict[str, dict[str, Seen]]() for _ in range(3))
+    positions, turns, angles = (dict[str, dict[str, LookedAt]]() for _ in range(3))
     for column in columns:
         if not (COMMAND.fullmatch(column.label) or column.label.startswith(("motor", "servo", "tendon"))):
             if match := ANGLE.fullmatch(column.name):
@@ -298,7 +298,7 @@ def _gaps(result: Guess, bodies: list[np.ndarray]) -> None:
         result.why.append(f"gaps: {' and '.join(f'{value:g}' for value in values)}, in x, y and z of several rows")
 
 
-def _motors(result: Guess, columns: list[Seen]) -> list[Seen]:
+def _motors(result: Guess, columns: list[LookedAt]) -> list[LookedAt]:
     """The columns without those of motors; where their unit is not clear, as comments."""
     motors = [c for c in columns if (MOTOR.fullmatch(c.label) or COMMAND.fullmatch(c.label)) and not _is_text(c)]
     if not motors:
@@ -327,11 +327,11 @@ def _motors(result: Guess, columns: list[Seen]) -> list[Seen]:
     return [column for column in columns if all(column is not motor for motor in motors)]
 
 
-def _is_text(column: Seen) -> bool:
+def _is_text(column: LookedAt) -> bool:
     return not np.isfinite(column.values).any()
 
 
-def _trials(result: Guess, columns: list[Seen]) -> list[Seen]:
+def _trials(result: Guess, columns: list[LookedAt]) -> list[LookedAt]:
     """The columns without the one that names trials."""
     for column in columns:
         if not LABEL.fullmatch(column.label):
