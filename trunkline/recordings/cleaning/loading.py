@@ -19,6 +19,7 @@ from trunkline.recordings.cleaning.trial_window import Stretch, check_seen, colu
 from trunkline.recordings.session.session import Session, TrialEntry
 from trunkline.recordings.session.source import LogSource, open_log
 from trunkline.recordings.signals.clock import OffsetFit, estimate_offset
+from trunkline.recordings.tables.source import TableReader
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_stepwise
 from trunkline.recordings.trials.raw_trial import RawTrial
 
@@ -36,11 +37,13 @@ def load_raw_trials(
     logs: dict[str, LogSource | InputError] = {}
     read: list[tuple[LogSource, Stretch] | InputError] = []
     findings = [Findings(warnings=list(session.shared.get(trial.name, []))) for trial in session.trials]
+    tables = TableReader(folder, session)
     for trial, record in zip(session.trials, findings, strict=True):
         try:
-            if trial.file not in logs:
-                logs[trial.file] = _opened(folder / trial.file, session)
-            source = logs[trial.file]
+            rows = trial.model_dump_json(include={"file", "label", "table"})
+            if rows not in logs:
+                logs[rows] = _opened(folder / trial.file, session, trial, tables)
+            source = logs[rows]
             if isinstance(source, InputError):
                 raise source
             record.where = f"{source.log.path}: trial {trial.name}"
@@ -61,10 +64,10 @@ def load_raw_trials(
             yield trial, error, record
 
 
-def _opened(path: Path, session: Session) -> LogSource | InputError:
-    """A log, decoded; or why it cannot be, for all of its trials."""
+def _opened(path: Path, session: Session, trial: TrialEntry, tables: TableReader) -> LogSource | InputError:
+    """A log, decoded, or a trial's rows of a table; or why it cannot be, for all of its trials."""
     try:
-        return open_log(path, session)
+        return tables.open(trial) if trial.of_table else open_log(path, session)
     except InputError as error:
         return error
 

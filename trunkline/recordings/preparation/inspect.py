@@ -12,7 +12,9 @@ from trunkline.program import command_parser
 from trunkline.recordings.logs.bag2 import bag_folder
 from trunkline.recordings.preparation.proposal import propose
 from trunkline.recordings.preparation.survey import describe, survey
-from trunkline.recordings.session.session import logs_in, unreadable_in
+from trunkline.recordings.preparation.table_survey import survey_table
+from trunkline.recordings.session.layout import TABLES
+from trunkline.recordings.session.session import logs_in, tables_in, unreadable_in
 
 
 @in_one_line
@@ -23,12 +25,13 @@ def main(arguments: list[str] | None = None) -> int:
     surveys, code, places = [], 0, parser.parse_args(arguments).logs
     for path in _logs(places):
         try:
-            surveys.append(survey(path))
+            new = survey_table(path) if path.suffix.lower() in TABLES else [survey(path)]
         except InputError as error:
             print(f"error: {error}", file=sys.stderr)
             code = 1
             continue
-        print("\n".join(describe(surveys[-1])))
+        surveys += new
+        print("\n".join(describe(new[0])))
     folder = places[0] if len(places) == 1 and places[0].is_dir() and bag_folder(places[0]) is None else None
     if text := propose(surveys, folder=folder):
         print(f"\nProposed session.yaml:\n\n{text}")
@@ -47,7 +50,8 @@ def _logs(paths: list[Path]) -> list[Path]:
     logs = []
     for path in paths:
         whole = not path.is_dir() or bag_folder(path) is not None
-        inside = [path if path.name else path.resolve()] if whole else [path / name for name in logs_in(path)]
+        names = [] if whole else logs_in(path) or tables_in(path)
+        inside = [path if path.name else path.resolve()] if whole else [path / name for name in names]
         if not inside:
             raise InputError(f"{path}: found no log, nor one folder down, expected some{unreadable_in(path)}")
         logs += inside

@@ -34,7 +34,7 @@ def propose(surveys: list[LogSurvey], ups: tuple[Axis, ...] = (), folder: Path |
         return ""
     best, poses = max(usable, key=lambda pair: len(pair[1].names))
     streams = [stream for _, stream in usable]
-    unit = likely_unit([stream.positions for stream in streams]) or "m"
+    unit = best.unit or likely_unit([stream.positions for stream in streams]) or "m"
     scale = METRES_PER[unit]
     base = next((name for word in BASE_NAMES for name in poses.names if word in name.lower()), None)
     by_sags = up_by_sags([survey for survey, _ in usable], base)
@@ -46,8 +46,10 @@ def propose(surveys: list[LogSurvey], ups: tuple[Axis, ...] = (), folder: Path |
         "# Proposed from the logs. Check `up` (against gravity), each trial's experiment, level and split.",
         f"frame: {{{frame}}}{comment}",
     ]
-    if doubtful := other_units([stream.positions for stream in streams], unit):
+    if best.unit is None and (doubtful := other_units([stream.positions for stream in streams], unit)):
         lines.append(f"# The unit is a guess by the bodies' distances: {doubtful}.")
+    elif best.tables and best.unit is None:
+        lines.append("# The unit is a guess: no name of a column tells it.")
     if base is not None and poses.quaternions is not None:
         lines.append(f"base: {_quoted(base)}")
     elif base is not None:
@@ -58,14 +60,14 @@ def propose(surveys: list[LogSurvey], ups: tuple[Axis, ...] = (), folder: Path |
     else:
         place = [round(float(x), 4) for x in np.nanmean(poses.positions[:, 0], axis=0) * scale]
         lines.append(f"base: {{position: {place}}}  # no body marks the mount: measure it")
-    lines += [f"clock: {_clock(streams)}", *_topics(best)]
+    lines += [f"clock: {_clock(streams)}", *(best.tables or _topics(best))]
     if poses.unnamed is not None:
         lines.append(f"bodies: {_list(poses.names)}  # names of the poses, in order; one is the base")
     joints = [stream for stream in (best.commands, best.tendon_positions) if stream is not None]
     if any(stream.unnamed is not None for stream in joints):
         names = next(stream.names for stream in joints if stream.unnamed is not None)
         lines.append(f"tendons: {_list(f'tendon_{name}' for name in names)}")
-    elif joints and not any(name.startswith("tendon_") for name in joints[0].names):
+    elif joints and not best.tables and not any(name.startswith("tendon_") for name in joints[0].names):
         lines.append(f"# The logs have {_list(joints[0].names)}: `tendons` or `motors` is to say what each winds in.")
     lines.append("trials:")
     root = folder or Path(os.path.commonpath([survey.log.path.parent for survey, _ in usable]))
@@ -81,6 +83,8 @@ def propose(surveys: list[LogSurvey], ups: tuple[Axis, ...] = (), folder: Path |
         split = VALIDATE if experiment in earlier and experiment not in later else IDENTIFY
         level_text = "" if level is None else f", level: {level}"
         name_text = f", name: {_quoted(name)}" if name else ""
+        if (label := usable[index][0].label) is not None:
+            name_text = f", label: {_quoted(label)}"
         lines.append(
             f"  - {{file: {_quoted(file.as_posix())}{name_text}, experiment: {experiment}{level_text}, split: {split}}}"
         )

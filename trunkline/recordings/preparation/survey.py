@@ -33,7 +33,11 @@ GAP = 1.5  # median intervals between frames that make a gap
 
 @dataclass
 class LogSurvey:
-    """A log and what could be read in it. notes: why something could not. pose_topics: as in `source`."""
+    """A log and what could be read in it. notes: why something could not. pose_topics: as in `source`.
+
+    Of a table: tables, the lines of session.yaml that say how it was read; unit, of its positions, where it says so;
+    label, of the trial.
+    """
 
     log: Log
     notes: list[str] = field(default_factory=list)
@@ -43,6 +47,9 @@ class LogSurvey:
     commands: JointStream | None = None
     position_topic: str | None = None
     tendon_positions: JointStream | None = None
+    tables: list[str] = field(default_factory=list)
+    unit: str | None = None
+    label: str | None = None
 
 
 def survey(path: Path) -> LogSurvey:

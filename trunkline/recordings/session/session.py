@@ -3,15 +3,13 @@
 import difflib
 import re
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from omegaconf import OmegaConf
 from pydantic import (
     AfterValidator,
-    BaseModel,
     BeforeValidator,
-    ConfigDict,
     Field,
     FiniteFloat,
     PrivateAttr,
@@ -22,6 +20,7 @@ from pydantic import (
 
 from trunkline.errors import InputError, nearest
 from trunkline.recordings.logs.bag2 import bag_with, recording_name, recordings_in
+from trunkline.recordings.session.layout import TABLES, Entry, TableLayout, keys_of_blocks
 from trunkline.recordings.session.shared_recordings import check_shared
 from trunkline.recordings.signals.held import Between
 from trunkline.recordings.trials.experiments import EXPERIMENTS, LOAD, ExperimentName, Level
@@ -61,12 +60,6 @@ def _each_once(names: list[str]) -> list[str]:
 OneFolder = Annotated[SessionName, BeforeValidator(_no_list)]
 SomeSessions = Annotated[list[SessionName], AfterValidator(_each_once)]
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
-
-
-class Entry(BaseModel):
-    """A block of session.yaml; unknown keys are refused."""
-
-    model_config = ConfigDict(extra="forbid")
 
 
 class MocapFrame(Entry):
@@ -164,10 +157,16 @@ class MotorEntry(Entry):
 
 
 class TrialEntry(Entry):
-    """window: s from the log's first pose. level: in the unit of the experiment. load: kg at the tip."""
+    """window: s from the log's first pose. level: in the unit of the experiment. load: kg at the tip.
+
+    label: what the column `tables.trial` says in this trial's rows; by default its name. table: what of `tables` is
+    otherwise in this trial's file.
+    """
 
     name: str = ""
     file: str
+    label: str | int | float | None = None
+    table: dict[str, Any] = {}
     window: tuple[FiniteFloat, FiniteFloat] | None = None
     experiment: ExperimentName
     level: FiniteFloat | None = None
@@ -191,8 +190,13 @@ class TrialEntry(Entry):
                 raise ValueError(f"level: missing, expected the nominal level of a {self.experiment}")
             self._check("level", self.level, level)
         self._check("load", self.load, LOAD)
-        self.name = self.name or recording_name(self.file)
+        name = recording_name(self.file)
+        self.name = self.name or (name if self.label is None else f"{name}_{self.label}")
         return self
+
+    @property
+    def of_table(self) -> bool:
+        return Path(self.file).suffix.lower() in TABLES
 
     def _check(self, key: str, value: float, level: Level) -> None:
         if not level.low <= value <= level.high:
@@ -206,6 +210,7 @@ class Session(Entry):
     bodies: names of the poses, in order, where messages hold them without. A list of tendons does the same for numbers.
     clock: what dates a pose: its header's stamp, the recorder's log time, or its frame number at the rate
     that the stamps show. With `log`, commands and tendon positions are dated by it too.
+    tables: how trials are read whose files are no MCAP logs, but tables.
     motors: name in the log to what it moves, in place of `tendons`, where motors count otherwise than in metres of a
     tendon's pull, or move several.
     commands: whether they hold until the next, or go on in a straight line to it; by default they hold, but for ramps
@@ -221,6 +226,7 @@ class Session(Entry):
     motors: dict[str, MotorEntry] | None = Field(default=None, min_length=1)
     topics: Topics = Topics()
     bodies: list[str] | None = Field(default=None, min_length=1)
+    tables: TableLayout | None = None
     clock: Literal["stamp", "log", "frame"] = "stamp"
     commands: Between | None = None
     trials: list[TrialEntry] = Field(min_length=1)
@@ -234,6 +240,26 @@ class Session(Entry):
         names = tuple(dict.fromkeys(name for motor in motors for name in motor.tendons))
         moved = [[motor.metres * motor.tendons.get(name, 0.0) for motor in motors] for name in names]
         return names, np.array(moved).reshape(len(names), len(motors))
+
+    def _unturned(self, layout: TableLayout) -> str:
+        """Why poses that are relative to the base cannot be put into the world; empty where they can."""
+        if isinstance(self.base, FixedBase):
+            return "" if self.base.quaternion else "quaternion missing, expected how it is turned"
+        body = layout.bodies.get(self.base)
+        if body is None:
+            return f"found {self.base!r}, expected one of `bodies` of `tables`{nearest(self.base, list(layout.bodies))}"
+        return "" if body.quaternion or body.euler else f"found no orientation of {self.base!r}, expected its columns"
+
+    def layout_of(self, trial: TrialEntry) -> TableLayout:
+        """What the columns of a trial's table are. Raises ValueError where `table` of the trial says it wrongly."""
+        assert self.tables is not None, "of a session with tables"
+        stated = {key: getattr(self.tables, key) for key in self.tables.model_fields_set}
+        return TableLayout.model_validate(stated | trial.table) if trial.table else self.tables
+
+    def motors_files(self) -> set[str]:
+        """Tables of motors alone."""
+        layouts = [self.layout_of(trial) for trial in self.trials if trial.of_table] if self.tables else []
+        return {layout.motors_file.file for layout in layouts if layout.motors_file is not None}
 
     @property
     def shared(self) -> dict[str, list[str]]:
@@ -266,6 +292,28 @@ class Session(Entry):
                 raise ValueError(f"{key}: found {twice!r} twice, expected each name of the model once")
         return self
 
+    @model_validator(mode="after")
+    def _of_tables(self):
+        for index, trial in enumerate(self.trials):
+            where = f"trials.{index}"
+            if not trial.of_table or self.tables is None:
+                key = "label" if trial.label is not None else "table" if trial.table else None
+                if key is not None:
+                    raise ValueError(f"{where}.{key}: found it without `tables`, or of a log, expected none")
+                continue
+            try:
+                layout = self.layout_of(trial)
+            except ValidationError as error:
+                raise ValueError(f"{where}.table: {_describe(error)}") from error
+            if layout.trial is None and trial.label is not None:
+                raise ValueError(f"{where}.label: found {trial.label!r}, expected none, or `trial` in `tables`: the "
+                                 "column that has it")  # fmt: skip
+            if layout.frame == "base" and (problem := self._unturned(layout)):
+                raise ValueError(f"base: {problem}, as `tables` has `frame: base`")
+            if layout.trial is not None and trial.label is None:
+                trial.label = trial.name
+        return self
+
 
 def sessions_in(folder: Path) -> list[str]:
     """Names of the sessions that a folder holds."""
@@ -294,12 +342,18 @@ def logs_in(folder: Path) -> list[str]:
     return [log.relative_to(folder).as_posix() for log in recordings_in(folder)]
 
 
+def tables_in(folder: Path) -> list[str]:
+    """The tables of a folder, or one further down, as `logs_in` has logs."""
+    files = [file for level in ("[!.]*", "[!.]*/[!.]*") for file in sorted(folder.glob(level)) if file.is_file()]
+    return [file.relative_to(folder).as_posix() for file in files if file.suffix.lower() in TABLES]
+
+
 def unreadable_in(folder: Path) -> str:
     """What else is there of which logs can be made, and how, as the end of a sentence; empty where nothing is."""
     remedies = {
         "*.mcap.lz4": "decompress them, as by `lz4 -d`",
         "*.bag": "`rosbags-convert` of the package rosbags makes bags of ROS 2 of them",
-    }
+    } | {f"*{suffix}": "`trunkline inspect` proposes a session.yaml that reads such tables" for suffix in TABLES}
     for pattern, remedy in remedies.items():
         if files := [file for level in ("", "[!.]*/") for file in folder.glob(level + pattern)]:
             return f"; found {len(files)} files such as {files[0].relative_to(folder)}: {remedy}"
@@ -325,7 +379,7 @@ def read_session(folder: Path, files: set[str] | None = None) -> Session:
     """
     folder = Path(folder)
     path = folder / "session.yaml"
-    logs = logs_in(folder) if folder.is_dir() else None
+    logs, tables = (logs_in(folder), tables_in(folder)) if folder.is_dir() else (None, [])
     if logs is None:
         there = ", ".join(sessions_in(folder.parent)) or "none yet"
         raise InputError(f"{folder}: no such folder, expected a session of logs and a session.yaml; found {there}")
@@ -338,14 +392,18 @@ def read_session(folder: Path, files: set[str] | None = None) -> Session:
     assert isinstance(content, dict)
     rename_keys(content, RENAMED, str(path))
     if files is not None:
-        logs = [log for log in logs if log in files]
+        logs, tables = ([file for file in some if file in files] for some in (logs, tables))
         content["trials"] = [trial for trial in content["trials"] if trial["file"] in files]
     try:
         session = Session.model_validate(content)
     except ValidationError as error:
         raise InputError(f"{path}: {_describe(error)}") from error
+    logs += tables if session.tables is not None else []
     bags = {trial.file: bag_with(folder / trial.file) for trial in session.trials if trial.file not in logs}
     for index, trial in enumerate(session.trials):
+        if trial.file in tables and session.tables is None:
+            expected = "expected `tables`, which says what its columns are (`trunkline inspect` proposes it)"
+            raise InputError(f"{path}: trials.{index}.file: found the table {trial.file!r}, {expected}")
         if trial.file not in logs and bags[trial.file] is None:
             close = difflib.get_close_matches(trial.file, logs, n=1) or logs[:1]
             expected = f"one of the folder's {len(logs)} logs" + (f", such as {close[0]}" if close else "")
@@ -356,7 +414,8 @@ def read_session(folder: Path, files: set[str] | None = None) -> Session:
             raise InputError(f"{path}: trials.{index}.name: found {name!r} again, expected each name once")
     session._shared = check_shared(folder, session.trials)
     of_bags = {bag.relative_to(folder).as_posix() for bag in bags.values() if bag is not None}
-    session._unlisted = sorted(set(logs) - of_bags - {trial.file for trial in session.trials})
+    listed = {trial.file for trial in session.trials} | of_bags | session.motors_files()
+    session._unlisted = sorted(set(logs) - listed)
     return session
 
 
@@ -371,8 +430,7 @@ def _describe(error: ValidationError) -> str:
     if problem["type"] == "missing":
         return f"{key}: missing, expected a value{more}"
     if problem["type"] == "extra_forbidden":
-        valid = [name for block in Entry.__subclasses__() for name in block.model_fields]
-        return f"{key}: unknown key{nearest(str(loc[-1]), valid)}{more}"
+        return f"{key}: unknown key{nearest(str(loc[-1]), keys_of_blocks())}{more}"
     if problem["type"] == "value_error":
         key = f"{key}: " if problem["loc"] else ""
         return f"{key}{problem['msg'].removeprefix('Value error, ')}{more}"

@@ -21,7 +21,7 @@ def check_shared(folder: Path, trials: list["TrialEntry"]) -> dict[str, list[str
     content = _contents(folder, sorted({trial.file for trial in trials}))
     remarks: dict[str, list[str]] = {}
     for first, second in combinations(trials, 2):
-        if not content[first.file] & content[second.file]:
+        if not content[first.file] & content[second.file] or first.label != second.label:
             continue
         whole = (float("-inf"), float("inf"))
         interval, other_interval = first.window or whole, second.window or whole
