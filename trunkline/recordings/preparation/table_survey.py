@@ -30,7 +30,7 @@ def survey_table(path: Path) -> list[LogSurvey]:
     try:
         session = Session.model_validate(content | {"trials": entries})
     except ValidationError as error:
-        raise InputError(f"{path}: guessed: {' '.join(text.split())}, which cannot be: {first_problem(error)}") from error
+        raise InputError(f"{path}: guessed {' '.join(text.split())}: {first_problem(error)}") from error
     reader, surveys = TableReader(path.parent, session), []
     for label, trial in zip(labels, session.trials, strict=True):
         try:

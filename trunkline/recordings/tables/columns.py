@@ -150,7 +150,8 @@ def _of_arrays(path: Path, numbers: list[Key], texts: list[Key]) -> Table:
         if len(array) != count:
             raise InputError(f"{path}: column {key!r}: found {len(array)} rows, expected {count} as in other columns")
         if key in texts:
-            table.texts[key] = [str(value) for value in (array.astype(str) if array.dtype.kind == "M" else array).tolist()]
+            cells = array.astype(str) if array.dtype.kind == "M" else array
+            table.texts[key] = [str(value) for value in cells.tolist()]
         if key in numbers:
             table.columns[key] = _cast(table, key, array)
     return table
