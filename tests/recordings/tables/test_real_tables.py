@@ -115,7 +115,8 @@ def test_the_helix_arm(tmp_path):
     rows = np.loadtxt(source / "poses.csv", delimiter=",", skiprows=1)[: len(raw.time)]
     np.testing.assert_allclose(raw.positions[:, -1], rows[:, 19:22])
     ticks = np.load(source / "commands.npz")["act_list"][: len(raw.time)].reshape(-1, 9)
-    np.testing.assert_allclose(raw.commands[: len(raw.time)], ticks * 2 * np.pi / 4096 * 0.01, atol=1e-9)
+    last = np.searchsorted(raw.command_time, raw.time + 1e-6, side="right") - 1  # commands hold until the next
+    np.testing.assert_allclose(raw.commands[last], ticks * 2 * np.pi / 4096 * 0.01, atol=1e-9)
 
 
 @with_recordings

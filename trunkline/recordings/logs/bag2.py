@@ -62,9 +62,9 @@ def recordings_in(folder: Path) -> list[Path]:
     it is a bag, goes by its metadata.yaml. Folders that are sessions themselves are left out."""
     inside = [sub for sub in sorted(folder.glob("[!.]*/")) if not (sub / "session.yaml").is_file()]
     bags = [sub for sub in inside if bag_folder(sub)]
-    own = [folder / METADATA] if bag_folder(folder) else _files_in(folder)
+    direct = [folder / METADATA] if bag_folder(folder) else _files_in(folder)
     deeper = [file for sub in inside if sub not in bags for file in _files_in(sub) if not file.name.startswith(".")]
-    return own + sorted([*bags, *deeper])
+    return direct + sorted([*bags, *deeper])
 
 
 def bag_with(file: Path) -> Path | None:
