@@ -11,6 +11,7 @@ from trunkline.recordings.session.session import Session
 from trunkline.recordings.signals.units import METRES_PER
 from trunkline.recordings.tables.guess import guess
 from trunkline.recordings.tables.source import TableReader
+from trunkline.recordings.trials.splits import IDENTIFY
 
 
 def survey_table(path: Path) -> list[LogSurvey]:
@@ -23,7 +24,7 @@ def survey_table(path: Path) -> list[LogSurvey]:
     text = "\n".join(guessed.tables)
     labels = guessed.labels or [None]
     entries = [
-        {"name": str(number), "file": path.name, "label": label, "experiment": "motion", "split": "identify"}
+        {"name": str(number), "file": path.name, "label": label, "experiment": "motion", "split": IDENTIFY}
         for number, label in enumerate(labels)
     ]
     content = {"frame": {"up": [0, 0, 1]}, "base": {"position": [0, 0, 0]}, "tables": yaml.safe_load(text)}
