@@ -54,7 +54,8 @@ class ModelChoice:
         """Those of a stage."""
         config = committed(stage)
         if self.loss:
-            config = replace(config, loss=Loss(**read_yaml(PROJECT / f"conf/shared/loss/{self.loss}.yaml")))
+            numbers = read_yaml(PROJECT / f"conf/shared/loss/{self.loss}.yaml")
+            config = replace(config, loss=Loss(**{str(key): value for key, value in numbers.items()}))
         if self.stage in ("", stage):
             config = replace(config, parameters=config.parameters | self.parameters, **self.changes)
         return config
