@@ -53,10 +53,10 @@ def declined_line(grasps: Iterable[Result]) -> str:
     declined = [seed for (variant, seed), row in rows.items() if not variant and row.plans > 1]
     if not declined:
         return "No first plan of a grasp was declined."
-    held, _, low, high = share_of([rows[CONFIRMED, seed].success for seed in declined])
+    successes, _, low, high = share_of([rows[CONFIRMED, seed].success for seed in declined])
     return (
         f"First plans of grasps that the operator declined: {len(declined)}; confirmed nevertheless, "
-        f"{held} of them succeeded ({100 * low:.0f} to {100 * high:.0f} %)."
+        f"{successes} of them succeeded ({100 * low:.0f} to {100 * high:.0f} %)."
     )
 
 
