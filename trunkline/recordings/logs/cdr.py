@@ -3,7 +3,7 @@
 Where a number lies in a CDR message depends only on the lengths and strings before it, so messages that
 agree in those bytes share a layout. It is worked out once, and their numbers are then read by slicing. That is what
 this module earns: many times the poses per second of the decoders in `mcap_ros2` and `rosbags`, from a log to the same
-arrays (`python -m benchmarks.decode`; docs/speed.md).
+arrays (docs/measurements/speed.md).
 """
 
 import re

@@ -2,8 +2,8 @@
 
 The `mcap` library gives up at the first record that it cannot read. Here the next one is looked for where the damaged
 one's length says that it begins, a last chunk that was cut off is read as far as it goes, and a chunk takes no more
-memory than it says. `python -m benchmarks.decode` puts both side by side (docs/speed.md): how many messages are found
-in copies of a log with a wrong byte in the head of a chunk, and in copies that are cut off, and how long it takes.
+memory than it says. docs/measurements/speed.md has both side by side: how many messages come out of copies of a log
+with a wrong byte in the head of a chunk, and of copies that are cut off, and how long it takes.
 """
 
 import hashlib
