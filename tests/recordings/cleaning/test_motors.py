@@ -80,6 +80,29 @@ def test_motors_without_stamps_are_dated_by_the_recorder(tmp_path, clock):
     assert len(repairs) == (0 if clock == "log" else 2)
 
 
+@pytest.mark.parametrize(("rate", "words"), [(1.05, "faster"), (0.95, "slower")])
+def test_motors_of_a_clock_of_another_rate_are_refused(tmp_path, rate, words):
+    def drift(m):
+        for stamps in (m.command_stamps, m.tendon_stamps):
+            stamps[:] = stamps[0] + np.round(rate * (stamps - stamps[0]))
+
+    curl(tmp_path, drift)
+    refused_curl(tmp_path, rf"/tendon_commands: command stamps run (4.9|5).* % {words} than the stamps of the poses")
+    edit_session(tmp_path, "clock: frame", "clock: log")
+    raw, _ = taken(tmp_path)[0]
+    assert not isinstance(raw, InputError), "as the message says"
+
+
+def test_motors_of_a_clock_that_is_off_by_what_quartzes_are_pass(tmp_path):
+    def drift(m):
+        for stamps in (m.command_stamps, m.tendon_stamps):
+            stamps[:] = stamps[0] + np.round((1 + 2e-4) * (stamps - stamps[0]))
+
+    raw, findings = curl(tmp_path, drift)
+    assert not isinstance(raw, InputError)
+    assert not any("stamps" in line for line in findings.warnings)
+
+
 def test_tendons_take_the_names_of_the_session(tmp_path):
     def rename(m):
         return replace(m, tendons=("motor_1", "motor_2", "motor_3"))

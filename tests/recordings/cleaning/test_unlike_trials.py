@@ -151,6 +151,22 @@ def test_commands_that_begin_after_the_motion_are_said(tmp_path):
         assert begin is None or f"comes {begin}" in lines[0]
 
 
+def test_positions_that_stand_for_commands_and_begin_after_the_motion_are_said(tmp_path):
+    def late(m):
+        first = len(m.tendon_positions) // 3
+        some = {key: getattr(m, key)[first:] for key in ("tendon_positions", "tendon_stamps", "tendon_logged")}
+        none = {key: getattr(m, key)[:0] for key in ("commands", "command_stamps", "command_logged")}
+        return replace(m, **some, **none)
+
+    one_trial(tmp_path, late, motion_truth())
+    path = tmp_path / "session.yaml"
+    path.write_text(path.read_text().replace("commands: /tendon_commands, ", ""))
+    warnings = [line for record in checked(tmp_path).findings for line in record.warnings]
+    (line,) = [line for line in warnings if "the first comes" in line]
+    assert line.startswith("tendon positions: the first comes 1.")
+    assert "no log tells what was wound before: expected one from before the motion" in line
+
+
 def test_bodies_that_each_arrive_late_by_themselves_make_whole_frames():
     rng, frames, bodies = np.random.default_rng(0), 120, 5
     arrived = np.arange(frames)[:, None] * 20_000_000 + rng.exponential(6e6, (frames, bodies)).astype(np.int64)

@@ -171,6 +171,21 @@ def test_rounded_and_constant_positions_are_not_frozen():
     assert not stale_samples(noise).any()
 
 
+@pytest.mark.parametrize("resolution", [1e-4, 5e-4])
+def test_stale_poses_of_a_rounded_log_are_those_of_a_body_beyond_others_that_move(resolution):
+    time = np.arange(400) / 100
+    swing = np.where(time < 2, np.sin(2 * np.pi * time), 0.0)[:, None, None]  # and at rest for 2 s
+    sizes = np.array([0.0, 0.02, 0.05, 0.1])[:, None]
+    noise = np.random.default_rng(0).normal(scale=2e-5, size=(400, 4, 3))
+    rounded = resolution * np.round((swing * sizes * [1, 0.5, 0.2] + noise) / resolution)
+    rounded[300, 1] += 0.04  # an outlier, while others rest
+    assert not stale_samples(rounded).any()
+    rounded[61:90, 3] = rounded[60, 3]
+    expected = np.zeros((400, 4), bool)
+    expected[61:90, 3] = True
+    np.testing.assert_array_equal(stale_samples(rounded), expected)
+
+
 @pytest.mark.parametrize(("factor", "declared", "taken_as"), [(1000.0, "m", "mm"), (1.0, "mm", "m")])
 def test_wrong_unit_is_recognised(tmp_path, right, factor, declared, taken_as):
     def scale(m):

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from mcap.writer import Writer
+from scipy.spatial.transform import Rotation
 
 from tests.recordings.logs.test_schemas import CASES, write
 from tests.support.sessions import (
@@ -121,6 +122,32 @@ def test_up_is_where_arms_sag_from_and_levels_are_left_open_where_none_does(tmp_
     (tmp_path / "stiff/session.yaml").write_text(proposed)
     with pytest.raises(InputError, match="level: missing, expected the nominal level of a static_tilt"):
         read_session(tmp_path / "stiff")
+
+
+@pytest.mark.parametrize("factor", [1e3, 50.0, 0.0])
+def test_a_level_that_is_no_pull_of_the_arm_is_left_open(tmp_path, capsys, factor):
+    """As of motors that count mm, degrees or rad."""
+    truth = curl_truth(20.0)
+    strange = replace(truth, commands=factor * truth.commands, tendon_positions=factor * truth.tendon_positions)
+    record(tmp_path, [strange, static_truth(0.0)], instruments(tendon_noise_mm=0.0))
+    proposed = inspect(capsys, tmp_path)[1]
+    (line,) = [line for line in proposed.splitlines() if "curl_20.mcap" in line]
+    assert "experiment: curl, split" in line
+    assert "# Add the `level` of each curl that has none, in mm: what its log holds is no pull of this arm" in proposed
+
+
+def test_a_tilt_by_a_base_whose_axes_are_not_the_arms_is_left_open(tmp_path, capsys):
+    turn = Rotation.from_euler("y", 90, degrees=True)
+    truths = []
+    for tilt in (0.0, 30.0, 60.0):
+        truth = static_truth(tilt)
+        base = Rotation.from_quat(truth.base_quaternion, scalar_first=True) * turn
+        truths.append(replace(truth, base_quaternion=base.as_quat(scalar_first=True)))
+    record(tmp_path, truths, instruments())
+    proposed = inspect(capsys, tmp_path)[1]
+    assert "up: [0, 1, 0]" in proposed
+    assert "level: " not in proposed
+    assert "no log tells it without a base whose z axis is back along the arm" in proposed
 
 
 def test_logs_one_folder_down_are_found(tmp_path, capsys):

@@ -37,7 +37,7 @@ def check_gravity_direction(
         by_others = up is not None
         remark = by_all if by_others or not identifying else remark
     if up is not None and not possible_axes(raw_trials, measured_base)[np.argmax(AXES @ up)]:
-        contradiction = f"levels would fit {_show(up)}, along which released arms do not hang"
+        contradiction = f"levels would fit {show_axis(up)}, along which released arms do not hang"
         return None, f"up: {contradiction}: check `frame.up`, `base` and the levels in session.yaml", False
     return up, remark if remark is not None else _check_hanging(raw_trials), by_others
 
@@ -51,10 +51,10 @@ def _by_tilts(static: list[RawTrial]) -> tuple[np.ndarray | None, str | None]:
         return None, None
     misfits = np.array([_misfit(z, axis, levels) for axis in AXES])
     best, second = np.argsort(misfits)[:2]
-    difference = f"{np.degrees(off):.0f}° off their levels with {_show(up)}"
+    difference = f"{np.degrees(off):.0f}° off their levels with {show_axis(up)}"
     problem = f"up: the tilts of {len(static)} static trials are {difference}"
     if misfits[best] < FITS and misfits[second] > OFF and np.ptp(np.degrees(levels)) >= SPREAD:
-        return AXES[best], f"{problem}, {np.degrees(misfits[best]):.1f}° with {_show(AXES[best])}, which was taken"
+        return AXES[best], f"{problem}, {np.degrees(misfits[best]):.1f}° with {show_axis(AXES[best])}, which was taken"
     return None, f"{problem}, and no other axis fits: check the levels, `frame.up` and `base` in session.yaml"
 
 
@@ -108,8 +108,9 @@ def _check_hanging(raw_trials: list[RawTrial]) -> str | None:
     best = int(np.argmin(others))
     if angle < LIES or others[best] > HANGS:
         return None
-    problem = f"released arms come to rest {np.degrees(angle):.0f}° from hanging with {_show(up)}"
-    return f"up: {problem}, {np.degrees(others[best]):.0f}° with {_show(AXES[best])}: check `frame.up` in session.yaml"
+    problem = f"released arms come to rest {np.degrees(angle):.0f}° from hanging with {show_axis(up)}"
+    other = f"{np.degrees(others[best]):.0f}° with {show_axis(AXES[best])}"
+    return f"up: {problem}, {other}: check `frame.up` in session.yaml"
 
 
 def _from_hanging(down: np.ndarray, up: np.ndarray) -> float:
@@ -125,5 +126,6 @@ def _hang(raw: RawTrial) -> np.ndarray:
     return middle[np.argmax(distance)] / max(distance.max(), 1e-12)
 
 
-def _show(axis: np.ndarray) -> str:
+def show_axis(axis: np.ndarray) -> str:
+    """As session.yaml has it."""
     return "[" + ", ".join(f"{value:g}" for value in np.round(axis, 3) + 0.0) + "]"

@@ -6,11 +6,13 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.recordings.cleaning.checks import Findings, TrialLimits, in_order
+from trunkline.recordings.cleaning.clocks import CERTAIN
 from trunkline.recordings.cleaning.trial_window import Stretch
 from trunkline.recordings.logs.joint_stream import JointStream
 from trunkline.recordings.logs.messages import JOINTS
 from trunkline.recordings.session.session import MotorEntry, Session
 from trunkline.recordings.session.source import LogSource
+from trunkline.recordings.signals.clock import fit_frames
 from trunkline.recordings.signals.held import OFTEN, to_and_fro, with_corners
 from trunkline.recordings.signals.steps import find_step
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_held
@@ -19,6 +21,8 @@ Series = tuple[np.ndarray, np.ndarray]  # times (T,) s and numbers (T, K)
 ROLES = ("command", "tendon position")
 NEAR_TURN = 0.2  # turns, by which an encoder that is whole turns off its command may differ from that
 NO_WORD = 1.0  # s before an arm at rest, from which on it is said that the last command holds
+RATE = 0.002  # by which the clocks of motors and poses may differ in rate; quartzes do by 100 times less
+FEWEST = 10  # messages that tell a rate
 HISTORY = 60.0  # s before an arm at rest under its motors in which its last motion is looked for
 
 
@@ -41,7 +45,8 @@ def read_motors(
     those that brought it there.
 
     Raises:
-        InputError: the tendons of a topic are not those of session.yaml, or of the other topic.
+        InputError: the tendons of a topic are not those of session.yaml, or of the other topic; or commands are those
+            of two publishers, or by a clock of another rate than that of the poses.
     """
     streams = [source.commands, source.tendon_positions]
     tendons = _tendons([stream.names for stream in streams if stream is not None])
@@ -61,7 +66,9 @@ def read_motors(
         findings.repairs += stream.notes
         stamps = dated(stream, recorder, stretch)
         if not recorder:
-            _check_step(stream, role, findings)
+            stepped = _check_step(stream, role, findings)
+            if not stepped and EXPERIMENTS[experiment].needs_motors and not EXPERIMENTS[experiment].static:
+                _check_rate(stream, role, where, findings)
         elif session.clock != "log":
             findings.repairs.append(f"{role} messages dated by the recorder's clock, as not all have stamps")
         rows = in_order(stamps, limits.disorder, f"{where}: {role} topic", findings, at_once=True)
@@ -223,14 +230,30 @@ def _unwrapped(
     return counts
 
 
-def _check_step(stream: JointStream, role: str, findings: Findings) -> None:
-    """Warn where the clock of a stream's messages jumps against the recorder's."""
+def _check_step(stream: JointStream, role: str, findings: Findings) -> bool:
+    """Warn where the clock of a stream's messages jumps against the recorder's; returned: whether it does."""
     stamps, logged = (1e-9 * (some - some[0]) for some in (stream.stamps, stream.log_times))
     step = find_step(logged, stamps) if np.ptp(logged) and np.ptp(stamps) else None
     if step is not None:
         place = f"at message {step.at}, after {stamps[step.at - 1]:.2f} s, against log times"
         remedy = "expected a clock that runs evenly, such as `clock: log` in session.yaml"
         findings.warnings.append(f"{role} stamps jump by {-step.size:+.3f} s {place}: {remedy}")
+    return step is not None
+
+
+def _check_rate(stream: JointStream, role: str, where: str, findings: Findings) -> None:
+    """Refuse stamps of a clock that is faster or slower than that of the poses, by what one recorder had of both: then
+    no offset dates the motors."""
+    poses, logged = findings.logged, 1e-9 * (stream.log_times - stream.log_times[0])
+    if poses is None or len(logged) < FEWEST or not np.ptp(logged) or not np.ptp(stream.stamps):
+        return
+    fit = fit_frames(stream.stamps, logged)
+    off = poses.rate / fit.rate - 1
+    if abs(off) <= max(RATE, CERTAIN * max(fit.jitter, poses.jitter) / np.ptp(logged)):
+        return
+    rates = f"{100 * abs(off):.3g} % {'faster' if off > 0 else 'slower'} than the stamps of the poses, by log times"
+    remedy = "expected clocks of one rate: `clock: log` in session.yaml dates both by log times"
+    raise InputError(f"{where}: {stream.topic}: {role} stamps run {rates}, {remedy}")
 
 
 def _one_publisher(seconds: np.ndarray, pulls: np.ndarray, where: str, findings: Findings) -> None:

@@ -91,14 +91,17 @@ def _pulled(raw: RawTrial, static: bool, idle: float, zeros: dict[str, float]) -
 
 
 def late_commands(raw: RawTrial) -> list[str]:
-    """That the commands of an arm in motion begin after its poses, by the motors' clock as it is set; else none."""
-    if EXPERIMENTS[raw.experiment].static or not EXPERIMENTS[raw.experiment].needs_motors or len(raw.command_time) < 2:
+    """That the commands of an arm in motion begin after its poses, by the motors' clock as it is set, or what is
+    measured in place of commands; else none."""
+    key, time = ("commands", raw.command_time) if len(raw.command_time) else ("tendon positions", raw.tendon_time)
+    if EXPERIMENTS[raw.experiment].static or not EXPERIMENTS[raw.experiment].needs_motors or not len(time):
         return []
-    begin = float(raw.command_time[0]) + raw.clock_offset
+    begin = float(time[0]) + raw.clock_offset
     if begin <= LATE:
         return []
-    problem = f"the first comes {begin:.2f} s after the first pose, and no log tells what was sent before"
-    return [f"commands: {problem}: expected one from before the motion, or a `window` from then on"]
+    before = "sent" if key == "commands" else "wound"
+    problem = f"the first comes {begin:.2f} s after the first pose, and no log tells what was {before} before"
+    return [f"{key}: {problem}: expected one from before the motion, or a `window` from then on"]
 
 
 def _fixed_commands(raw: RawTrial) -> list[str]:

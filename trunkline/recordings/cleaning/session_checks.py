@@ -9,6 +9,7 @@ from trunkline.recordings.cleaning.checks import Findings
 from trunkline.recordings.cleaning.clock_offset import MotorClock, align_clocks, set_gravity_direction
 from trunkline.recordings.cleaning.described_arm import Places
 from trunkline.recordings.cleaning.pulls import late_commands
+from trunkline.recordings.cleaning.resting_shapes import check_resting_shapes
 from trunkline.recordings.cleaning.sanity_checks import SanityLimits, check_sanity
 from trunkline.recordings.session.session import FixedBase, Session, TrialEntry
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_stepwise
@@ -88,6 +89,8 @@ def check_session(
     gathered.clock = align_clocks(gathered.raw_trials, gathered.findings, plausible.clock)
     for raw, record in zip(gathered.raw_trials, gathered.findings, strict=True):
         record.warnings += late_commands(raw)
+    if arm:
+        check_resting_shapes(gathered.raw_trials, gathered.findings, arm, base)
     return gathered
 
 

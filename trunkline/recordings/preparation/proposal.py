@@ -10,7 +10,15 @@ from trunkline.recordings.logs.bag2 import recording_name
 from trunkline.recordings.logs.joint_stream import JointStream
 from trunkline.recordings.logs.pose_stream import PoseStream
 from trunkline.recordings.preparation.survey import LogSurvey
-from trunkline.recordings.preparation.vertical import Axis, at_rest, nearest_axis, pulled, up_by_hanging, up_by_sags
+from trunkline.recordings.preparation.vertical import (
+    ALONG,
+    Axis,
+    at_rest,
+    nearest_axis,
+    pulled,
+    up_by_hanging,
+    up_by_sags,
+)
 from trunkline.recordings.signals.clock import MIN_TRAVEL
 from trunkline.recordings.signals.units import METRES_PER, likely_unit, other_units
 from trunkline.recordings.trials.experiments import EXPERIMENTS, PULL, TILT
@@ -89,7 +97,12 @@ def propose(surveys: list[LogSurvey], ups: tuple[Axis, ...] = (), folder: Path |
             f"  - {{file: {_quoted(file.as_posix())}{name_text}, experiment: {experiment}{level_text}, split: {split}}}"
         )
     if any(level is None and EXPERIMENTS[experiment].level is TILT for experiment, level in trials):
-        lines.append("# Add the `level` that you set of each static_tilt, in degrees: no log tells it without `up`.")
+        lacks = "`up`" if by_sags is None else "a base whose z axis is back along the arm"
+        why = f"no log tells it without {lacks}"
+        lines.append(f"# Add the `level` that you set of each static_tilt, in degrees: {why}.")
+    if any(level is None and EXPERIMENTS[experiment].level is PULL for experiment, level in trials):
+        why = "what its log holds is no pull of this arm in m"
+        lines.append(f"# Add the `level` of each curl that has none, in mm: {why}; `motors` says what motors count.")
     return "\n".join(lines) + "\n"
 
 
@@ -160,10 +173,13 @@ def _experiment(
         experiment = next(name for name, kind in EXPERIMENTS.items() if (kind.needs_motors, kind.static) == signs)
     level = EXPERIMENTS[experiment].level
     if level is PULL:
-        return experiment, f"{round(1e3 * _drawn_in(survey.commands, survey.tendon_positions)):g}"
+        drawn = round(1e3 * _drawn_in(survey.commands, survey.tendon_positions))
+        return experiment, f"{drawn:g}" if 0 < drawn <= 1e3 * _longest(poses, scale) else None
     if level is not TILT:
         return experiment, None
-    return experiment, None if up is None else f"{_tilt(poses, base, np.array(up)):g}"
+    arm = at_rest(survey, base)
+    askew = arm is not None and arm.base is not None and -arm.first @ arm.base[:, 2] < ALONG
+    return experiment, None if up is None or askew else f"{_tilt(poses, base, np.array(up)):g}"
 
 
 def _drawn_in(commands: JointStream | None, measured: JointStream | None) -> float:
@@ -176,6 +192,13 @@ def _drawn_in(commands: JointStream | None, measured: JointStream | None) -> flo
     if stream is commands:
         highest = min(highest, float(np.nanmax(pulls)))
     return highest if highest > 0 else _largest_travel(pulls)
+
+
+def _longest(poses: PoseStream, scale: float) -> float:
+    """The largest usual distance between two bodies, m, by which no tendon is drawn in; of one body no limit."""
+    places = np.nanmedian(poses.positions, axis=0)
+    apart = np.nanmax(np.linalg.norm(places[:, None] - places, axis=-1)) * scale
+    return float(apart) if apart > 0 else np.inf
 
 
 def _largest_travel(positions: np.ndarray) -> float:

@@ -26,6 +26,7 @@ from trunkline.program import add_settings, command_parser
 from trunkline.recordings.trials.inventory import missing_lines, recorded_of_each
 from trunkline.recordings.trials.splits import DECIDING, IDENTIFY
 from trunkline.settings import read_yaml
+from trunkline.tools.check.sides import side_lines
 from trunkline.tools.check.up_axis import other_ups, up_lines
 from trunkline.tools.evaluate.session import read_trials_of
 
@@ -51,6 +52,8 @@ def main(arguments: list[str] | None = None) -> int:
     print("\n".join(["recorded:", *(f"  {line}" for line in recorded_of_each(trials))]))
     if missing := missing_lines(trials):
         print("\n".join(["missing:", *(f"  {line}" for line in missing)]))
+    if lines := side_lines([trial for trial in trials if trial.split in DECIDING], model):
+        print("\n".join(lines))
     ups = other_ups(raw_trials)
     for stage, config in configs.items():
         check_parameters(stage, config, model)
