@@ -30,12 +30,12 @@ def askew(truth, axis, degrees):
     return replace(truth, base_quaternion=wxyz_from_rotation(turn))
 
 
-@pytest.mark.parametrize(("axis", "degrees", "said"), [("x", 15, True), ("y", -15, True), ("x", 4, False)])
-def test_a_base_askew_to_the_arm_is_said(tmp_path, axis, degrees, said):
+@pytest.mark.parametrize(("axis", "degrees", "doubtful"), [("x", 15, True), ("y", -15, True), ("x", 4, False)])
+def test_a_base_askew_to_the_arm_is_said(tmp_path, axis, degrees, doubtful):
     lines = warned(tmp_path, [askew(truth, axis, degrees) for truth in TILTED])
     expected = "base: in the axes of 'base' the arm rests "
     assert {name: [line.startswith(expected) for line in some] for name, some in lines.items()} == {
-        truth.name: [True] * said for truth in TILTED
+        truth.name: [True] * doubtful for truth in TILTED
     }
 
 

@@ -35,8 +35,8 @@ def test_an_honest_session_has_nothing_said(model, pulled):
 @pytest.mark.parametrize("degrees", [30, -25])
 def test_a_base_that_is_turned_about_the_arm_is_said(model, pulled, degrees):
     (line,) = side_lines([turned(trial, degrees) for trial in pulled], model)
-    told = float(line.partition("turned by ")[2].partition("°")[0])
-    assert told == pytest.approx(degrees, abs=4)
+    angle = float(line.partition("turned by ")[2].partition("°")[0])
+    assert angle == pytest.approx(degrees, abs=4)
     assert "in the median of 4 trials: are x and y of the base body those of the arm's description?" in line
 
 

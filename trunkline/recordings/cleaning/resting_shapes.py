@@ -38,7 +38,7 @@ def check_resting_shapes(raw_trials: list[RawTrial], findings: list[Findings], a
         others = {
             name: other
             for name, shape in left.items()
-            if (fit := _sags([left[one] for one in chosen if one in left and one != name])) is not None
+            if (fit := _sags([left[some] for some in chosen if some in left and some != name])) is not None
             and (other := _other_vertical(shape, *fit)) is not None
         }
         if not others:

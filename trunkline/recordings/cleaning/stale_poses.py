@@ -40,8 +40,8 @@ def stale_samples(positions: np.ndarray) -> np.ndarray:
 
 def _travel(positions: np.ndarray) -> np.ndarray:
     """Lengths (B,) of the diagonals of what bodies (T, B, 3) m go through, 0 of one that is never seen."""
-    seen = np.isfinite(positions)
-    low, high = np.where(seen, positions, np.inf).min(axis=0), np.where(seen, positions, -np.inf).max(axis=0)
+    visible = np.isfinite(positions)
+    low, high = np.where(visible, positions, np.inf).min(axis=0), np.where(visible, positions, -np.inf).max(axis=0)
     return np.linalg.norm(np.where(high > low, high - low, 0.0), axis=-1)
 
 

@@ -55,20 +55,20 @@ def tendon_sides(model: mujoco.MjModel) -> dict[str, complex]:
 def _turn(trial: Trial, sides: dict[str, complex], places: dict[str, np.ndarray]) -> float | None:
     """The angle, rad, from the side that a trial's tendons are to bend it to, to where it is; None where none tells."""
     kind = EXPERIMENTS[trial.experiment]
-    held = kind.needs_motors and (kind.static or kind.level is PULL) and not kind.stepwise
-    if not held or not trial.tendons or not trial.markers or tilt_of_gravity(trial.gravity) > UPRIGHT:
+    at_level = kind.needs_motors and (kind.static or kind.level is PULL) and not kind.stepwise
+    if not at_level or not trial.tendons or not trial.markers or tilt_of_gravity(trial.gravity) > UPRIGHT:
         return None
     pulls = np.maximum(trial.commands, 0)
     deepest = pulls.max(axis=1)
     frames = deepest >= DEEP * deepest.max()
     farthest = max(trial.markers, key=lambda name: float(np.linalg.norm(places[name])))
-    seen = frames & trial.measured[:, trial.markers.index(farthest)]
-    if not deepest.max() > 0 or not seen.any():
+    visible = frames & trial.measured[:, trial.markers.index(farthest)]
+    if not deepest.max() > 0 or not visible.any():
         return None
     pull = pulls[frames].mean(axis=0)
     directions = np.array([sides[name] for name in trial.tendons])
     side = complex(pull @ directions)
-    aside = np.median(trial.positions[seen, trial.markers.index(farthest)], axis=0) - places[farthest]
+    aside = np.median(trial.positions[visible, trial.markers.index(farthest)], axis=0) - places[farthest]
     length = float(np.linalg.norm(places[farthest]))
     if abs(side) < TOWARDS_ONE * pull @ np.abs(directions) or np.hypot(*aside[:2]) < BENT * length or not abs(side):
         return None
