@@ -165,6 +165,20 @@ def test_a_part_of_which_nothing_is_readable_and_one_that_is_not_named(tmp_path)
         read_recording(tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("files", "storage", "line"),
+    [
+        (["a.db3"], "mcap", "found 'mcap' with a.db3, which is sqlite3, expected files of one storage"),
+        (["a.db3", "b.mcap"], "sqlite3", "found 'sqlite3' with b.mcap, which is mcap, expected files of one storage"),
+    ],
+)
+def test_files_of_two_storages_are_refused(tmp_path, files, storage, line):
+    database(tmp_path / "a.db3", [("/poses", 1, b"a")])
+    mcap(tmp_path / "b.mcap", [("/poses", 2, b"b")])
+    with pytest.raises(InputError, match=f"metadata.yaml: storage_identifier: {line}"):
+        read_recording(described(tmp_path, files, storage))
+
+
 @pytest.mark.parametrize("named", ["old_name/a.db3", "/home/lab/old_name/a.db3", "a.db3"])
 def test_names_with_the_folder_as_it_was(tmp_path, named):
     database(tmp_path / "a.db3", [("/poses", 1, b"a")])
@@ -191,6 +205,16 @@ def test_packed_files(tmp_path, ending, storage, frames):
     assert log.kind.startswith("rosbag2: ")
     assert log.kind.endswith(", the file compressed, without a metadata.yaml")
     assert recordings_in(tmp_path) == [file, tmp_path / f"plain/a.{storage}"]
+
+
+def test_a_packed_file_that_is_cut_off_gives_the_frames_that_it_has(tmp_path):
+    plain = mcap(tmp_path / "a.mcap", [("/poses", time, bytes([time])) for time in range(100)]).read_bytes()
+    pack, half = zstandard.ZstdCompressor().compress, len(plain) // 2
+    file = tmp_path / "a.mcap.zstd"
+    file.write_bytes(pack(plain[:half]) + pack(plain[half:])[:-5])
+    log = read_recording(file)
+    assert log.damage == [f"cut off: unpacked to {half} bytes", f"cut off at byte {half}"]
+    assert log.count == 100  # what is lost is behind them
 
 
 def test_a_small_file_that_unpacks_to_too_much_is_refused(tmp_path):
@@ -245,16 +269,12 @@ def test_a_transaction_that_was_not_ended_did_not_happen(tmp_path, mode, beside,
     assert {path: path.read_bytes() for path in file.parent.iterdir()} == before
 
 
-def test_nothing_is_written_beside_a_file_that_says_it_has_a_log(tmp_path):
-    """Its log is lost: opened to be written, SQLite would make another."""
+def test_a_file_is_read_as_one_that_nobody_changes(tmp_path):
+    """SQLite asks for no lock, which it would have to write."""
     file = database(tmp_path / "a.db3", [("/poses", 1, b"a")])
-    with closing(sqlite3.connect(file)) as opened:
-        opened.execute("PRAGMA journal_mode=WAL")
-    before = file.read_bytes()
-    file.chmod(0o444)
-    assert messages(read_recording(file)) == [(1, b"a")]
-    assert list(tmp_path.iterdir()) == [file]
-    assert file.read_bytes() == before
+    with closing(sqlite3.connect(file, isolation_level=None)) as recorder:
+        recorder.execute("BEGIN EXCLUSIVE")
+        assert messages(read_recording(file)) == [(1, b"a")]
 
 
 # damage
@@ -279,6 +299,19 @@ def test_what_lies_behind_a_damaged_page_comes_in_its_order(tmp_path):
     assert set(range(60)) - set(numbers) <= set(range(27, 33))
     assert 30 not in numbers
     assert log.damage == [f"database disk image is malformed: {len(numbers)} messages before and behind it are read"]
+
+
+class Torn:
+    """A database whose rows are out of order from the fourth on, and from the other end from the second on."""
+
+    def execute(self, query: str) -> list:
+        return [(1, "a"), (2, "b"), (5, "e"), (3, "c")] if query.endswith("ASC") else [(9, "i"), (10, "j")]
+
+
+def test_rows_of_a_torn_table_are_those_before_they_leave_their_order():
+    rows, problem = bag2._rows(Torn(), "SELECT")
+    assert rows == [("a",), ("b",), ("e",), ("i",)]
+    assert problem == "rows out of order"
 
 
 @pytest.mark.parametrize("size", [512, 4096, 65536])

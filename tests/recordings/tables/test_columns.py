@@ -156,12 +156,22 @@ def test_labels_go_without_the_blanks_beside_them(tmp_path):
 def test_times_and_what_is_missing_in_parquet(tmp_path):
     stamps = np.array(["2026-03-14T14:15:33.120", "NaT"], "datetime64[ns]")
     pose = pa.FixedSizeListArray.from_arrays(pa.array([1.0, 2.0, 3.0, 4.0]), 2)
-    table = pa.table({"t": stamps, "n": pa.array([7, None]), "text": ["5", "n/a"], "pose": pose, "first": pose[:1].take(
-        pa.array([0, None]))})  # fmt: skip
+    columns = {"t": stamps, "n": pa.array([7, None]), "text": ["5", "n/a"], "word": ["5", None], "pose": pose}
+    table = pa.table(columns | {"first": pose[:1].take(pa.array([0, None]))})
     pq.write_table(table, tmp_path / "a.parquet")
-    keys = ["t", "n", "text", "pose[1]", "pose[2]", "first[1]", "first[2]", 4]
+    keys = ["t", "n", "text", "word", "pose[1]", "pose[2]", "first[1]", "first[2]", 5]
     result = read_table(tmp_path / "a.parquet", TextForm(), keys, ["t"])
-    right = [[1773497733.12, np.nan], [7, np.nan], [5, np.nan], [1, 3], [2, 4], [1, np.nan], [2, np.nan], [1, 3]]
+    right = [
+        [1773497733.12, np.nan],
+        [7, np.nan],
+        [5, np.nan],
+        [5, np.nan],
+        [1, 3],
+        [2, 4],
+        [1, np.nan],
+        [2, np.nan],
+        [1, 3],
+    ]
     for key, values in zip(keys, right, strict=True):
         np.testing.assert_allclose(result.columns[key], values, rtol=1e-15, err_msg=str(key))
     assert result.texts["t"][0].startswith("2026-03-14T14:15:33.12")
@@ -183,6 +193,7 @@ ARRAYS = {
         {"act": np.arange(30).reshape(5, 2, 3)}, {"act[1,1]": 6 * ROW, "act[2,3]": 6 * ROW + 5}, ["act[0,0]"]),
     "whole numbers": ({"t": np.arange(5), "on": ROW > 2}, {"t": ROW, "on": [0, 0, 0, 1, 1]}, []),
     "one number": ({"t": ROW, "rate": np.array(100.0)}, {"t": ROW}, ["rate"]),
+    "empty ones": ({"t": ROW, "a": np.zeros((0, 0)), "b": np.zeros(0)}, {"t": ROW}, ["a", "b"]),
     "text beside": ({"t": ROW, "who": np.array("me")}, {"t": ROW}, ["who"]),
 }  # fmt: skip
 
@@ -204,6 +215,11 @@ def test_a_structure_in_a_structure_of_matlab(tmp_path):
     names, _ = array_columns(tmp_path / "a.mat")
     assert names == ["run.time", "run.mocap.tip[1]", "run.mocap.tip[2]"]
     np.testing.assert_array_equal(read_table(tmp_path / "a.mat", TextForm(), [3], []).columns[3], -ROW)
+
+
+def test_objects_of_python_are_not_run(tmp_path):
+    np.savez(tmp_path / "a.npz", t=np.array([{"a": 1}, 2], dtype=object))
+    assert "allow_pickle=False" in refusal(tmp_path / "a.npz", ["t"])
 
 
 def test_only_what_is_wanted_has_to_be_numbers(tmp_path):
