@@ -7,7 +7,7 @@ import yaml
 
 from trunkline.errors import InputError
 from trunkline.recordings.preparation.table_survey import survey_table
-from trunkline.recordings.tables.guess import guess
+from trunkline.recordings.tables.guess import _yaml, guess
 
 COUNT = 40
 T = np.arange(COUNT) / 100
@@ -147,14 +147,18 @@ def test_gaps_are_in_all_three_places(tmp_path, axes, gaps):
     assert of_csv(tmp_path, {"time": numbers(T)} | columns).get("gaps") == gaps
 
 
-@pytest.mark.parametrize("name", ["y", "no", "on", "null", "true", "x [mm]", "#1", "a: b"])
-def test_names_are_texts_in_yaml(tmp_path, name):
-    """Some words are no text there."""
-    columns = {"time": numbers(T)} | dict(zip(("tip_x", "tip_y", "tip_z"), PLACES.values(), strict=True))
-    path = table(tmp_path / "a.csv", columns | {f"{name}_cmd": HALF})
-    assert list(block(path).get("commands", {"motor_1": f"{name}_cmd"}).values()) == [f"{name}_cmd"]
-    trials = ["a"] * 20 + ["b"] * 20
-    assert of_csv(tmp_path, {"time": numbers(T)} | PLACES | {"run": trials})["bodies"]["body"]["position"][1] == "y"
+@pytest.mark.parametrize(
+    "name", ["y", "N", "yes", "no", "On", "off", "true", "False", "null", "x [mm]", "#1", "a: b", "Ö"]
+)
+def test_names_are_texts_in_any_version_of_yaml(name):
+    """Some words are none there: in 1.1 y is true."""
+    assert yaml.safe_load(_yaml(name)) == name
+    assert _yaml(name) == f'"{name}"'
+
+
+@pytest.mark.parametrize("name", ["tip_x", "tip.x", "T1"])
+def test_other_names_go_without_quotes(name):
+    assert _yaml(name) == name
 
 
 # commands and measured positions by name, and their unit: (commands, tendon_positions), or None where it is not clear

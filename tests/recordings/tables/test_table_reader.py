@@ -363,6 +363,20 @@ def test_names_may_be_any_line_of_the_header():
         TableLayout(time={"rate": 1}, bodies=TIP, header=2, names=3)
 
 
+@pytest.mark.parametrize(
+    ("keys", "problem"),
+    [
+        ({"separator": ",", "decimal": ","}, "found ',' beside the separator ','"),
+        ({"bodies": {"tip": {"position": ["x", "y", "x"]}}}, "found the column 'x' twice"),
+        ({"bodies": {"tip": {"position": POSITION, "quaternion": [1, 2, 3, 1]}}, "quaternion": "wxyz"}, "1 twice"),
+        ({"bodies": {"tip": {"position": POSITION, "euler": ["a", "b"]}}}, "found 2 columns, expected 3"),
+    ],
+)
+def test_columns_and_commas_that_are_not_declared_so(keys, problem):
+    with pytest.raises(ValidationError, match=problem):
+        TableLayout.model_validate({"time": {"rate": 1}, "bodies": TIP} | keys)
+
+
 def test_dates_of_parquet(tmp_path):
     """As dates, or as numbers of s."""
     frame = pd.DataFrame(dict(zip(POSITION, [[1.0, 2.0]] * 3, strict=True)))
