@@ -156,7 +156,7 @@ def test_labels_go_without_the_blanks_beside_them(tmp_path):
 def test_times_and_what_is_missing_in_parquet(tmp_path):
     stamps = np.array(["2026-03-14T14:15:33.120", "NaT"], "datetime64[ns]")
     pose = pa.FixedSizeListArray.from_arrays(pa.array([1.0, 2.0, 3.0, 4.0]), 2)
-    columns = {"t": stamps, "n": pa.array([7, None]), "text": ["5", "n/a"], "word": ["5", None], "pose": pose}
+    columns = {"t": stamps, "n": pa.array([7, None]), "text": ["5", "n/a"], "word": ["n/a", None], "pose": pose}
     table = pa.table(columns | {"first": pose[:1].take(pa.array([0, None]))})
     pq.write_table(table, tmp_path / "a.parquet")
     keys = ["t", "n", "text", "word", "pose[1]", "pose[2]", "first[1]", "first[2]", 5]
