@@ -165,7 +165,7 @@ def test_times_and_what_is_missing_in_parquet(tmp_path):
         [1773497733.12, np.nan],
         [7, np.nan],
         [5, np.nan],
-        [5, np.nan],
+        [np.nan, np.nan],
         [1, 3],
         [2, 4],
         [1, np.nan],
