@@ -161,11 +161,11 @@ def test_angles_of_one(tmp_path, unit, right):
     np.testing.assert_allclose(turned(tmp_path, "1,0,0", euler), right, atol=1e-12)
 
 
-# gaps: rows of x, y, z, whether each is seen
+# gaps: rows of x, y, z, whether each is visible
 
 
 @pytest.mark.parametrize(
-    ("gaps", "cells", "seen"),
+    ("gaps", "cells", "visible"),
     [
         ([], "0,0,0", True),
         ([], "1,,3", False),
@@ -178,12 +178,12 @@ def test_angles_of_one(tmp_path, unit, right):
         ([0, -9999], "0,-1,0", True),
     ],
 )
-def test_gaps_of_bodies(tmp_path, gaps, cells, seen):
+def test_gaps_of_bodies(tmp_path, gaps, cells, visible):
     """What is no place has no orientation either."""
     tables = {"gaps": gaps, "bodies": {"tip": {"position": POSITION, "quaternion": list("abcd")}}, "quaternion": "wxyz"}
     poses = read(tmp_path, f"t,x,y,z,a,b,c,d\n0,1,1,1,1,0,0,0\n1,{cells},1,0,0,0\n", tables).poses
-    assert poses.present[:, 0].tolist() == [True, seen]
-    assert np.isfinite(poses.positions[1]).all() == np.isfinite(poses.quaternions[1]).all() == seen
+    assert poses.present[:, 0].tolist() == [True, visible]
+    assert np.isfinite(poses.positions[1]).all() == np.isfinite(poses.quaternions[1]).all() == visible
 
 
 def test_gaps_of_motors(tmp_path):
@@ -250,11 +250,11 @@ def test_trials_of_one_file(tmp_path):
     text = "run,x,y,z,u\n1.0,1,2,3,1\n1.0,1,2,4,2\nb,1,2,5,3\n02,1,2,6,4\n02,1,2,7,5\n1,1,2,8,6\n"
     trials = [{"file": "a.csv", "label": label} for label in (2, "b", 1)]
     tables = {"time": {"rate": 10}, "trial": "run", "commands": ["u"]}
-    two, b, one = sources(tmp_path, text, tables, trials)
-    assert [source.poses.positions[:, 0, 2].tolist() for source in (two, b, one)] == [[6, 7], [5], [3, 4, 8]]
-    assert [source.commands.positions[:, 0].tolist() for source in (two, b, one)] == [[4, 5], [3], [1, 2, 6]]
+    two, b, last = sources(tmp_path, text, tables, trials)
+    assert [source.poses.positions[:, 0, 2].tolist() for source in (two, b, last)] == [[6, 7], [5], [3, 4, 8]]
+    assert [source.commands.positions[:, 0].tolist() for source in (two, b, last)] == [[4, 5], [3], [1, 2, 6]]
     assert [source.poses.stamps.tolist() for source in (two, b)] == [[0, 100_000_000], [0]]
-    assert [source.log.count for source in (two, b, one)] == [2, 1, 3]
+    assert [source.log.count for source in (two, b, last)] == [2, 1, 3]
 
 
 def test_a_trial_without_a_label_goes_by_its_name(tmp_path):
