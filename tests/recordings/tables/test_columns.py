@@ -227,3 +227,35 @@ def test_only_what_is_wanted_has_to_be_numbers(tmp_path):
     assert read_table(tmp_path / "a.npz", TextForm(), ["t"], ["word"]).texts["word"] == list("abcde")
     line = refusal(tmp_path / "a.npz", ["t", "word"])
     assert re.fullmatch(r"row 1, column 'word': found 'a', expected a number", line), line
+
+
+def test_durations_are_seconds(tmp_path):
+    pq.write_table(pa.table({"t": np.array([0, 20, "NaT"], "timedelta64[ms]")}), tmp_path / "a.parquet")
+    values = read_table(tmp_path / "a.parquet", TextForm(), ["t"], []).columns["t"]
+    np.testing.assert_allclose(values, [0, 0.02, np.nan])
+
+
+def test_the_line_of_a_byte_of_another_encoding_far_down(tmp_path):
+    (tmp_path / "a.csv").write_bytes(b"t,x,note\n" + b"0,1,fine\n" * 20_000 + b"0,1,20 \xb0C\n" + b"0,1,fine\n" * 9)
+    assert refusal(tmp_path / "a.csv", [1]).startswith("line 20002: found bytes that are not utf-8")
+
+
+def test_objects_of_python_beside_what_is_read(tmp_path):
+    np.savez(tmp_path / "a.npz", t=ROW, meta=np.array({"rate": 100}, dtype=object))
+    assert read_table(tmp_path / "a.npz", TextForm(), ["t"], []).columns["t"].tolist() == ROW.tolist()
+    assert "expected 'meta' of session.yaml" in refusal(tmp_path / "a.npz", ["meta"])
+
+
+def test_matrices_beside_what_is_read(tmp_path):
+    time = np.arange(30.0)
+    calibration = {name: np.eye(3) for name in "KRSQ"}
+    np.savez(tmp_path / "a.npz", t=time, tip=np.stack([time, 2 * time, 3 * time], 1), **calibration)
+    table = read_table(tmp_path / "a.npz", TextForm(), ["t", "tip[3]"], [])
+    assert table.columns["tip[3]"].tolist() == (3 * time).tolist()
+
+
+def test_structures_in_an_array_are_said(tmp_path):
+    trials = np.empty((1, 2), dtype=[("time", object), ("tip", object)])
+    trials[0, 0] = trials[0, 1] = (ROW, ROW)
+    savemat(tmp_path / "a.mat", {"trials": trials})
+    assert refusal(tmp_path / "a.mat", ["trials.time"]).startswith("found no arrays of numbers, expected some: of stru")

@@ -241,3 +241,53 @@ def test_what_is_no_position_is_refused_in_a_line(tmp_path):
     path = table(tmp_path / "a.csv", {"time": numbers(T), "force": HALF})
     with pytest.raises(InputError, match=r"a\.csv: found force, expected columns of x, y and z, such as tip_x"):
         guess(path)
+
+
+# what labs' files are like
+
+
+def test_a_table_that_is_not_there_or_is_empty_is_refused_in_a_line(tmp_path):
+    for name in ("a.csv", "a.parquet", "a.npz", "a.mat"):
+        with pytest.raises(InputError, match=rf"{name}: .*no such file or directory.*, expected a table"):
+            guess(tmp_path / name)
+    for text in ("", "\n\n", "time,x,y,z\n"):
+        (tmp_path / "a.csv").write_text(text)
+        with pytest.raises(InputError, match=r"a\.csv: found no row of numbers, expected a table"):
+            guess(tmp_path / "a.csv")
+
+
+def test_cells_in_quotes(tmp_path):
+    """All of them, or those that have a separator in them."""
+    quoted = {f'"{name}"': [f'"{cell}"' for cell in cells] for name, cells in TIMED.items()}
+    for columns in (quoted, TIMED | {"note": ['"by hand, cold"'] * COUNT}):
+        proposed = of_csv(tmp_path, columns)
+        assert (proposed["separator"], proposed["header"]) == (",", 1)
+        assert proposed["time"] == {"column": "time", "unit": "s"}
+        assert proposed["bodies"] == {"body": {"position": ["x", "y", "z"]}}
+
+
+def test_velocities_are_no_places_and_angles_by_axis_are_angles(tmp_path):
+    beside = {f"tip_{kind}{axis}": HALF for kind in ("v", "w", "a") for axis in "xyz"}
+    columns = {"time": numbers(T)} | {f"tip_{axis}": cells for axis, cells in PLACES.items()} | beside
+    assert list(of_csv(tmp_path, columns)["bodies"]) == ["tip"]
+    turned = columns | {f"tip_r{axis} [rad]": HALF for axis in "xyz"}
+    path = table(tmp_path / "a.csv", turned)
+    assert list(block(path)["bodies"]) == ["tip"]
+    assert ("FILL IN: euler: [\"tip_rx [rad]\", \"tip_ry [rad]\", \"tip_rz [rad]\"], with `euler: {convention: xyz, "
+            "unit: rad}`") in "\n".join(guess(path).tables)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["ts_us", "Zeit [us]"])
+def test_other_names_of_time(tmp_path, name):
+    assert of_csv(tmp_path, {name: numbers(1e6 * T)} | PLACES)["time"] == {"column": name, "unit": "us"}
+
+
+def test_a_table_of_motors_alone_is_said(tmp_path):
+    with pytest.raises(InputError, match="found m1, m2, .*of motors alone, it is the `motors_file` of the poses'"):
+        guess(table(tmp_path / "a.csv", {"time": numbers(T), "m1": HALF, "m2": HALF}))
+
+
+def test_durations_of_parquet(tmp_path):
+    frame = pd.DataFrame({axis: np.arange(COUNT) * 1.0 for axis in "xyz"}).assign(time=pd.to_timedelta(T, unit="s"))
+    frame.to_parquet(tmp_path / "a.parquet")
+    assert block(tmp_path / "a.parquet")["time"] == {"column": "time", "unit": "s"}

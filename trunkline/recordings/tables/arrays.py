@@ -13,6 +13,7 @@ from scipy.io.matlab import MatReadError
 
 from trunkline.errors import InputError
 
+FEWEST = 10  # rows, where anything has as many: matrices of calibration are smaller
 HDF5 = b"MATLAB 7.3"  # how the files of `save -v7.3` begin
 Columns = dict[str, np.ndarray]
 
@@ -28,12 +29,15 @@ def array_columns(path: Path) -> tuple[list[str], Callable[[list[str]], Columns]
         return _of_parquet(path)
     arrays = _load(path)
     lengths = Counter(length for array in arrays.values() for length in set(array.shape))
-    rows = max(lengths, key=lambda length: (lengths[length], length), default=0)  # the larger of two
+    rows = max(lengths, key=lambda length: (length >= FEWEST, lengths[length], length), default=0)  # the larger of two
     places: dict[str, tuple[str, tuple[int, ...]]] = {}
     for key, array in arrays.items():
         if rows in array.shape:
             arrays[key] = np.moveaxis(array, array.shape.index(rows), 0)
             places |= _with_places(key, arrays[key].shape[1:])
+    if not places:
+        raise InputError(f"{path}: found no arrays of numbers, expected some: of structures in an array, such as "
+                         "trials(2).time of MATLAB, each needs a file of its own")  # fmt: skip
 
     def read(names: list[str]) -> Columns:
         return {name: arrays[places[name][0]][(slice(None), *places[name][1])] for name in names}
@@ -75,7 +79,11 @@ def _load(path: Path) -> Columns:
     try:
         if path.suffix.lower() == ".npz":
             with np.load(path, allow_pickle=False) as file:
-                arrays = {name: file[name] for name in file.files}
+                arrays = {name: array for name in file.files if (array := _unpickled(file, name)) is not None}
+                if file.files and not arrays:
+                    raise ValueError(
+                        f"Object arrays ({', '.join(file.files)}) cannot be loaded with allow_pickle=False"
+                    )
         else:
             with open(path, "rb") as file:
                 if file.read(len(HDF5)) == HDF5:
@@ -85,6 +93,16 @@ def _load(path: Path) -> Columns:
     except (ValueError, zipfile.BadZipFile, EOFError, MatReadError, NotImplementedError, TypeError) as error:
         raise InputError(f"{path}: {error}, expected an {path.suffix[1:]} file of arrays of numbers") from error
     return {name: np.squeeze(array) for name, array in arrays.items() if array.size > 1}
+
+
+def _unpickled(file: np.lib.npyio.NpzFile, name: str) -> np.ndarray | None:
+    """An array, but for one of Python's objects: those are not run, and may lie beside what is read."""
+    try:
+        return file[name]
+    except ValueError as error:
+        if "Object arrays" not in str(error):
+            raise
+        return None
 
 
 def _flat(values: dict, before: str = "") -> Columns:

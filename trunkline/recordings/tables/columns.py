@@ -4,7 +4,7 @@ import codecs
 import csv
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -53,13 +53,23 @@ def read_table(path: Path, form: TextForm, numbers: list[Key], texts: list[Key])
         with opened(path, form.encoding) as file:
             return _of_text(path, form, file, numbers, texts)
     except UnicodeError as error:
-        line = 1 + path.read_bytes()[: getattr(error, "start", 0)].count(b"\n")
+        line = _first_line_beyond(path, form.encoding)
         expected = "expected `encoding` in session.yaml to say which: utf-8, utf-16 or latin-1"
         raise InputError(f"{path}: line {line}: found bytes that are not {form.encoding}, {expected}") from error
     except csv.Error as error:
         raise InputError(f"{path}: {error}, expected a table of text") from error
     except OSError as error:
         raise InputError(f"{path}: {(error.strerror or str(error)).lower()}, expected a table") from error
+
+
+def _first_line_beyond(path: Path, encoding: str) -> int:
+    """The first line of a file that is not in an encoding. What a decoder says counts from its own last block."""
+    data = path.read_bytes()
+    try:
+        data.decode(encoding)
+    except UnicodeDecodeError as error:
+        return 1 + data[: error.start].count(b"\n")
+    return 1
 
 
 def opened(path: Path, encoding: str) -> io.TextIOWrapper:
@@ -71,7 +81,7 @@ def opened(path: Path, encoding: str) -> io.TextIOWrapper:
     return open(path, encoding=marked or without, newline="")
 
 
-def cells_of(file: io.TextIOWrapper, separator: str) -> Iterator[tuple[int, list[str]]]:
+def cells_of(file: Iterable[str], separator: str) -> Iterator[tuple[int, list[str]]]:
     """(line, cells) of every line, empty ones too."""
     if separator == " ":
         yield from ((number, line.split()) for number, line in enumerate(file, 1))
@@ -158,10 +168,9 @@ def _of_arrays(path: Path, numbers: list[Key], texts: list[Key]) -> Table:
 
 
 def _cast(table: Table, key: Key, array: np.ndarray) -> np.ndarray:
-    """(N,) numbers; times become seconds since 1970."""
-    if array.dtype.kind == "M":
-        seconds = array.astype("datetime64[ns]").astype(np.int64) * 1e-9
-        return np.where(np.isnat(array), np.nan, seconds)
+    """(N,) numbers; times become seconds since 1970, and what passed seconds."""
+    if array.dtype.kind in "Mm":
+        return seconds_of(array)
     try:
         return array.astype(float)
     except (TypeError, ValueError):
@@ -174,6 +183,12 @@ def _cast(table: Table, key: Key, array: np.ndarray) -> np.ndarray:
             if not BLANK.fullmatch(str(value)):
                 raise InputError(f"{table.place(row, key)}: found {value!r:.40}, expected a number") from None
     return values
+
+
+def seconds_of(array: np.ndarray) -> np.ndarray:
+    """Dates as s since 1970, durations as s; NaN where there is none. Shape (N,)."""
+    kind = "datetime64[ns]" if array.dtype.kind == "M" else "timedelta64[ns]"
+    return np.where(np.isnat(array), np.nan, array.astype(kind).astype(np.int64) * 1e-9)
 
 
 def _place(path: Path, key: Key, names: list[str], width: int, line: int) -> int:

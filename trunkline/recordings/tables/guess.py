@@ -17,7 +17,7 @@ from trunkline.recordings.session.layout import TEXT, TO_SECONDS, TextForm
 from trunkline.recordings.session.session import UNITS as METRES
 from trunkline.recordings.session.session import MotorEntry
 from trunkline.recordings.tables.arrays import array_columns
-from trunkline.recordings.tables.columns import BLANK, Key, cells_of, opened
+from trunkline.recordings.tables.columns import BLANK, Key, cells_of, opened, seconds_of
 
 LOOKED_AT = 5000  # lines
 FORMS = [(",", "."), (";", "."), (";", ","), ("tab", "."), ("tab", ","), ("blanks", "."), ("blanks", ",")]
@@ -25,14 +25,15 @@ UNITS = "m|mm|cm|inch|s|ms|us|ns|min|deg|rad|Nm|N"
 UNIT = re.compile(rf"([\s_]+|[\s_]*[\[(/]\s*)({UNITS})\s*[\])]?$")
 BARE = re.compile(rf"[\[(]?({UNITS}|-|)[\])]?")
 BETWEEN = r"[ _.:\-]*"
-TURNED = r"q|quat(?:ernion)?|rot(?:ation)?|orientation"
+TURNED = r"q|quat(?:ernion)?|r|rot(?:ation)?|orientation|euler|angle"
+MOVING = r"v|vel(?:ocity)?|a|acc(?:el(?:eration)?)?|w|omega|f|force|gyro"  # no places
 AXIS = re.compile(
-    rf"(.*?){BETWEEN}((?<![a-z])(?:pos(?:ition)?|translation|p|{TURNED}))?{BETWEEN}([wxyz]){BETWEEN}(\d*)",
+    rf"(.*?){BETWEEN}((?<![a-z])(?:pos(?:ition)?|translation|p|{TURNED}|{MOVING}))?{BETWEEN}([wxyz]){BETWEEN}(\d*)",
     re.IGNORECASE,
 )
 ANGLE = re.compile(rf"(.*?){BETWEEN}(roll|pitch|yaw){BETWEEN}(\d*)", re.IGNORECASE)
 NUMBERED = re.compile(rf"(.*?){BETWEEN}(?<![a-z])q(?:uat)?_?([0-4])", re.IGNORECASE)
-TIME = re.compile(r"(.*[ _.])?(time|t|time_?stamp|stamp|secs?|seconds|elapsed)")
+TIME = re.compile(r"(.*[ _.])?(time|t|ts|time_?stamp|stamp|secs?|seconds|elapsed|zeit)")
 COUNTER = re.compile(r"frame|frames?[ _]?(number|nr|no|id)|sample|index|id")
 LABEL = re.compile(r".*(id|trial|run|traj\w*|label|pattern|episode|experiment|take|test)")
 COMMAND = re.compile(r"u\d+|.*(cmd|command|target|setpoint|input).*")
@@ -76,9 +77,14 @@ def guess(path: Path) -> Guess:
     """Look at a table.
 
     Raises:
-        InputError: it has no columns that could be positions.
+        InputError: it cannot be read, or has no columns that could be positions.
     """
-    form, columns = _text(path) if path.suffix.lower() in TEXT else ([], _arrays(path))
+    try:
+        form, columns = _text(path) if path.suffix.lower() in TEXT else ([], _arrays(path))
+    except OSError as error:
+        raise InputError(f"{path}: {(error.strerror or str(error)).lower()}, expected a table") from error
+    if not any(len(column.values) for column in columns):
+        raise InputError(f"{path}: found no row of numbers, expected a table")
     result = Guess(form)
     left = _time(result, columns)
     left = _bodies(result, left, path)
@@ -129,8 +135,8 @@ def _arrays(path: Path) -> list[LookedAt]:
     columns = []
     for name, array in read(names).items():
         texts = [] if array.dtype.kind in "biuf" else [str(value) for value in array.tolist()]
-        if array.dtype.kind == "M":
-            values = array.astype("datetime64[ns]").astype(np.int64) * 1e-9
+        if array.dtype.kind in "Mm":
+            values = seconds_of(array)
         else:
             values = array.astype(float) if not texts else np.full(len(array), np.nan)
         columns.append(_column(name, name, values, texts, ""))
@@ -163,7 +169,8 @@ def _encoding(path: Path) -> str:
 
 
 def _cells(line: str, separator: str) -> list[str]:
-    return line.split() if separator == "blanks" else line.split("\t" if separator == "tab" else separator)
+    by = {"blanks": " ", "tab": "\t"}.get(separator, separator)
+    return next((cells for _, cells in cells_of([line], by)), [])
 
 
 def _number(cell: str, decimal: str) -> float | None:
@@ -244,6 +251,8 @@ def _bodies(result: Guess, columns: list[LookedAt], path: Path) -> list[LookedAt
                 angles.setdefault(_name(match[1], match[3]), {})[match[2].lower()] = column
             elif match := AXIS.fullmatch(column.name):
                 head, kind, axis, tail = match.groups()
+                if kind is not None and re.fullmatch(MOVING, kind.lower()):
+                    continue
                 turned = kind is not None and re.fullmatch(TURNED, kind.lower())
                 (turns if turned else positions).setdefault(_name(head, tail), {})[axis.lower()] = column
             elif match := NUMBERED.fullmatch(column.name):
@@ -256,7 +265,9 @@ def _bodies(result: Guess, columns: list[LookedAt], path: Path) -> list[LookedAt
     if not bodies:
         some = ", ".join(str(column.key) for column in columns[:12])
         expected = "expected columns of x, y and z, such as tip_x, tip_y, tip_z"
-        raise InputError(f"{path}: found {some}, {expected}: `tables` in session.yaml is for you to write")
+        alone = any(MOTOR.fullmatch(column.label) or COMMAND.fullmatch(column.label) for column in columns)
+        more = "; of motors alone, it is the `motors_file` of the poses' `tables`" if alone else ""
+        raise InputError(f"{path}: found {some}, {expected}: `tables` in session.yaml is for you to write{more}")
     used = [axes[axis] for axes in bodies.values() for axis in "xyz"]
     result.unit = next((column.unit for column in used if column.unit is not None), None)
     if any(set(axes) == set("wxyz") for name, axes in turns.items() if name in bodies):
@@ -275,9 +286,11 @@ def _bodies(result: Guess, columns: list[LookedAt], path: Path) -> list[LookedAt
             fill = f"  # FILL IN: quaternion: [{listed}], with `quaternion: wxyz` or xyzw above"
             used += axes_of_turn.values()
             reason += "; four numbers of norm 1 are a quaternion, whose order no number tells"
-        elif len(turned := angles.get(name, {})) == 3:
-            listed = ", ".join(_yaml(turned[key].key) for key in ("roll", "pitch", "yaw"))
-            fill = f"  # FILL IN: euler: [{listed}], with `euler: {{convention: xyz, unit: deg}}` above, or as it is"
+        elif len(turned := angles.get(name) or (axes_of_turn if set(axes_of_turn) == set("xyz") else {})) == 3:
+            order = ("roll", "pitch", "yaw") if name in angles else "xyz"
+            listed = ", ".join(_yaml(turned[key].key) for key in order)
+            unit = next((c.unit for c in turned.values() if c.unit in ("deg", "rad")), "deg")
+            fill = f"  # FILL IN: euler: [{listed}], with `euler: {{convention: xyz, unit: {unit}}}` above, or as it is"
             used += turned.values()
             reason += "; of its angles no number tells the convention"
         result.tables.append(f"  {_yaml(name)}: {{{text}}}{fill}")
