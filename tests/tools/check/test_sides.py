@@ -37,7 +37,7 @@ def test_a_base_that_is_turned_about_the_arm_is_said(model, pulled, degrees):
     (line,) = side_lines([turned(trial, degrees) for trial in pulled], model)
     angle = float(line.partition("turned by ")[2].partition("°")[0])
     assert angle == pytest.approx(degrees, abs=4)
-    assert "in the median of 4 trials: are x and y of the base body those of the arm's description?" in line
+    assert "on average over 4 trials: are x and y of the base body those of the arm's description?" in line
 
 
 def test_trials_that_disagree_or_tell_nothing_have_no_say(model, pulled):

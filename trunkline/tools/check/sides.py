@@ -12,7 +12,7 @@ from trunkline.recordings.trials.trial import Trial
 FEWEST = 2  # trials that tell it
 UPRIGHT = np.radians(5)  # of the mount, up to which an arm bends to where it is pulled
 DEEP = 0.8  # of a trial's deepest pull, from which on its frames count
-TOWARDS_ONE = 0.9  # of the pulls, that has to be left where they are added as vectors: the deepest takes most of others
+TOGETHER = 0.9  # of the pulls, that has to be left where they are added as vectors: the deepest takes most of others
 BENT = 0.05  # of the arm's length, by which the farthest marker has to be aside
 TURNED = np.radians(15)  # from which on it is said
 ALIKE = 1 / 3  # of that, by which trials may differ
@@ -22,8 +22,8 @@ BEND = 1e-4  # rad, of every joint, by which the sides of tendons are measured
 def side_lines(trials: list[Trial], model: mujoco.MjModel) -> list[str]:
     """By how much all trials that are pulled are bent to other sides than described, all the same way, in a sentence;
     none where they are not."""
-    sides = tendon_sides(model)
-    turns = np.array([turn for trial in trials if (turn := _turn(trial, sides, marker_places(model))) is not None])
+    sides, places = tendon_sides(model), marker_places(model)
+    turns = np.array([turn for trial in trials if (turn := _turn(trial, sides, places)) is not None])
     if len(turns) < FEWEST:
         return []
     mean = float(np.angle(np.sum(np.exp(1j * turns))))
@@ -32,7 +32,7 @@ def side_lines(trials: list[Trial], model: mujoco.MjModel) -> list[str]:
         return []
     problem = f"tendons bend the arm to sides that are turned by {np.degrees(mean):.0f}° about z of the base against"
     remedy = "are x and y of the base body those of the arm's description?"
-    return [f"base: {problem} those where they are described, in the median of {len(turns)} trials: {remedy}"]
+    return [f"base: {problem} those where they are described, on average over {len(turns)} trials: {remedy}"]
 
 
 def tendon_sides(model: mujoco.MjModel) -> dict[str, complex]:
@@ -70,6 +70,6 @@ def _turn(trial: Trial, sides: dict[str, complex], places: dict[str, np.ndarray]
     side = complex(pull @ directions)
     aside = np.median(trial.positions[visible, trial.markers.index(farthest)], axis=0) - places[farthest]
     length = float(np.linalg.norm(places[farthest]))
-    if abs(side) < TOWARDS_ONE * pull @ np.abs(directions) or np.hypot(*aside[:2]) < BENT * length or not abs(side):
+    if abs(side) < TOGETHER * pull @ np.abs(directions) or np.hypot(*aside[:2]) < BENT * length or not abs(side):
         return None
     return float(np.angle(complex(aside[0], aside[1]) / side))
