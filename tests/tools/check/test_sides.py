@@ -43,5 +43,7 @@ def test_a_base_that_is_turned_about_the_arm_is_said(model, pulled, degrees):
 def test_trials_that_disagree_or_tell_nothing_have_no_say(model, pulled):
     either = [turned(trial, degrees) for trial, degrees in zip(pulled, (40, -40, 40, -40), strict=True)]
     assert side_lines(either, model) == []
+    some = [turned(trial, degrees) for trial, degrees in zip(pulled, (60, 0, 60, 0), strict=True)]
+    assert side_lines(some, model) == []
     slack = [replace(turned(trial, 30), commands=-np.abs(trial.commands)) for trial in pulled]
     assert side_lines(slack, model) == []
