@@ -23,7 +23,7 @@ from PIL import Image
 
 from qualification.browser import Page, browsing
 from trunkline.ar.preview.package import only_package
-from trunkline.ar.session import lease, robot_process
+from trunkline.ar.session import clock, controller, lease, robot_process
 from trunkline.ar.session.previewer import Answer, FollowRequest, Order, Previewer
 from trunkline.ar.session.serving import Address, opened
 from trunkline.ar.session.settings import SessionConfig
@@ -35,7 +35,7 @@ from trunkline.pipeline.config import PROJECT, load_folder
 ADDRESS, SIZE, YIELDS = Address(18452), (760, 640), 3  # of the page: pixels, and how nice its browser is
 COLOURS = 128  # of a picture's palette
 PATIENCE = 60.0  # s for a state to come
-SILENCE, STALE = 10.0, 1.0  # s for which the page and the robot's process may say nothing
+SILENCE, STALE = 10.0, 1.0  # s for which the page, its inputs and pictures, and the robot's process may be late
 EYE, AT = (1.29, 1.04, 1.94), (0.35, 0.43, 0.05)  # m, in the room: where the picture is taken from, and what it is of
 # presses of each arrow, 1 cm each, for the mount's target and for the tip's
 AIMED = (
@@ -194,7 +194,8 @@ async def session(package: Path) -> dict[Mode, bytes]:
     config, teleop = load_folder(SessionConfig, PROJECT / "conf/live"), load_folder(Teleop, PROJECT / "conf/teleop")
     safety = replace(teleop.core.safety, silence=SILENCE, plan_wait=PATIENCE)
     teleop = replace(teleop, core=replace(teleop.core, safety=safety))
-    lease.LEASE_TIMEOUT, robot_process.STALE = SILENCE, STALE
+    lease.LEASE_TIMEOUT = controller.UNDRAWN = clock.LATEST = SILENCE
+    robot_process.STALE = STALE
     with tempfile.TemporaryDirectory() as logs:
         config = replace(config, journal=replace(config.journal, folder=logs))
         async with opened(package, ADDRESS, lambda line: None, config=config, teleop=teleop) as (server, made):

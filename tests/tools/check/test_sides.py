@@ -7,7 +7,7 @@ import pytest
 
 from tests.support.matched_plant import curl, release, small_model, static_pull
 from tests.tools.check.test_preflight import turned
-from trunkline.tools.check.sides import side_lines, tendon_sides
+from trunkline.tools.check.sides import FEWEST, side_lines, tendon_sides
 
 
 @pytest.fixture(scope="module")
@@ -38,6 +38,15 @@ def test_a_base_that_is_turned_about_the_arm_is_said(model, pulled, degrees):
     angle = float(line.partition("turned by ")[2].partition("°")[0])
     assert angle == pytest.approx(degrees, abs=4)
     assert "on average over 4 trials: are x and y of the base body those of the arm's description?" in line
+
+
+def test_a_turn_is_said_from_its_limit_on(model, pulled):
+    """Of trials that are alike to the last bit, so that nothing but the angle decides."""
+    (line,) = side_lines([turned(pulled[0], 40)] * FEWEST, model)
+    offset = float(line.partition("turned by ")[2].partition("°")[0]) - 40
+    limit = 15 - offset
+    assert side_lines([turned(pulled[0], limit - 2)] * FEWEST, model) == []
+    assert side_lines([turned(pulled[0], limit + 2)] * FEWEST, model)
 
 
 def test_trials_that_disagree_or_tell_nothing_have_no_say(model, pulled):
