@@ -1,6 +1,7 @@
 """`python -m upkeep.release`: what the split `test` comes to, goal by goal, when a version is released.
 
-It holds the metrics of `score`, the project's and the examples', against tests/release.yaml. Nothing is chosen by it:
+It holds the metrics of `score`, the project's and the examples', and the errors of arms that nobody designs for
+(docs/results/families.csv) against tests/release.yaml. Nothing is chosen by it:
 it is run once when a version is ready, not on the way to it, and CI does not run it. A goal that is missed is told; one
 that the version before met and this one misses, or no longer has, ends with exit code 1. `--keep` then writes
 tests/release.json, by which the next version is judged.
@@ -13,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
+import pandas as pd
 from pydantic import Field, TypeAdapter
 
 from trunkline.errors import InputError, in_one_line
@@ -21,8 +23,10 @@ from trunkline.pipeline.stage import write_json
 from trunkline.settings import settings
 from trunkline.version import __version__
 from upkeep.limits import SCORING, Below, checked, is_finite, lookup, of_test, read_metrics, read_rows
+from upkeep.results import KeptResult
 
 GOALS, RELEASED = Path("tests/release.yaml"), Path("tests/release.json")
+FAMILIES = Path("docs/results/families.json")  # in place of a folder: the table of its arms, `families.csv`, is read
 
 
 @settings
@@ -63,7 +67,7 @@ class Released:
     met: dict[str, dict[str, bool]]
 
 
-# folder: dotted key of its artifacts/score/metrics.json: goal
+# folder, or FAMILIES: dotted key of its artifacts/score/metrics.json, or of `family_metrics`: goal
 Goals = Annotated[dict[str, Annotated[dict[str, ReleaseGoal], Field(min_length=1)]], Field(min_length=1)]
 
 
@@ -105,12 +109,41 @@ def results(root: Path, goals: Goals, before: Released | None) -> list[GoalResul
     """
     rows = []
     for folder, folder_goals in goals.items():
-        metrics = read_metrics(root / folder, SCORING)
+        metrics = family_metrics(root) if folder == str(FAMILIES) else read_metrics(root / folder, SCORING)
         for key, goal in folder_goals.items():
             value, then = lookup(metrics, key), None if before is None else before.met.get(folder, {}).get(key)
             number = value if is_finite(value) else None
             rows.append(GoalResult(folder, key, number, goal.words(metrics), goal.met(metrics, key), then))
     return rows
+
+
+def family_metrics(root: Path) -> dict:
+    """Of the simulated arms of the last `make families`, as `arm_metrics`.
+
+    Raises:
+        InputError: it was not run, or of other code.
+    """
+    if not (root / FAMILIES).is_file():
+        raise InputError(f"{FAMILIES}: found none, expected that of `make families`")
+    result = KeptResult.read(root / FAMILIES)
+    if result.state(root) != "of this code":
+        raise InputError(f"{FAMILIES}: found it of commit {result.origin.commit}, expected it of this code")
+    return arm_metrics(pd.read_csv(root / FAMILIES.with_suffix(".csv"), dtype={"code": str}), result.origin.digest)
+
+
+def arm_metrics(table: pd.DataFrame, code: str) -> dict:
+    """Of the rows of this code, first attempts: `test.mean` and `test.worst` over arms of every column of errors (% of
+    the arm's length), `test.sealed_arms`, and `test.intervals_held`, the share of intervals that hold the truth."""
+    arms = table[(table["code"] == code) & (table["attempt"] == 1)]
+    errors = arms.filter(regex=r"_(position|tip)$")
+    return {
+        "test": {
+            "mean": errors.mean().to_dict(),
+            "worst": errors.max().to_dict(),
+            "sealed_arms": int((arms["sealed"] == "yes").sum()),
+            "intervals_held": float(arms["held"].sum() / arms["intervals"].sum()),
+        }
+    }
 
 
 def lost(rows: list[GoalResult], before: Released | None) -> list[str]:

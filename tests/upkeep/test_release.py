@@ -3,12 +3,14 @@
 import json
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from upkeep import release
 from upkeep.baseline import baseline_file, read_baseline
 from upkeep.limits import Below, limit_files, lookup, of_test
-from upkeep.release import GOALS, RELEASED, ReleaseGoal, read_goals, read_released
+from upkeep.release import FAMILIES, GOALS, RELEASED, ReleaseGoal, arm_metrics, read_goals, read_released
+from upkeep.results import KeptResult
 
 ROOT = Path(__file__).parents[2]
 GOALS_OF = """
@@ -149,6 +151,32 @@ def test_metrics_that_are_missing_end_in_one_line(project, capsys):
     assert "artifacts/score/metrics.json is missing" in capsys.readouterr().err
 
 
+def arms(**cells):
+    return pd.DataFrame({"code": "abc", "attempt": 1, "sealed": "yes", "held": 9, "intervals": 10, **cells}, index=[0])
+
+
+def test_arms_are_those_of_this_code_at_their_first_attempt():
+    """Not those of other code, and not a second try at an arm."""
+    table = pd.concat([
+        arms(curl_tip=1.0), arms(curl_tip=4.0, sealed="no", held=5), arms(curl_tip=90.0, code="old", held=0),
+        arms(curl_tip=80.0, attempt=2, held=0),
+    ])  # fmt: skip
+    metrics = arm_metrics(table, "abc")["test"]
+    assert (metrics["mean"], metrics["worst"]) == ({"curl_tip": 2.5}, {"curl_tip": 4.0})
+    assert (metrics["sealed_arms"], metrics["intervals_held"]) == (1, 0.7)
+
+
+def test_arms_that_nobody_measured_with_this_code_end_in_one_line(project, capsys):
+    (project / GOALS).write_text(f"{FAMILIES}:\n  test.mean.every_tip: {{max: 2.0}}\n")
+    assert release.main(project, []) == 1
+    assert f"{FAMILIES}: found none, expected that of `make families`" in capsys.readouterr().err
+    (project / FAMILIES).parent.mkdir(parents=True)
+    result = {"command": "python -m studies.families", "commit": "abc", "code": {"studies": "old"}, "lines": []}
+    (project / FAMILIES).write_text(json.dumps(result))
+    assert release.main(project, []) == 1
+    assert f"{FAMILIES}: found it of commit abc, expected it of this code" in capsys.readouterr().err
+
+
 # the project's own
 
 
@@ -164,7 +192,11 @@ def test_no_row_and_no_baseline_of_the_project_is_of_test():
 
 def test_each_goal_of_the_project_has_a_metric_of_test():
     for folder, rows in read_goals(ROOT / GOALS).items():
-        metrics = json.loads((ROOT / folder / "artifacts/score/metrics.json").read_text())
+        if folder == str(FAMILIES):
+            code = KeptResult.read(ROOT / FAMILIES).origin.digest
+            metrics = arm_metrics(pd.read_csv(ROOT / FAMILIES.with_suffix(".csv"), dtype={"code": str}), code)
+        else:
+            metrics = json.loads((ROOT / folder / "artifacts/score/metrics.json").read_text())
         for key, goal in rows.items():
             assert lookup(metrics, key) is not None, f"{folder}: {key}"
             assert goal.below is None or lookup(metrics, goal.below.key) is not None, f"{folder}: {key}"
