@@ -45,6 +45,19 @@ def test_pose_fit_finds_a_coil_of_more_than_a_turn(with_orientations):
     assert np.abs(seen_at(model, fit.qpos, ["unit_16"])[0] - seen_at(model, qpos, ["unit_16"])[0]).max() < 1e-3
 
 
+def test_a_pose_is_fitted_where_a_body_was_not_visible():
+    """It has no attitude either: NaN, as in trials whose every frame is a pose of its own."""
+    model = small_model(units=4)
+    markers = ("unit_01", "unit_02", "unit_04")
+    positions, matrices = seen_at(model, np.full(8, 0.2), markers)
+    quaternions = np.empty((3, 4))
+    for quaternion, matrix in zip(quaternions, matrices, strict=True):
+        mujoco.mju_mat2Quat(quaternion, matrix.ravel())
+    positions[1], quaternions[1] = np.nan, np.nan
+    fit = fit_pose(model, markers, positions, quaternions)
+    assert fit.residuals[[0, 2]].max() < 1e-3
+
+
 @pytest.mark.parametrize("in_motion", [True, False])
 def test_an_arm_that_moves_already_starts_with_its_velocity(in_motion):
     model = small_model()

@@ -53,7 +53,7 @@ def test_each_section_has_units_of_its_own(model):
 
 def test_cables_that_end_on_the_way_cannot_rub():
     spec = arm().build(ACTUATION, SOLVER, Path()).spec
-    with pytest.raises(InputError, match="build_mjcf.holes: found .* 'tendon_1', which ends at unit 2 of 5, expected"):
+    with pytest.raises(InputError, match="build_mjcf.holes: found .* 'tendon_1', which bends 2 of 5 units, expected"):
         add_holes(spec, GuideHoles(0.1, 2))
     whole = arm(tendons=TENDONS[1:]).build(ACTUATION, SOLVER, Path()).spec
     add_holes(whole, GuideHoles(0.1, 2))
@@ -70,6 +70,20 @@ def test_tendons_run_where_they_are_described(model):
     assert (np.diff(along) < 0).all()
     third = 0.8 * 0.02 / 2 * np.array([np.cos(np.radians(-120)), np.sin(np.radians(-120))])
     np.testing.assert_allclose(model.site("unit_04_tendon_3").pos[:2], third, atol=1e-12)
+
+
+def test_a_tendon_may_start_where_another_section_does():
+    """Before that it is in a sheath: no bend of the first section changes its length."""
+    tendons = [Tendon(0.0, 0.012, end=2), Tendon(90.0, (0.010, 0.006), start=2)]
+    later = arm(tendons=tendons).build(ACTUATION, SOLVER, Path()).spec.compile()
+    assert later.tendon_num.tolist() == [3, 4]
+    np.testing.assert_allclose(later.site("unit_02_tendon_2").pos[:2], [0, 0.010], atol=1e-12)
+    np.testing.assert_allclose(later.site("unit_05_tendon_2").pos[:2], [0, 0.006], atol=1e-12)
+    data = mujoco.MjData(later)
+    data.qpos[:4] = 0.2
+    mujoco.mj_forward(later, data)
+    assert abs(data.ten_length[0] - later.tendon_length0[0]) > 1e-3
+    assert data.ten_length[1] == pytest.approx(later.tendon_length0[1], abs=1e-12)
 
 
 def test_pretension_is_told_in_metres_of_cable(model):
@@ -94,6 +108,8 @@ def test_an_arm_may_bring_guesses_of_its_own_motors(tmp_path):
     ("changed", "message"),
     [
         ({"tendons": [Tendon(0.0, 0.01, end=6)]}, "tendons.0.end: found 6, expected one of the 5 units"),
+        ({"tendons": [Tendon(0.0, 0.01, end=2, start=2)]}, "tendons.0.start: found 2, expected a unit before .* 2, or"),
+        ({"tendons": [Tendon(0.0, 0.01, start=5)]}, "tendons.0.start: found 5, expected a unit before .* 5, or"),
         ({"markers": {"tip": 0.17}}, "markers.tip: found 0.17 m, expected at most the length of 0.16 m, or"),
     ],
 )

@@ -26,9 +26,9 @@ from trunkline.pipeline.stage import run_stage
 from trunkline.recordings.cleaning.clock_offset import set_gravity_direction
 from trunkline.recordings.cleaning.label_swaps import find_label_swaps
 from trunkline.recordings.cleaning.loading import load_raw_trials
-from trunkline.recordings.cleaning.stale_poses import stale_samples
 from trunkline.recordings.cleaning.usual_distances import usual_distances
 from trunkline.recordings.session.session import read_session
+from trunkline.recordings.signals.repeats import stale_samples
 
 CLEAN = instruments(occlusions_per_s=0.3, outliers=0)
 SPANS = slice(60, 110), slice(60, 61), slice(200, None), slice(0, 250)  # frames

@@ -65,8 +65,11 @@ class PoseProblem:
         self.model, self.data = model, mujoco.MjData(model)
         self.sites = ArmModel(model).marker_sites(markers)
         self.positions = positions
-        self._targets = None if quaternions is None else rotation_from_wxyz(quaternions).as_matrix()
-        measured = np.flatnonzero(np.isfinite(positions).all(axis=1))
+        visible = np.isfinite(positions).all(axis=1)
+        measured = np.flatnonzero(visible)
+        self._targets = None
+        if quaternions is not None:
+            self._targets = rotation_from_wxyz(np.where(visible[:, None], quaternions, [1.0, 0, 0, 0])).as_matrix()
         # the chain numbers its bodies from the base
         self.measured = measured[np.argsort(model.site_bodyid[self.sites[measured]])]
         self.hinges = int(np.bincount(model.jnt_bodyid).max())  # of each joint

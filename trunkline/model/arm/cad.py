@@ -64,6 +64,9 @@ class ChainArm(ABC):
             if tendon.end > self.units:
                 raise ValueError(f"tendons.{number}.end: found {tendon.end}, expected one of the {self.units} units, "
                                  f"or 0 for the last")
+            if tendon.start >= (tendon.end or self.units):
+                expected = f"a unit before the one where it is anchored, {tendon.end or self.units}, or 0 for the mount"
+                raise ValueError(f"tendons.{number}.start: found {tendon.start}, expected {expected}")
 
     @abstractmethod
     def chain(self) -> ChainGeometry:

@@ -37,7 +37,7 @@ def add_holes(spec: mujoco.MjSpec, holes: GuideHoles) -> None:
     """Let the cables of an arm rub, in place.
 
     Raises:
-        InputError: a cable ends before the last unit: how those rub is not modelled.
+        InputError: a cable ends before the last unit, or starts behind the first: how those rub is not modelled.
     """
     cables = [tendon for tendon in spec.tendons if tendon.path[0].type == mujoco.mjtWrap.mjWRAP_SITE]
     if not holes.stretches or not cables:
@@ -51,8 +51,8 @@ def add_holes(spec: mujoco.MjSpec, holes: GuideHoles) -> None:
     for cable in cables:
         arms = _moment_arms(straight, data, straight.tendon(cable.name).id)
         if len(arms) < units:
-            problem = f"found holes in which cables rub, and {cable.name!r}, which ends at unit {len(arms)} of {units}"
-            raise InputError(f"build_mjcf.holes: {problem}, expected cables to the last unit, or `smooth`")
+            problem = f"found holes in which cables rub, and {cable.name!r}, which bends {len(arms)} of {units} units"
+            raise InputError(f"build_mjcf.holes: {problem}, expected cables from the mount to the last, or `smooth`")
         edges = stretch_edges(len(arms), holes.stretches)
         for number, (begin, end) in enumerate(pairwise(edges), start=1):
             rubbing = spec.add_tendon(

@@ -227,11 +227,11 @@ def _add_cable(spec: mujoco.MjSpec, index: int, tendons: Tendons, solver: Solver
 
 
 def _add_holes(body, name: str, place: int, height: float, routes: list[Route], cables: list) -> None:
-    """The holes of the mount, `place` 0, or of unit `place`, for the tendons that go as far."""
+    """The holes of the mount, `place` 0, or of unit `place`, for the tendons that run there."""
     for number, (route, cable) in enumerate(zip(routes, cables, strict=True), start=1):
-        if place >= len(route.distances):
+        if not 0 <= place - route.start < len(route.distances):
             continue
-        site, radius = f"{name}_tendon_{number}", route.distances[place]
+        site, radius = f"{name}_tendon_{number}", route.distances[place - route.start]
         at = [radius * np.cos(route.angle), radius * np.sin(route.angle), height]
         body.add_site(name=site, pos=at, size=[0.0015] * 3)
         cable.wrap_site(site)

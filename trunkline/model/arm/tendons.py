@@ -19,15 +19,18 @@ class Tendon:
 
     Attributes:
         angle: about the arm's axis from +x towards +y, deg.
-        distance: of its holes from the axis, m, or that at the mount and that at its end, evenly changing along the
+        distance: of its holes from the axis, m, or that at the first and that at its end, evenly changing along the
             arm; where it is left out, the arm's `hole_ratio` of each unit's outer radius.
         end: the unit where it is anchored, counted from 1 at the mount; 0 for the last.
+        start: the unit from whose hole on it bends the arm, counted likewise; 0 for the mount. Before that it runs
+            where no bend changes its length, as in a sheath.
         pretension: with which it pulls on the straight arm while its command is 0, N.
     """
 
     angle: Annotated[float, Field(ge=-360, le=360)]
     distance: Distance | tuple[Distance, Distance] | None = None
     end: Annotated[int, Field(ge=0, le=500)] = 0
+    start: Annotated[int, Field(ge=0, le=500)] = 0
     pretension: Annotated[float, Field(ge=0, le=1000)] = 0.0
 
 
@@ -37,13 +40,16 @@ class Route:
 
     Attributes:
         angle: about the arm's axis from +x towards +y, rad.
-        distances: of its holes from the axis, m: of the mount's, then of each unit's up to the last. Shape (e + 1,).
+        distances: of its holes from the axis, m: of the mount's, then of each unit's up to the last; from that of
+            unit `start` on. Shape (e + 1 - start,).
         pretension: N.
+        start: the unit, from 1, of its first hole; 0 for the mount.
     """
 
     angle: float
     distances: np.ndarray
     pretension: float = 0.0
+    start: int = 0
 
 
 def even_routes(chain: ChainGeometry, count: int, ratio: float) -> list[Route]:
@@ -62,11 +68,11 @@ def _route(chain: ChainGeometry, tendon: Tendon, ratio: float) -> Route:
     if tendon.distance is None:
         distances = _along(chain, ratio)[: end + 1]
     elif isinstance(tendon.distance, tuple):
-        below = np.cumsum(chain.lengths[:end]) - chain.lengths[:end] / 2  # the mount's hole is at 0
-        distances = np.interp(np.append(0.0, below), [0.0, below[-1]], tendon.distance)
+        below = np.append(0.0, np.cumsum(chain.lengths[:end]) - chain.lengths[:end] / 2)  # the mount's hole is at 0
+        distances = np.interp(below, [below[tendon.start], below[-1]], tendon.distance)
     else:
         distances = np.full(end + 1, tendon.distance)
-    return Route(np.radians(tendon.angle), distances, tendon.pretension)
+    return Route(np.radians(tendon.angle), distances[tendon.start :], tendon.pretension, tendon.start)
 
 
 def _along(chain: ChainGeometry, ratio: float) -> np.ndarray:

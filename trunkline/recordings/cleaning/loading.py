@@ -40,7 +40,7 @@ def load_raw_trials(
     tables = TableReader(folder, session)
     for trial, record in zip(session.trials, findings, strict=True):
         try:
-            rows = trial.model_dump_json(include={"file", "label", "table"})
+            rows = trial.model_dump_json(include={"file", "label", "table", "rows"})
             if rows not in logs:
                 logs[rows] = _opened(folder / trial.file, session, trial, tables)
             source = logs[rows]

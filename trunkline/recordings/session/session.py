@@ -156,22 +156,57 @@ class MotorEntry(Entry):
         return UNITS[self.unit] * (self.spool_radius or 1.0)
 
 
+class Rows(Entry):
+    """Which rows of a table, from 1, are a trial's poses: those from `first` to `last`, but none of the trials that
+    `without` names. draw: how many of these, drawn with `seed`."""
+
+    first: Annotated[int, Field(strict=True, ge=1)] = 1
+    last: Annotated[int, Field(strict=True, ge=1)]
+    without: list[str] = []
+    draw: Annotated[int, Field(strict=True, ge=2)] | None = None
+    seed: Annotated[int, Field(strict=True, ge=0)] | None = None
+
+    @model_validator(mode="after")
+    def _complete(self):
+        if self.last < self.first:
+            raise ValueError(f"last: found {self.last}, expected no row before `first`, {self.first}")
+        if (self.draw is None) != (self.seed is None):
+            missing = "seed" if self.seed is None else "draw"
+            raise ValueError(f"{missing}: missing, expected both `draw` and `seed`, or none")
+        return self
+
+    def chosen(self, taken: set[int]) -> np.ndarray:
+        """Their numbers, from 1, in their order, of those that are not `taken`. Shape (T,).
+
+        Raises:
+            ValueError: fewer are left than are drawn.
+        """
+        rows = np.array([row for row in range(self.first, self.last + 1) if row not in taken], dtype=int)
+        if self.draw is None:
+            return rows
+        if self.draw > len(rows):
+            raise ValueError(f"draw: found {self.draw}, expected at most the {len(rows)} rows that are left")
+        return np.sort(np.random.default_rng(self.seed).choice(rows, self.draw, replace=False))
+
+
 class TrialEntry(Entry):
     """window: s from the log's first pose. level: in the unit of the experiment. load: kg at the tip.
 
     label: what the column `tables.trial` says in this trial's rows; by default its name. table: what of `tables` is
-    otherwise in this trial's file.
+    otherwise in this trial's file. rows: which of the table's rows are its poses, by default all.
     """
 
     name: str = ""
     file: str
     label: str | int | float | None = None
     table: dict[str, Any] = {}
+    rows: Rows | None = None
     window: tuple[FiniteFloat, FiniteFloat] | None = None
     experiment: ExperimentName
     level: FiniteFloat | None = None
     load: FiniteFloat = 0.0
     split: SplitName
+    _chosen: tuple[int, ...] | None = PrivateAttr(default=None)
 
     @field_validator("level", "load", mode="before")
     @classmethod
@@ -193,6 +228,11 @@ class TrialEntry(Entry):
         name = recording_name(self.file)
         self.name = self.name or (name if self.label is None else f"{name}_{self.label}")
         return self
+
+    @property
+    def chosen(self) -> tuple[int, ...] | None:
+        """Rows of the table, from 1, as `rows` has them; None for all."""
+        return self._chosen
 
     @property
     def of_table(self) -> bool:
@@ -293,11 +333,35 @@ class Session(Entry):
         return self
 
     @model_validator(mode="after")
+    def _of_rows(self):
+        """Each trial's rows, after those that it goes without."""
+        before: dict[str, set[int]] = {}
+        for index, trial in enumerate(self.trials):
+            if trial.rows is None:
+                continue
+            where = f"trials.{index}.rows"
+            if not EXPERIMENTS[trial.experiment].stepwise:
+                raise ValueError(f"{where}: found it of a {trial.experiment}, expected `window`: only in a static_path "
+                                 "is every row a pose at rest of its own")  # fmt: skip
+            for name in trial.rows.without:
+                if name not in before:
+                    some = f"a trial with `rows` above{nearest(name, list(before))}"
+                    raise ValueError(f"{where}.without: found {name!r}, expected {some}")
+            try:
+                rows = trial.rows.chosen(set().union(*(before[name] for name in trial.rows.without)))
+            except ValueError as error:
+                raise ValueError(f"{where}.{error}") from error
+            trial._chosen = tuple(rows.tolist())
+            before[trial.name] = set(trial._chosen)
+        return self
+
+    @model_validator(mode="after")
     def _of_tables(self):
         for index, trial in enumerate(self.trials):
             where = f"trials.{index}"
             if not trial.of_table or self.tables is None:
-                key = "label" if trial.label is not None else "table" if trial.table else None
+                said = {"label": trial.label is not None, "table": bool(trial.table), "rows": trial.rows is not None}
+                key = next((key for key, there in said.items() if there), None)
                 if key is not None:
                     raise ValueError(f"{where}.{key}: found it without `tables`, or of a log, expected none")
                 continue

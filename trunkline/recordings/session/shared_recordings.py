@@ -23,6 +23,8 @@ def check_shared(folder: Path, trials: list["TrialEntry"]) -> dict[str, list[str
     for first, second in combinations(trials, 2):
         if not content[first.file] & content[second.file] or first.label != second.label:
             continue
+        if first.chosen is not None and second.chosen is not None and not {*first.chosen} & {*second.chosen}:
+            continue
         whole = (float("-inf"), float("inf"))
         interval, other_interval = first.window or whole, second.window or whole
         if max(interval[0], other_interval[0]) >= min(interval[1], other_interval[1]):

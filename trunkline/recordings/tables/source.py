@@ -1,6 +1,6 @@
 """A table as what a log gives: poses, commands and measured positions, each with its times."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +23,7 @@ from trunkline.recordings.session.layout import (
 )
 from trunkline.recordings.session.session import FixedBase, Session, TrialEntry
 from trunkline.recordings.session.source import LogSource, without_unset
+from trunkline.recordings.signals.repeats import stale_samples
 from trunkline.recordings.signals.units import METRES_PER
 from trunkline.recordings.tables.columns import Key, Table, read_table
 
@@ -49,6 +50,8 @@ class TableReader:
         rows = _rows_of(table, layout, trial)
         stamps = _stamps(table, layout.time, rows)
         poses = _poses(table, layout, rows, stamps, self.session)
+        if trial.chosen is not None:  # of the motors all rows stay: what went before brought the arm there
+            poses = _without_stale(poses).take(_chosen(table, rows, trial))
         beside, times, notes = table, stamps, []
         if layout.motors_file is not None:
             beside = self._table(self.folder / layout.motors_file.file, layout.motors_file, layout)
@@ -61,7 +64,7 @@ class TableReader:
                 rows, times = rows[rows < len(beside.rows)], stamps[rows < len(beside.rows)]
         streams = [_joints(beside, layout, role, rows, times) for role in ROLES]
         if beside is table:
-            poses = _without_rows_of_motors(poses, streams, stamps)
+            poses = _without_rows_of_motors(poses, streams, poses.stamps)
         poses = without_repeats(poses)
         poses.notes = notes + poses.notes
         if self.session.clock != "log":
@@ -108,6 +111,28 @@ def _rows_of(table: Table, layout: TableLayout, trial: TrialEntry) -> np.ndarray
         raise InputError(f"{table.path}: trial {trial.name}: column {layout.trial!r}: found {some}, expected "
                          f"{_label(str(trial.label))!r}, the `label` of the trial")  # fmt: skip
     return rows
+
+
+def _without_stale(poses: PoseStream) -> PoseStream:
+    """Without what only repeats the frame before, which shows in a stretch of frames and not in some of them."""
+    stale = stale_samples(poses.positions)
+    if not stale.any():
+        return poses
+    names = ", ".join(name for name, some in zip(poses.names, stale.any(axis=0), strict=True) if some)
+    note = f"of the table {stale.sum()} samples that only repeat the one before, to the last bit, dropped ({names})"
+    positions = np.where(stale[..., None], np.nan, poses.positions)
+    turns = None if poses.quaternions is None else np.where(stale[..., None], np.nan, poses.quaternions)
+    present = poses.present & ~stale
+    return replace(poses, positions=positions, quaternions=turns, present=present, notes=[*poses.notes, note])
+
+
+def _chosen(table: Table, rows: np.ndarray, trial: TrialEntry) -> np.ndarray:
+    """Which of the `rows` (T,) are those that the trial lists. Shape (T,)."""
+    assert trial.chosen is not None, "as asked before"
+    if trial.chosen[-1] > len(table.rows):
+        raise InputError(f"{table.path}: trial {trial.name}: rows.last: found row {trial.chosen[-1]}, expected one of "
+                         f"the {len(table.rows)} below the header")  # fmt: skip
+    return np.isin(rows + 1, trial.chosen)
 
 
 def _label(text: str) -> str:
