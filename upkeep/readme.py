@@ -42,6 +42,7 @@ PICTURES = {
     "examples/asl_motion/artifacts/identify_stiffness/paths.png": "examples/asl_motion/paths.png",
     "examples/asl_trunk/artifacts/identify_damping/paths.png": "examples/asl_trunk/paths.png",
     "examples/ftdcr/artifacts/score/errors.png": "examples/ftdcr/errors.png",
+    "examples/helix/artifacts/score/errors.png": "examples/helix/errors.png",
     "examples/pairs/artifacts/identify_stiffness/paths.png": "examples/pairs/paths.png",
 }
 EXAMPLES = ("asl_trunk",)  # folders of examples/ with releases, each a block of docs/report.md and of its own README
@@ -588,7 +589,7 @@ def generate(root: Path) -> dict[Path, str]:
     """README.md, the examples' own, the reference of sessions and the docs, with their generated blocks as they should
     be."""
     examples = {name: example_table(root / "examples" / name) for name in EXAMPLES}
-    examples |= {name: log_table(root / "examples" / name) for name in ("asl_motion", "pairs")}
+    examples |= {name: log_table(root / "examples" / name) for name in ("asl_motion", "helix", "pairs")}
     blocks: dict[Path, dict[str, str]] = {}
     blocks[root / "README.md"] = {"pipeline": pipeline_graph(root), "headline": headline(root)}
     blocks[root / "data" / "raw" / "README.md"] = {"experiments": experiment_table()}
