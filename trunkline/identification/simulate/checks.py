@@ -83,7 +83,7 @@ def check_sides(trial: Trial, model: mujoco.MjModel) -> None:
     fault = f"found {most!r} wound by {1e3 * pulls.max():.0f} mm while the arm bends to the side of {bent!r}"
     raise InputError(
         f"session.yaml: tendons: trial {trial.name}: {fault}, expected it to bend to the side of what is wound: "
-        "are names exchanged, signs reversed, or is the base body turned about the arm?"
+        "are names exchanged, signs reversed, is the base body turned about the arm, or the frame left-handed?"
     )
 
 
@@ -109,8 +109,8 @@ def check_lengths(trial: Trial, model: mujoco.MjModel) -> None:
     cause = "signs reversed" if mirrored < best else "names exchanged"
     raise InputError(
         f"session.yaml: tendons: trial {trial.name}: {fault}, which fits with {cause}, expected a tendon to be "
-        "slack or about as long as its command: are names exchanged, signs reversed, or is the base body turned about "
-        "the arm?"
+        "slack or about as long as its command: are names exchanged, signs reversed, is the base body turned about "
+        "the arm, or the frame left-handed?"
     )
 
 
