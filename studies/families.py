@@ -24,7 +24,7 @@ from omegaconf import OmegaConf
 from demo.families import draw_arm, families, sealed_seed
 from studies.recovery import run
 from studies.rows import Rows, digest
-from trunkline.errors import in_one_line
+from trunkline.errors import InputError, in_one_line
 from trunkline.identification.stages import STAGES
 from trunkline.pipeline.config import PROJECT
 from trunkline.recordings.trials.experiments import EXPERIMENTS
@@ -61,11 +61,11 @@ def set_up(folder: Path, family: str, seed: int) -> None:
     OmegaConf.save({"stages": {name: {} for name in PIPELINE}}, folder / "dvc.yaml")
 
 
-def cells(folder: Path) -> dict[str, float]:
+def cells(folder: Path) -> dict[str, float | str]:
     """Of the arm in `folder`: errors of its final model in % of its length, by kind of trial, those of the null model,
     and of how many parameters that have a truth the interval holds it."""
     scored = json.loads((folder / "artifacts/score/metrics.json").read_text(encoding="utf-8"))[STAGES[-1]]
-    row: dict[str, float] = {}
+    row: dict[str, float | str] = {}
     for model, end in (("identified", ""), ("null", "_null")):
         errors = scored[model][TEST]
         for kind, of in {EVERY: errors, **errors["by_experiment"]}.items():
@@ -73,38 +73,51 @@ def cells(folder: Path) -> dict[str, float]:
     truth = json.loads((folder / TRUTH).read_text(encoding="utf-8"))
     verdicts = [holds(table, expectation(truth, name)) for name, table in identified(folder).items()]
     decided = [verdict for verdict in verdicts if verdict is not None]
-    return row | {"held": sum(decided), "intervals": len(decided)}
+    return row | {"held": sum(decided), "intervals": len(decided), "refused": "no"}
 
 
-def measure(family: str, seed: int) -> dict[str, float]:
-    """Record, identify and score an arm."""
+def measure(family: str, seed: int) -> dict[str, float | str]:
+    """Record, identify and score an arm; where a stage refuses its session, which is none that a lab would mend, that
+    stage in place of errors."""
     begun = time.perf_counter()
     with tempfile.TemporaryDirectory() as name:
         set_up(Path(name), family, seed)
-        for module in ("demo.record", *(f"stages.{stage}" for stage in PIPELINE)):
-            run(module, Path(name))
-        return cells(Path(name)) | {"seconds": time.perf_counter() - begun}
+        run("demo.record", Path(name))
+        row: dict[str, float | str] = {"held": 0, "intervals": 0}
+        for stage in PIPELINE:
+            try:
+                run(f"stages.{stage}", Path(name))
+            except InputError:
+                row["refused"] = stage
+                break
+        else:
+            row = cells(Path(name))
+        return row | {"seconds": time.perf_counter() - begun}
 
 
 def family_table(rows: list[dict]) -> str:
-    """Errors by family and kind of trial, those of all arms last, and the parameters' intervals below."""
-    table = pd.DataFrame(rows)
+    """Errors by family and kind of trial, those of all arms last, and the parameters' intervals below. Arms whose
+    session was refused have no errors."""
+    every = pd.DataFrame(rows)
+    table = every[every["refused"] == "no"]
     words = {kind: of.plural for kind, of in EXPERIMENTS.items()} | {EVERY: "all"}
     lines = ["| family | arms | trials of `test`, final model | position (%): mean | worst arm | tip (%): mean "
              "| worst arm | null model, tip (%): mean |", "|---|---:|---|---:|---:|---:|---:|---:|"]  # fmt: skip
     for family, of in [*table.groupby("family", sort=False), (EVERY, table)]:
         for kind in [kind for kind in words if f"{kind}_tip" in of]:
-            errors = [of[f"{kind}_{error}"] for error in ("position", "tip")]
+            errors = [pd.to_numeric(of[f"{kind}_{error}"]) for error in ("position", "tip")]
             numbers = [f"{number:.3g}" for error in errors for number in (error.mean(), error.max())]
-            cell = f"{of[f'{kind}_null_tip'].mean():.3g}"
+            cell = f"{pd.to_numeric(of[f'{kind}_null_tip']).mean():.3g}"
             lines.append(f"| {family} | {len(of)} | {words[kind]} | {' | '.join([*numbers, cell])} |")
     least = table.loc[(table["held"] / table["intervals"]).idxmin()]
-    holding, intervals, seconds = (int(table[name].sum()) for name in ("held", "intervals", "seconds"))
+    holding, intervals, seconds = (int(every[name].sum()) for name in ("held", "intervals", "seconds"))
+    refused = [f"{row['arm']} by {row['refused']}" for row in rows if row["refused"] != "no"]
     return "\n".join([
         *lines,
+        *([f"Sessions that are refused, and shall not be: {', '.join(refused)}."] if refused else []),
         f"95 % intervals of parameters, given the model, that hold the truth: {holding} of {intervals}; "
         f"worst arm {int(least['held'])} of {int(least['intervals'])} ({least['arm']}).",
-        f"{(table['sealed'] == 'yes').sum()} of {len(table)} arms sealed; {seconds / 60 / len(table):.0f} min an arm.",
+        f"{(every['sealed'] == 'yes').sum()} of {len(every)} arms sealed; {seconds / 60 / len(every):.0f} min an arm.",
     ])  # fmt: skip
 
 

@@ -133,14 +133,16 @@ def family_metrics(root: Path) -> dict:
 
 def arm_metrics(table: pd.DataFrame, code: str) -> dict:
     """Of the rows of this code, first attempts: `test.mean` and `test.worst` over arms of every column of errors (% of
-    the arm's length), `test.sealed_arms`, and `test.intervals_held`, the share of intervals that hold the truth."""
+    the arm's length), `test.sealed_arms`, `test.refused_arms`, and `test.intervals_held`, the share of intervals that
+    hold the truth."""
     arms = table[(table["code"] == code) & (table["attempt"] == 1)]
-    errors = arms.filter(regex=r"_(position|tip)$")
+    errors = arms.filter(regex=r"_(position|tip)$")  # none of a session that was refused
     return {
         "test": {
             "mean": errors.mean().to_dict(),
             "worst": errors.max().to_dict(),
             "sealed_arms": int((arms["sealed"] == "yes").sum()),
+            "refused_arms": int((arms["refused"] != "no").sum()),
             "intervals_held": float(arms["held"].sum() / arms["intervals"].sum()),
         }
     }

@@ -72,12 +72,15 @@ def test_the_table_has_mean_and_worst_and_the_readme_shows_its_last_row(tmp_path
         written(tmp_path, error, 2 * error)
         sealed = "yes" if "sealed" in arm else "no"
         rows.append({"arm": arm, "family": family, "sealed": sealed} | cells(tmp_path) | {"seconds": 60.0})
+    refused = {"arm": "oval 2", "family": "oval", "sealed": "no", "held": 0, "intervals": 0, "refused": "filter"}
+    rows.append(refused | {"seconds": 60.0})
     lines = family_table(rows).splitlines()
     assert "| oval | 2 | curls | 2 | 3 | 4 | 6 | 4 |" in lines
     assert "| every | 3 | curls | 4 | 8 | 8 | 16 | 8 |" in lines
     assert "| every | 3 | all | 2 | 4 | 4 | 8 | 4 |" in lines
     assert any("3 of 6; worst arm 1 of 2" in line for line in lines)
-    assert lines[-1] == "1 of 3 arms sealed; 1 min an arm."
+    assert "Sessions that are refused, and shall not be: oval 2 by filter." in lines
+    assert lines[-1] == "1 of 4 arms sealed; 1 min an arm."
     (tmp_path / "tests").mkdir()
     (tmp_path / "tests/limits.yaml").write_text("rehearse: {reach.rate: {min: 0.5}}\n")
     (tmp_path / "docs/results").mkdir(parents=True)
@@ -86,4 +89,5 @@ def test_the_table_has_mean_and_worst_and_the_readme_shows_its_last_row(tmp_path
         write_json(tmp_path / "docs/results/families.json", result)
     text = headline(tmp_path)
     assert ("3 simulated arms" in text) == with_rows
-    assert ("| mean 2 / 4 %, worst arm 4 / 8 % | baseline: mean rest shape, tip 4 % |" in text) == with_rows
+    shown = "| mean 2 / 4 %, worst arm 4 / 8 %; **1 more refused** | baseline: mean rest shape, tip 4 % |"
+    assert (shown in text) == with_rows

@@ -152,18 +152,19 @@ def test_metrics_that_are_missing_end_in_one_line(project, capsys):
 
 
 def arms(**cells):
-    return pd.DataFrame({"code": "abc", "attempt": 1, "sealed": "yes", "held": 9, "intervals": 10, **cells}, index=[0])
+    row = {"code": "abc", "attempt": 1, "sealed": "yes", "refused": "no", "held": 9, "intervals": 10}
+    return pd.DataFrame(row | cells, index=[0])
 
 
 def test_arms_are_those_of_this_code_at_their_first_attempt():
     """Not those of other code, and not a second try at an arm."""
     table = pd.concat([
         arms(curl_tip=1.0), arms(curl_tip=4.0, sealed="no", held=5), arms(curl_tip=90.0, code="old", held=0),
-        arms(curl_tip=80.0, attempt=2, held=0),
+        arms(curl_tip=80.0, attempt=2, held=0), arms(refused="filter", sealed="no", held=0, intervals=0),
     ])  # fmt: skip
     metrics = arm_metrics(table, "abc")["test"]
     assert (metrics["mean"], metrics["worst"]) == ({"curl_tip": 2.5}, {"curl_tip": 4.0})
-    assert (metrics["sealed_arms"], metrics["intervals_held"]) == (1, 0.7)
+    assert (metrics["sealed_arms"], metrics["refused_arms"], metrics["intervals_held"]) == (1, 1, 0.7)
 
 
 def test_arms_that_nobody_measured_with_this_code_end_in_one_line(project, capsys):
