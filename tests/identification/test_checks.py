@@ -75,6 +75,18 @@ def test_exchanged_tendons_show_in_static_pulls(model, static_pulls, columns):
         assert refused(with_columns(trial, list(columns)), model) or columns[largest] == largest, trial.name
 
 
+@pytest.mark.parametrize(("third", "refused"), [(10, False), (14, True)])
+def test_a_small_share_of_a_deep_pull_is_no_exchange(model, third, refused):
+    """As where guide holes are askew: paths of cables that are let out differ by a tenth of what the third pulls."""
+    trial = static_pull(model, [-25, 50, -22])
+    trial = replace(trial, commands=1e-3 * np.array([[6, 50, third]]))
+    if refused:
+        with pytest.raises(InputError, match="longer than commanded"):
+            check_trials([trial], model)
+    else:
+        check_trials([trial], model)
+
+
 def test_static_pulls_that_other_things_bend_too_pass(model):
     """What gravity bends further than tendons do, and what all tendons press."""
     trials = [static_pull(model, [10, -300, -300], 90), static_pull(model, [-300, 10, 5], 120)]

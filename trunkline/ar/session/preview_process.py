@@ -27,7 +27,7 @@ from trunkline.compute.threads import thread_count
 from trunkline.errors import InputError
 from trunkline.kinematics.panda.kinematics import mount_pose
 
-NICE = 10
+NICE = 5  # robot and server go first, but a preview comes on a busy computer too
 PULL = 0.03  # m of the first cable, for a plan that is thrown away
 
 

@@ -16,6 +16,7 @@ WOUND = 5e-3  # m, from which on a tendon counts as wound, and the arm as bent b
 PLACES = 12  # frames of a trial in which several tendons pull in turn
 SHORTER = 0.75  # of the cables' stretch that other names may leave at least, where those given are right
 STRETCH = 2.5e-3  # m, all tendons together, in the mean over frames, from which on more stretch than need be counts
+SHARE = 0.1  # of the deepest pull of each frame, likewise: guide holes that are askew by some degrees cost as much
 ALIKE = 0.5  # of how well pulls and path lengths agree at best; two of three tendons exchanged: -0.5, out of six: 0.5
 SHORTEST, LONGEST = 0.4, 1.5  # of a pull, by which its path is shorter: weak motors and cables that stretch take of it
 OFF = 1e-2  # m between a pull and its path, which an arm bent at rest may have too
@@ -101,7 +102,8 @@ def check_lengths(trial: Trial, model: mujoco.MjModel) -> None:
     shorter = np.array([model.tendon_length0 - _path_lengths(trial, model, frame) for frame in frames])[:, tendons]
     stretch = np.maximum(trial.commands[frames, :, None] - shorter[:, None, :], 0).mean(axis=0)  # (K names, K paths)
     named, best = np.trace(stretch), stretch[linear_sum_assignment(stretch)].sum()
-    if named - best < STRETCH or best >= SHORTER * named:
+    counts = max(STRETCH, SHARE * float(trial.commands[frames].max(axis=1).mean()))
+    if named - best < counts or best >= SHORTER * named:
         return
     worst = int(np.argmax(np.diag(stretch)))
     fault = f"found the path of {trial.tendons[worst]!r} {1e3 * stretch[worst, worst]:.0f} mm longer than commanded"
