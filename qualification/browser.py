@@ -25,7 +25,7 @@ for (const kind of [WebGLRenderingContext, WebGL2RenderingContext]) {
   for (const name of Object.getOwnPropertyNames(kind.prototype).filter((name) => name.startsWith("draw"))) {
     const was = Object.getOwnPropertyDescriptor(kind.prototype, name).value;
     if (typeof was !== "function") continue;
-    kind.prototype[name] = function (...given) { draws = true; return was.apply(this, given); };
+    kind.prototype[name] = function (...args) { draws = true; return was.apply(this, args); };
   }
 }
 const request = globalThis.requestAnimationFrame.bind(globalThis);

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from upkeep.names import REFUSED, bound_names, count_names, repeated_classes
+from upkeep.names import REFUSED, bound_names, count_names, repeated_classes, script_names
 from upkeep.sources import Sources, code_in, parse, python_in, read_checkout
 
 ROOT = Path(__file__).parents[1]
@@ -81,6 +81,28 @@ def test_no_folder_binds_more_vague_names_than_listed_and_none_fewer(sources, ca
 def test_no_class_name_of_the_library_gets_a_further_meaning(sources):
     lines = differences(counted(sources)["classes"], written()["classes"])
     assert not lines, "\n".join(lines)
+
+
+def test_scripts_of_the_page_have_no_vague_names():
+    paths = [path for folder in ("src", "test", "bench") for path in (ROOT / "client" / folder).rglob("*.*js")]
+    names = {str(path): set(script_names(path.read_text(encoding="utf-8"))) & {*REFUSED} for path in paths}
+    assert len(names) > 20
+    assert not any(names.values()), {path: words for path, words in names.items() if words}
+
+
+@pytest.mark.parametrize("script", [
+    "const found = 1;", "for (const [one] of x) y;", "const { said } = x;", "const f = (told) => 1;", "this.held = 1;",
+    "get known() {}", "({ given: 1 });", "f(...seen);", "const KEPT = 1;", 'f("a", own);', "`a`; told; `b`",
+])  # fmt: skip
+def test_a_vague_name_of_a_script_is_noticed(script):
+    assert {*script_names(script)} & {*REFUSED}
+
+
+@pytest.mark.parametrize("script", [
+    'x === "held"', "x.said", "x?.told", "// one\n/* seen\nown */", "`known`", "f(/kept, seen/);", "foundIn = 1",
+])  # fmt: skip
+def test_strings_comments_and_keys_of_messages_are_no_names_of_a_script(script):
+    assert not {*script_names(script)} & {*REFUSED}
 
 
 def test_the_list_goes_when_it_is_empty():

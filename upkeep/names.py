@@ -7,6 +7,7 @@ either end are left out, so `_found` is `found`; `found_in` is another name.
 """
 
 import ast
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
 
@@ -15,6 +16,11 @@ from upkeep.sources import Sources, parse
 REFUSED = ("found", "told", "one", "own", "said", "seen", "given", "held", "kept", "known")  # in tests/test_names.py
 VAGUE = (*REFUSED, "heard", "asked", "shown", "meant")
 Function = ast.FunctionDef | ast.AsyncFunctionDef
+# Of a script: comments, strings and patterns; names but for properties of others than `this`, as keys are the wire's.
+_NO_NAMES = re.compile(
+    r'//.*|/\*[\s\S]*?\*/|"(?:\\.|[^"\\\n])*"|`(?:\\.|[^`\\])*`|(?<=[(\[,:=&|?! ])/(?! )(?:\\.|[^/\\\n])+/'
+)
+_NAME = re.compile(r"(?:(?<![\w$.])|(?<=\bthis\.)|(?<=\.{3}))[A-Za-z_$][\w$]*")
 
 
 def bound_names(tree: ast.AST) -> Iterator[str]:
@@ -31,6 +37,11 @@ def _bound(node: ast.AST) -> str | None:
         case ast.arg(arg=name) | ast.alias(asname=name) | ast.ExceptHandler(name=name) | ast.MatchAs(name=name):
             return name
     return None
+
+
+def script_names(text: str) -> Iterator[str]:
+    """Every name of a script in JavaScript, once for each place that binds or uses it, but for keys of messages."""
+    return (name.strip("_").lower() for name in _NAME.findall(_NO_NAMES.sub(" ", text)))
 
 
 def count_names(sources: Sources, words: Iterable[str] = VAGUE) -> tuple[int, int]:

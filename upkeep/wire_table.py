@@ -38,8 +38,8 @@ def table() -> dict:
         "MARKERS": list(binary.MARKERS),
         "FROM_SERVER": {name: _kind(kind) for name, kind in binary.FROM_SERVER.items()},
         "FROM_CLIENT": {name: _kind(kind) for name, kind in binary.FROM_CLIENT.items()},
-        "SAID": {_type(kind): _fields(kind) for kind in messages.CLIENT_MESSAGES},
-        "ANSWERS": {_type(kind): _fields(kind) for kind in messages.SERVER_MESSAGES},
+        "CLIENT_MESSAGES": {_type(kind): _fields(kind) for kind in messages.CLIENT_MESSAGES},
+        "SERVER_MESSAGES": {_type(kind): _fields(kind) for kind in messages.SERVER_MESSAGES},
     }
 
 
@@ -58,8 +58,8 @@ def blocks() -> dict[str, str]:
         "wire_head": "\n".join(head),
         "wire_server": _kinds(binary.FROM_SERVER),
         "wire_client": _kinds(binary.FROM_CLIENT),
-        "wire_said": _messages(messages.CLIENT_MESSAGES),
-        "wire_answers": _messages(messages.SERVER_MESSAGES),
+        "wire_client_messages": _messages(messages.CLIENT_MESSAGES),
+        "wire_server_messages": _messages(messages.SERVER_MESSAGES),
     }
 
 

@@ -4,13 +4,13 @@
 //
 // A line of JSON each way: {lead: k} asks for the robot to be led to its place number k, and is answered by {mark}, where
 // the flange's mark is in the base then, m. {run, presses, touches, off, expected, why} ends a run, answered by {}; why:
-// "" where all went well, off: m, of the point AT of the base, JSON, where it was found.
+// "" where all went well, off: m, of the point AT of the base, JSON, as aligned.
 
 import { createInterface } from "node:readline";
 import { frames, inMode, launch, open, point, press, set, until } from "../test/harness.mjs";
 
-const TIP = [0.01, -0.03, -0.05]; // m, of the controller's tip, which nobody is told
-const TREMOR = 2e-4, TOUCH = 1e-3; // m along each axis: of a hand that is kept still, and of a touch
+const TIP = [0.01, -0.03, -0.05]; // m, of the controller's tip, which the server has to calibrate
+const TREMOR = 2e-4, TOUCH = 1e-3; // m along each axis: of a hand at rest, and of a touch
 const RIGID = [0.5, 0, 0.55], SOFT = [0.62, 0, 0.2], ASIDE = 0.15; // m, of the targets; to both sides, in turns
 const MOST_TOUCHES = 12, TOUCHED = 20_000; // ms that a touch may take
 
@@ -44,37 +44,37 @@ function operate({ tip, tremor, base }) {
 }
 
 const hold = (page, at, how = {}) => page.evaluate((hand) => (globalThis.hand = hand), { at, ...how });
-const aligning = (page) => page.evaluate(() => ({ step: globalThis.trunkline.immersive.aligning.step, said: globalThis.trunkline.immersive.aligning.said }));
+const alignment = (page) => page.evaluate(() => ({ step: globalThis.trunkline.immersive.alignment.step, feedback: globalThis.trunkline.immersive.alignment.feedback }));
 const gauss = () => Math.sqrt(-2 * Math.log(1 - Math.random())) * Math.cos(2 * Math.PI * Math.random());
 
-/** Six touches and what goes before, as the board says: the tip in a dent, then the mark wherever the robot holds it. */
+/** Six touches and what goes before, by the board's instructions: the tip in a dent, then the mark wherever the robot holds it. */
 async function align(page, where) {
   await press(page, "right", "thumbstick");
-  await until(page, () => globalThis.trunkline.immersive.aligning.step === "tip");
+  await until(page, () => globalThis.trunkline.immersive.alignment.step === "tip");
   await hold(page, [0.3, 1, -0.4], { turning: true });
-  await until(page, () => globalThis.trunkline.immersive.aligning.step === "touch");
+  await until(page, () => globalThis.trunkline.immersive.alignment.step === "touch");
   await hold(page, [0.3, 1.2, -0.4], { moving: true });
   let touches = 0;
-  for (; touches < MOST_TOUCHES && (await aligning(page)).step === "touch"; touches++) {
+  for (; touches < MOST_TOUCHES && (await alignment(page)).step === "touch"; touches++) {
     const { mark } = await ask({ lead: touches });
-    const { said } = await aligning(page);
+    const { feedback } = await alignment(page);
     const place = (await page.evaluate((point) => globalThis.room(point), mark)).map((value) => value + TOUCH * gauss());
     await hold(page, place);
     const end = Date.now() + TOUCHED;
-    for (let now = await aligning(page); now.said === said && now.step === "touch"; now = await aligning(page)) {
-      if (Date.now() > end) throw new Error(`touch ${touches + 1} was not heard: ${said}`);
+    for (let now = await alignment(page); now.feedback === feedback && now.step === "touch"; now = await alignment(page)) {
+      if (Date.now() > end) throw new Error(`touch ${touches + 1} was not heard: ${feedback}`);
       await page.waitForTimeout(50);
     }
     await hold(page, place.map((value, axis) => value + (axis === 1 ? 0.2 : 0)), { moving: true });
   }
-  await until(page, () => globalThis.trunkline.immersive.aligning.done && globalThis.trunkline.immersive.anchor && true);
+  await until(page, () => globalThis.trunkline.immersive.alignment.done && globalThis.trunkline.immersive.anchor && true);
   await hold(page, null);
-  const found = await page.evaluate((at) => {
-    const { place, told } = globalThis.trunkline.immersive.aligning;
-    const seen = place.position.clone().set(...at).applyQuaternion(place.quaternion).add(place.position).toArray();
-    return { off: Math.hypot(...globalThis.room(at).map((value, axis) => value - seen[axis])), expected: told.expected };
+  const result = await page.evaluate((at) => {
+    const { place, progress } = globalThis.trunkline.immersive.alignment;
+    const estimate = place.position.clone().set(...at).applyQuaternion(place.quaternion).add(place.position).toArray();
+    return { off: Math.hypot(...globalThis.room(at).map((value, axis) => value - estimate[axis])), expected: progress.expected };
   }, where);
-  return { ...found, touches };
+  return { ...result, touches };
 }
 
 /** Aim with both rays, ask, watch, confirm, until the robot has done it; how often the trigger was pressed. */
@@ -112,7 +112,7 @@ const browser = await launch();
 try {
   for (let run = 0; run < Number(runs); run++) {
     const closing = [], counted = { presses: 0 };
-    let found = {}, why = "";
+    let accuracy = {}, why = "";
     try {
       const { page, wrongs } = await open({ after: (work) => closing.push(work) }, browser, { url, origin: new URL(url).origin }, { headset: true, drawn: false, width: 320, height: 240 });
       const yaw = Math.PI * (2 * Math.random() - 1), [c, s] = [Math.cos(yaw / 2), Math.sin(yaw / 2)], h = Math.SQRT1_2;
@@ -123,15 +123,15 @@ try {
       await until(page, () => !document.querySelector("#immerse").hidden);
       await page.click("#immerse");
       await until(page, () => globalThis.trunkline.immersive.session && globalThis.trunkline.wire.controls);
-      await until(page, () => globalThis.trunkline.immersive.aligning.place && true);
-      found = await align(page, JSON.parse(at));
+      await until(page, () => globalThis.trunkline.immersive.alignment.place && true);
+      accuracy = await align(page, JSON.parse(at));
       await cycle(page, run, counted);
       if (wrongs.length) throw new Error(wrongs[0]);
     } catch (error) {
       why = error.message.split("\n")[0] || "it failed";
     }
     for (const work of closing) await work();
-    await ask({ run, ...counted, ...found, why });
+    await ask({ run, ...counted, ...accuracy, why });
   }
 } finally {
   await browser.close();

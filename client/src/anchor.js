@@ -1,4 +1,4 @@
-// One anchor at the robot's base, kept by the headset from one session to the next; the server knows it by its id.
+// One anchor at the robot's base, which the headset keeps from one session to the next; the server identifies it by its id.
 
 import { Quaternion, Vector3 } from "three";
 

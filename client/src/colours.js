@@ -1,4 +1,4 @@
-// Okabe and Ito's colours, told apart by the colour-blind. Whatever a colour says, a shape or a word says too.
+// Okabe and Ito's colours, distinguishable to the colour-blind. What a colour means, a shape or a word shows as well.
 
 export const MOUNT = 0x56b4e9; // sky blue: the mount's target
 export const TIP = 0xe69f00; // orange: the tip's

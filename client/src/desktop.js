@@ -3,41 +3,41 @@
 // A ray's length is the core's. So a hand is put where its ray ends at the wanted point, and sends no stick for it.
 
 import { MathUtils, Matrix4, Plane, Quaternion, Raycaster, Vector2, Vector3 } from "three";
-import { axisOf, onAxis, thingAt } from "./handles.js";
+import { axisOf, onAxis, objectAt } from "./handles.js";
 import { matrixOf } from "./geoms.js";
 import { HANDS } from "./wire_table.js";
 import { noHand } from "./wire.js";
 
 const NEAR = 42; // pixels within which a marker is taken
 const BESIDE = { mouse: 9, pen: 12, touch: 22 }; // pixels within which a handle is taken
-const MARGIN = 0.01; // m about a thing, which is small on the screen
+const MARGIN = 0.01; // m about an object, which is small on the screen
 const STEP = 0.01, FINE = 0.001, TILT = MathUtils.degToRad(2); // of an arrow
 const WHEEL = 0.0006; // m a pixel of the wheel
-const PRESS = 4; // inputs in which a key's press is held, so that it is heard however slowly they are sent
+const PRESS = 4; // inputs for which a press lasts, so that it arrives however slowly they are sent
 const SETTLES = 0.7; // s for which a target keeps its grip after a step, until the core's filter is there; while aiming alone
 const DOWN = new Vector3(0, 0, -1);
 const ARROWS = { ArrowLeft: [-1, 0, 0], ArrowRight: [1, 0, 0], ArrowUp: [0, 1, 0], ArrowDown: [0, -1, 0], PageUp: [0, 0, 1], PageDown: [0, 0, -1] };
 
 export class DesktopHands {
   /**
-   * `acts`: what else keys do: `stop`, `reach`; `held(on)` is told of the dead man's key, `pressed(code)` of
-   * each key. Positions are in the base frame, z up.
+   * `acts`: what else keys do: `stop` and `reach`; `deadman(on)` at each change of the dead man's key, `key(code)` at
+   * each key pressed. Positions are in the base frame, z up.
    */
   constructor(canvas, camera, orbit, base, marks, handles, rigidHand, acts) {
     Object.assign(this, { canvas, camera, orbit, base, marks, handles, acts });
-    this.things = []; // what a tip's marker that is dragged onto it marks
+    this.objects = []; // an object onto which the tip's marker is dragged is marked by it
     this.axis = -1; // of the handle that is dragged
     this.touches = matchMedia("(pointer: coarse)").matches; // else there are keys
     this.rigid = HANDS.indexOf(rigidHand);
     this.wanted = [null, null];
-    this.length = 0.6; // m, of the core's rays; it tells where they end
+    this.length = 0.6; // m, of the core's rays, from hand to end
     this.pointing = DOWN.clone();
     this.chosen = this.rigid;
     this.dragging = false;
     this.aiming = false; // whether the core aims
-    this.dead = false; // the dead man's key or button
-    this.left = {}; // inputs in which a button is still to be held
-    this.until = { trigger: 0, primary: 0, stick_pressed: 0, grip: 0, tilt: 0 };
+    this.deadman = false; // the dead man's key or button
+    this.pressedInputs = {}; // by button: inputs for which it stays pressed
+    this.pressedUntil = { trigger: 0, primary: 0, stick_pressed: 0, grip: 0, tilt: 0 }; // s, of the page
     this.listen();
   }
 
@@ -51,7 +51,7 @@ export class DesktopHands {
     addEventListener("pointerdown", ({ pointerType }) => (this.touches = pointerType === "touch"), true);
     addEventListener("keydown", (event) => this.key(event));
     addEventListener("keyup", (event) => event.code === "KeyG" && this.hold(false));
-    addEventListener("blur", () => this.letGo()); // a key let go elsewhere is never heard of
+    addEventListener("blur", () => this.letGo()); // a key let go elsewhere causes no event
     document.addEventListener("visibilitychange", () => document.hidden && this.letGo());
   }
 
@@ -61,29 +61,29 @@ export class DesktopHands {
   }
 
   hold(on) {
-    this.dead = on;
-    this.acts.held(on);
+    this.deadman = on;
+    this.acts.deadman(on);
   }
 
   press(button, seconds = 0) {
-    this.until[button] = performance.now() / 1000 + seconds;
-    this.left[button] = PRESS;
+    this.pressedUntil[button] = performance.now() / 1000 + seconds;
+    this.pressedInputs[button] = PRESS;
   }
 
   /** An offer is taken by a hand that grips nothing: a target that still settles is let go. */
   accept() {
-    this.until.grip = this.left.grip = 0;
+    this.pressedUntil.grip = this.pressedInputs.grip = 0;
     this.press("primary");
   }
 
-  /** Where both targets begin: at the robot's own mount and tip, so that they are seen. */
+  /** Where both targets begin: at the robot's own mount and tip, so that they are in view. */
   begin(mount, tip) {
-    const other = 1 - this.rigid;
+    const soft = 1 - this.rigid;
     this.wanted[this.rigid] ??= mount.clone();
-    this.wanted[other] ??= tip.clone();
+    this.wanted[soft] ??= tip.clone();
   }
 
-  /** What the core's rays say of their length: how far each end is from where its hand was. */
+  /** The length of the core's rays: from where the hand was to the ray's end. */
   measure(end, start) {
     const length = end.distanceTo(start);
     if (Number.isFinite(length) && length > 0.01) this.length = length;
@@ -117,8 +117,8 @@ export class DesktopHands {
       if (slid) this.wanted[this.chosen] = slid.sub(this.slid).add(this.began);
       return;
     }
-    const thing = this.chosen === this.rigid ? null : thingAt(this.rayInBase(event), this.things, inverseOf, MARGIN);
-    if (thing) return void (this.wanted[this.chosen] = new Vector3(...thing.position));
+    const object = this.chosen === this.rigid ? null : objectAt(this.rayInBase(event), this.objects, inverseOf, MARGIN);
+    if (object) return void (this.wanted[this.chosen] = new Vector3(...object.position));
     const point = this.onPlane(event);
     if (point) this.wanted[this.chosen] = this.inBase(point.add(this.grabbed));
   }
@@ -149,7 +149,7 @@ export class DesktopHands {
     if (event.ctrlKey || event.metaKey) return;
     this.touches = false;
     const isButton = code === "Enter" && event.target instanceof HTMLElement && /^(BUTTON|SUMMARY)$/.test(event.target.tagName);
-    if (!event.repeat && !isButton) this.acts.pressed(code);
+    if (!event.repeat && !isButton) this.acts.key(code);
     if (code === "KeyG" && !event.repeat) return this.hold(true);
     if (code in ARROWS && !(event.target instanceof HTMLInputElement)) return this.arrow(event);
     if (event.repeat) return;
@@ -183,15 +183,15 @@ export class DesktopHands {
     this.press("tilt", SETTLES);
   }
 
-  /** Whether the user holds anything that the core waits to be let go. */
-  get isHeld() {
-    return this.dead || this.dragging;
+  /** Whether a key or the mouse is pressed; the core waits until none is. */
+  get isPressed() {
+    return this.deadman || this.dragging;
   }
 
   /** Both hands now, in the base frame. */
   hands() {
     const now = performance.now() / 1000;
-    const down = (name) => now < this.until[name] || this.left[name] > 0;
+    const down = (name) => now < this.pressedUntil[name] || this.pressedInputs[name] > 0;
     const hands = {};
     HANDS.forEach((side, index) => {
       const hand = noHand();
@@ -204,13 +204,13 @@ export class DesktopHands {
       hand.tracked = true;
       hand.position = start.toArray();
       hand.quaternion = [turn.w, turn.x, turn.y, turn.z];
-      const mine = this.dragging || (this.aiming && down("grip")); // no grip lasts beyond the hand where a robot may move
-      hand.grip = this.dead || tilting || (mine && index === this.chosen);
+      const gripping = this.dragging || (this.aiming && down("grip")); // no grip lasts beyond the hand where a robot may move
+      hand.grip = this.deadman || tilting || (gripping && index === this.chosen);
       hand.primary = down("primary") || tilting;
       hand.trigger = down("trigger") && index === this.rigid;
       hand.stick_pressed = down("stick_pressed") && index === this.rigid;
     });
-    for (const name of Object.keys(this.left)) this.left[name] = Math.max(this.left[name] - 1, 0);
+    for (const name of Object.keys(this.pressedInputs)) this.pressedInputs[name] = Math.max(this.pressedInputs[name] - 1, 0);
     return hands;
   }
 
@@ -231,9 +231,9 @@ export class DesktopHands {
   }
 
   toScreen(point) {
-    const seen = this.inRoom(point).project(this.camera);
+    const projected = this.inRoom(point).project(this.camera);
     const { clientWidth, clientHeight } = this.canvas;
-    return [((seen.x + 1) / 2) * clientWidth, ((1 - seen.y) / 2) * clientHeight];
+    return [((projected.x + 1) / 2) * clientWidth, ((1 - projected.y) / 2) * clientHeight];
   }
 
   /** From the eye through a point of the screen, in the room. */

@@ -33,11 +33,11 @@ export function mergedGeoms(geoms, meshes) {
   const parts = [];
   for (const { body, shape, size, position, quaternion, rgba, mesh } of geoms) {
     if (shape === "mesh" && !shaded.has(mesh)) shaded.set(mesh, meshGeometry(meshes[mesh]));
-    const made = shape === "mesh" ? shaded.get(mesh).clone() : SHAPES[shape]?.(size)?.toNonIndexed();
-    if (!made) continue;
-    made.applyMatrix4(matrixOf(position, quaternion));
-    made.deleteAttribute("uv");
-    parts.push(painted(made, body, rgba));
+    const geometry = shape === "mesh" ? shaded.get(mesh).clone() : SHAPES[shape]?.(size)?.toNonIndexed();
+    if (!geometry) continue;
+    geometry.applyMatrix4(matrixOf(position, quaternion));
+    geometry.deleteAttribute("uv");
+    parts.push(painted(geometry, body, rgba));
   }
   return parts.length ? mergeGeometries(parts) : null;
 }

@@ -4,7 +4,7 @@ import { CylinderGeometry, ConeGeometry, Group, Mesh, MeshBasicMaterial, Ray, Ve
 import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
 
 const AXES = [new Vector3(1, 0, 0), new Vector3(0, 1, 0), new Vector3(0, 0, 1)];
-const COLOURS = [0xe8705a, 0x7ccf6a, 0x6aa9f0]; // x, y, z, as such handles have them everywhere; the way they point says it too
+const COLOURS = [0xe8705a, 0x7ccf6a, 0x6aa9f0]; // x, y, z, as usual for such handles; their direction distinguishes them as well
 const FROM = 0.06, LONG = 0.13; // m at 1 m from the eye, of an arrow that begins beside the target's ring
 const LARGEST = 2.5, SMALLEST = 0.5;
 
@@ -42,7 +42,7 @@ export class Handles {
     AXES.forEach((axis, index) => {
       const [from, to] = [at(axis, FROM), at(axis, LONG + 0.012)];
       const [dx, dy] = [to[0] - from[0], to[1] - from[1]], long = dx * dx + dy * dy;
-      if (long < 100) return; // it points at the viewer: nobody could say how far it is dragged
+      if (long < 100) return; // it points at the viewer: how far it is dragged is undefined
       const share = Math.min(Math.max(((x - from[0]) * dx + (y - from[1]) * dy) / long, 0), 1);
       const away = Math.hypot(x - from[0] - share * dx, y - from[1] - share * dy);
       if (away < least) [best, least] = [index, away];
@@ -55,22 +55,22 @@ export class Handles {
 export function onAxis(ray, point, axis) {
   const between = new Vector3().subVectors(point, ray.origin), along = axis.dot(ray.direction);
   const share = 1 - along * along;
-  if (share < 1e-3) return null; // seen end on
-  const way = (along * between.dot(ray.direction) - between.dot(axis)) / share;
-  return point.clone().addScaledVector(axis, way);
+  if (share < 1e-3) return null; // end on: along the line of sight
+  const offset = (along * between.dot(ray.direction) - between.dot(axis)) / share;
+  return point.clone().addScaledVector(axis, offset);
 }
 
 export const axisOf = (index) => AXES[index];
 
-/** The nearest of the `things` that `ray` meets, both in the base frame, or comes within `margin` m of; null for none. */
-export function thingAt(ray, things, toLocal, margin) {
+/** The nearest of the `objects` that `ray` meets, both in the base frame, or comes within `margin` m of; null for none. */
+export function objectAt(ray, objects, toLocal, margin) {
   let best = null, least = Infinity;
-  for (const thing of things) {
-    const inverse = toLocal(thing);
+  for (const object of objects) {
+    const inverse = toLocal(object);
     const local = new Ray(ray.origin.clone().applyMatrix4(inverse), ray.direction.clone().transformDirection(inverse));
-    const half = new Vector3(thing.diameter / 2, thing.diameter / 2, (thing.shape === "sphere" ? thing.diameter : thing.height) / 2).addScalar(margin);
-    const met = meets(local, half);
-    if (met !== null && met < least) [best, least] = [thing, met];
+    const half = new Vector3(object.diameter / 2, object.diameter / 2, (object.shape === "sphere" ? object.diameter : object.height) / 2).addScalar(margin);
+    const distance = meets(local, half);
+    if (distance !== null && distance < least) [best, least] = [object, distance];
   }
   return best;
 }
@@ -79,10 +79,10 @@ export function thingAt(ray, things, toLocal, margin) {
 function meets({ origin, direction }, half) {
   let from = 0, to = Infinity;
   for (const axis of ["x", "y", "z"]) {
-    const [one, other] = [-1, 1].map((side) => (side * half[axis] - origin[axis]) / direction[axis]);
-    if (!Number.isFinite(one) && Math.abs(origin[axis]) > half[axis]) return null;
-    if (!Number.isFinite(one)) continue;
-    [from, to] = [Math.max(from, Math.min(one, other)), Math.min(to, Math.max(one, other))];
+    const [low, high] = [-1, 1].map((side) => (side * half[axis] - origin[axis]) / direction[axis]);
+    if (!Number.isFinite(low) && Math.abs(origin[axis]) > half[axis]) return null;
+    if (!Number.isFinite(low)) continue;
+    [from, to] = [Math.max(from, Math.min(low, high)), Math.min(to, Math.max(low, high))];
   }
   return from <= to ? from : null;
 }

@@ -1,4 +1,4 @@
-// What the page itself says to whom is at it: in words of the device at hand, and only what is true now.
+// The page's own hints for its user: in words of the device at hand, and only while they are true.
 
 /** Words of controllers, as the core writes its notices, in those of a keyboard. */
 const BY_KEYS = [
@@ -29,7 +29,7 @@ const BY_TOUCH = [
   [/\bG\b/g, "“Let it move”"],
 ];
 
-const replaced = (text, pairs) => pairs.reduce((words, [from, to]) => words.replace(from, to), text);
+const replaced = (text, pairs) => pairs.reduce((line, [from, to]) => line.replace(from, to), text);
 
 /** `text` of the server for a `device`: "controllers", "keys" or "touch". */
 export function ofDevice(text, device) {
@@ -38,8 +38,8 @@ export function ofDevice(text, device) {
   return device === "touch" ? replaced(keys, BY_TOUCH) : keys;
 }
 
-/** What is next while the core holds: it waits until nothing is held, and only then. */
-export const whileHolding = (held) => (held ? "let go of G and of the mouse for a moment" : "wait a moment, aiming begins by itself");
+/** The next action while the core holds: it waits until nothing is pressed. */
+export const whileHolding = (pressed) => (pressed ? "let go of G and of the mouse for a moment" : "wait a moment, aiming begins by itself");
 
 /** Whether the cause of a `notice` that stands while aiming is still there. */
 export function lasts(notice, { mode, targets, gripped }) {
@@ -91,19 +91,19 @@ export function whyLost({ gap, hidden }) {
   return `Control was lost: ${why}. Press “Take control” to go on.`;
 }
 
-const DOUBTFUL = 0.75; // share of futures in which a grasp must hold, else confirming it asks twice
+const DOUBTFUL = 0.75; // share of futures in which a grasp must hold, else confirming it takes two presses
 
-/** Whether a grasp that is foreseen so is likely to fail. */
-export const isDoubtful = (told) => (told?.probability ?? 1) < DOUBTFUL;
+/** Whether a grasp with this prediction is likely to fail. */
+export const isDoubtful = (prediction) => (prediction?.probability ?? 1) < DOUBTFUL;
 
-/** What is asked when a doubtful grasp is confirmed for the first time. */
-export const askedTwice = (told) => `Foreseen to hold in only ${Math.round(100 * told.probability)} % of cases. Pull the trigger again to confirm it all the same.`;
+/** The question at the first press that would confirm a doubtful grasp. */
+export const doubtQuestion = (prediction) => `Foreseen to hold in only ${Math.round(100 * prediction.probability)} % of cases. Pull the trigger again to confirm it all the same.`;
 
-/** What a motion that has arrived has brought about, by the `phases` of its plan and what is believed of the `things`. */
-export function success(phases, things) {
-  const named = new Set(phases);
-  const object = things.find(({ support }) => support === "held");
-  if (object && named.has("lift")) return `Held: lift of ${object.name} is done. Now point where it goes.`;
-  if (named.has("release")) return "Put down: the arm has let go. Aim anew for the next motion.";
+/** The result of a motion that has arrived, by the `phases` of its plan and the `objects` as the server has them. */
+export function success(phases, objects) {
+  const names = new Set(phases);
+  const object = objects.find(({ support }) => support === "held");
+  if (object && names.has("lift")) return `Held: lift of ${object.name} is done. Now point where it goes.`;
+  if (names.has("release")) return "Put down: the arm has let go. Aim anew for the next motion.";
   return "Arrived. Aim anew for the next motion.";
 }

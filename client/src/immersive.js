@@ -2,7 +2,7 @@
 
 import { Quaternion, Vector3 } from "three";
 import { HANDS } from "./wire_table.js";
-import { Aligning, toWire } from "./aligning.js";
+import { Alignment, toWire } from "./alignment.js";
 import { fasten, placeOf, restore } from "./anchor.js";
 import { noHand } from "./wire.js";
 
@@ -15,12 +15,12 @@ const CREEP = 0.0005, CREEP_TURN = 0.0005; // m and rad of an anchor that are no
 export const canImmerse = async () => Boolean(await navigator.xr?.isSessionSupported("immersive-ar").catch(() => false));
 
 export class Immersive {
-  /** `say(type, fields)`: to the server. `ended()`: the session. */
-  constructor(renderer, say, ended) {
-    Object.assign(this, { renderer, say, ended });
+  /** `sendJson(type, fields)`: to the server. `ended()`: called when the session ends. */
+  constructor(renderer, sendJson, ended) {
+    Object.assign(this, { renderer, sendJson, ended });
     this.session = null;
-    this.aligning = new Aligning();
-    this.held = { left: new Set(), right: new Set() };
+    this.alignment = new Alignment();
+    this.buttons = { left: new Set(), right: new Set() };
   }
 
   /** From a user's click. */
@@ -30,7 +30,7 @@ export class Immersive {
       optionalFeatures: ["anchors", "hand-tracking"],
     });
     this.session = session;
-    this.aligning.begin();
+    this.alignment.begin();
     this.leaveAnchor();
     session.addEventListener("end", () => {
       this.session = null;
@@ -54,33 +54,33 @@ export class Immersive {
 
   /** The room's frame has leapt: what stood in it is elsewhere. An anchor stays with the room. */
   recentred() {
-    if (this.anchor) return this.tell(null);
-    this.say("alignment", { pose: null });
+    if (this.anchor) return this.sendAnchor(null);
+    this.sendJson("alignment", { pose: null });
   }
 
-  /** What the server says of the alignment. */
-  heard(told) {
+  /** The server's progress of the alignment. */
+  receive(progress) {
     if (!this.session) return;
-    this.fastening ||= told.fasten && !this.aligning.told?.fasten;
-    this.aligning.heard(told);
-    if (told.step === "lost") this.sent = undefined; // it waits to hear where the anchor is
-    if (told.fasten || told.anchor === this.wanted) return;
+    this.fastening ||= progress.fasten && !this.alignment.progress?.fasten;
+    this.alignment.receive(progress);
+    if (progress.step === "lost") this.sent = undefined; // the server waits for the anchor's pose
+    if (progress.fasten || progress.anchor === this.anchorId) return;
     this.deleteAnchor();
-    this.wanted = told.anchor;
-    if (this.wanted) this.restore(this.wanted);
+    this.anchorId = progress.anchor;
+    if (this.anchorId) this.restore(this.anchorId);
   }
 
   async restore(id) {
-    const { session } = this, found = await restore(session, id);
-    if (session === this.session && this.wanted === id) this.anchor = found;
+    const { session } = this, anchor = await restore(session, id);
+    if (session === this.session && this.anchorId === id) this.anchor = anchor;
   }
 
-  /** `wanted`: id of the anchor that the server knows. `sent`: where it was told to be. */
+  /** `anchorId`: of the anchor that the server follows. `sent`: its pose as last sent. */
   leaveAnchor() {
-    [this.anchor, this.wanted, this.sent, this.fastening] = [null, "", undefined, false];
+    [this.anchor, this.anchorId, this.sent, this.fastening] = [null, "", undefined, false];
   }
 
-  /** One that is worth nothing any more; a headset keeps only some. */
+  /** Deletes an anchor that is of no use any more; a headset keeps only some. */
   deleteAnchor() {
     const { anchor, id } = this.anchor ?? {};
     anchor?.delete?.();
@@ -88,80 +88,80 @@ export class Immersive {
     this.leaveAnchor();
   }
 
-  /** What happens at a frame of the headset; returns both hands in the room's frame. */
+  /** At each frame of the headset; returns both hands in the room's frame. */
   frame(frame) {
-    const seen = this.controllers(frame);
+    const controllers = this.readControllers(frame);
     const viewer = frame.getViewerPose(this.space);
     this.eye = viewer && { position: vector(viewer.transform.position), quaternion: quaternion(viewer.transform.orientation) };
     if (this.fastening) this.fasten(frame);
     if (this.anchor) this.follow(frame);
-    if (this.eye && !this.aligning.done) {
-      const wish = this.aligning.hear(seen, this.eye);
-      if (wish === "touch") this.say("touch", {});
-      if (wish === "here") this.say("alignment", { pose: toWire(this.aligning.place) });
+    if (this.eye && !this.alignment.done) {
+      const request = this.alignment.update(controllers, this.eye);
+      if (request === "touch") this.sendJson("touch", {});
+      if (request === "here") this.sendJson("alignment", { pose: toWire(this.alignment.place) });
     }
-    return this.hands(seen);
+    return this.hands(controllers);
   }
 
-  /** An anchor where the server says that the base is. */
+  /** Fastens an anchor at the base's pose. */
   fasten(frame) {
     this.deleteAnchor();
     const { session } = this;
-    fasten(frame, this.space, this.aligning.place).then((found) => {
-      if (session === this.session && found) [this.anchor, this.wanted] = [found, found.id];
+    fasten(frame, this.space, this.alignment.place).then((anchor) => {
+      if (session === this.session && anchor) [this.anchor, this.anchorId] = [anchor, anchor.id];
     }).catch(() => {}); // without one, a recentring asks to align again
   }
 
-  /** Tells where the anchor is. */
+  /** Sends the anchor's pose where it has changed. */
   follow(frame) {
     const place = placeOf(frame, this.space, this.anchor.anchor), { sent } = this;
     const crept = place && sent && place.position.distanceTo(sent.position) < CREEP && place.quaternion.angleTo(sent.quaternion) < CREEP_TURN;
-    if (!crept && (place || sent !== null)) this.tell(place);
+    if (!crept && (place || sent !== null)) this.sendAnchor(place);
   }
 
-  tell(place) {
+  sendAnchor(place) {
     this.sent = place;
-    this.say("anchor", { id: this.anchor.id, pose: place && toWire(place) });
+    this.sendJson("anchor", { id: this.anchor.id, pose: place && toWire(place) });
   }
 
-  /** The controllers that are tracked, with buttons that are held and those `pressed` since the frame before. */
-  controllers(frame) {
-    const found = { left: null, right: null };
+  /** The tracked controllers: `buttons` that are down, and those `pressed` since the frame before. */
+  readControllers(frame) {
+    const controllers = { left: null, right: null };
     for (const source of this.session.inputSources) {
       if (!HANDS.includes(source.handedness) || !source.gamepad) continue;
       const pose = frame.getPose(source.targetRaySpace, this.space);
       const button = (name) => Boolean(source.gamepad.buttons[BUTTONS[name]]?.pressed);
-      const held = new Set(Object.keys(BUTTONS).filter(button));
-      const before = this.held[source.handedness];
-      this.held[source.handedness] = held;
+      const buttons = new Set(Object.keys(BUTTONS).filter(button));
+      const before = this.buttons[source.handedness];
+      this.buttons[source.handedness] = buttons;
       // An emulated position is a guess of the headset's: no touch, no target.
       if (!pose || pose.emulatedPosition) continue;
       const { position, orientation } = pose.transform;
-      found[source.handedness] = {
+      controllers[source.handedness] = {
         source,
         position: vector(position),
         quaternion: quaternion(orientation),
-        held,
-        pressed: new Set([...held].filter((name) => !before.has(name))),
-        grip: held.has("grip"),
+        buttons,
+        pressed: new Set([...buttons].filter((name) => !before.has(name))),
+        grip: buttons.has("grip"),
         stick: STICK.map((axis) => source.gamepad.axes[axis] ?? 0),
       };
     }
-    this.seen = found;
-    return found;
+    this.controllers = controllers;
+    return controllers;
   }
 
   /** As the wire has them. */
-  hands(seen) {
+  hands(controllers) {
     const hands = { left: noHand(), right: noHand() };
     for (const side of HANDS) {
-      const one = seen[side];
+      const controller = controllers[side];
       // A stop counts from a controller that is not tracked, too.
-      hands[side].secondary = this.held[side].has("secondary");
-      if (!one) continue;
-      const { position: p, quaternion: q } = one;
-      for (const name of Object.keys(BUTTONS)) hands[side][name] = one.held.has(name);
-      const [right, back] = one.stick;
+      hands[side].secondary = this.buttons[side].has("secondary");
+      if (!controller) continue;
+      const { position: p, quaternion: q } = controller;
+      for (const name of Object.keys(BUTTONS)) hands[side][name] = controller.buttons.has(name);
+      const [right, back] = controller.stick;
       // WebXR's stick is negative forward, the wire's positive.
       Object.assign(hands[side], { tracked: true, position: p.toArray(), quaternion: [q.w, q.x, q.y, q.z], stick: [right, -back] });
     }
@@ -170,7 +170,7 @@ export class Immersive {
 
   /** A tick in the hand of `side`. */
   tick(side) {
-    const pad = this.seen?.[side]?.source.gamepad;
+    const pad = this.controllers?.[side]?.source.gamepad;
     const motor = pad?.hapticActuators?.[0];
     if (motor?.pulse) motor.pulse(...TICK);
     else pad?.vibrationActuator?.playEffect?.("dual-rumble", { strongMagnitude: TICK[0], duration: TICK[1] });

@@ -1,4 +1,4 @@
-// A line of text in the room that faces the viewer; it is drawn again only when its words change.
+// A line of text in the room that faces the viewer; it is drawn again only when the text changes.
 
 import { CanvasTexture, LinearFilter, Sprite, SpriteMaterial, SRGBColorSpace } from "three";
 import { css } from "./colours.js";
@@ -18,25 +18,25 @@ export class Label {
     this.sprite.center.set(0, 0); // the text stands right of its place, and above it
     this.sprite.renderOrder = 10;
     this.colour = colour;
-    this.words = null;
+    this.text = null;
   }
 
-  set(words, colour = this.colour) {
-    const key = `${words} ${colour}`;
-    this.sprite.visible = words !== "";
-    if (key === this.words || words === "") return;
-    this.words = key;
+  set(text, colour = this.colour) {
+    const key = `${text} ${colour}`;
+    this.sprite.visible = text !== "";
+    if (key === this.text || text === "") return;
+    this.text = key;
     const pen = this.canvas.getContext("2d");
     pen.clearRect(0, 0, WIDTH, HEIGHT);
     pen.font = "600 50px system-ui, sans-serif";
     pen.textBaseline = "middle";
-    const width = Math.min(pen.measureText(words).width + 48, WIDTH);
+    const width = Math.min(pen.measureText(text).width + 48, WIDTH);
     pen.fillStyle = "rgba(20, 24, 29, 0.85)";
     pen.beginPath();
     pen.roundRect(0, 8, width, HEIGHT - 16, 20);
     pen.fill();
     pen.fillStyle = css(colour);
-    pen.fillText(words, 24, HEIGHT / 2, WIDTH - 48);
+    pen.fillText(text, 24, HEIGHT / 2, WIDTH - 48);
     this.texture.needsUpdate = true;
   }
 }

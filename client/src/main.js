@@ -7,10 +7,10 @@ import { BACK } from "./colours.js";
 import { Confirming } from "./confirming.js";
 import { DesktopHands } from "./desktop.js";
 import { Handles } from "./handles.js";
-import { askedTwice, isDoubtful, lasts, ofDevice, success, whyLost, whyNothing } from "./hints.js";
+import { doubtQuestion, isDoubtful, lasts, ofDevice, success, whyLost, whyNothing } from "./hints.js";
 import { Immersive, canImmerse } from "./immersive.js";
 import { Marks } from "./rays.js";
-import { PagePanel, RoomPanel, foreseenWords, remedy, words } from "./panel.js";
+import { PagePanel, RoomPanel, predictionText, remedy, uiText } from "./panel.js";
 import { Playback } from "./playback.js";
 import { Quality, Stopwatch, isSoftware } from "./quality.js";
 import { Recording } from "./recording.js";
@@ -19,17 +19,17 @@ import { freeArea, look, shape } from "./views.js";
 import { HANDS, MARKERS } from "./wire_table.js";
 import { STRIDE, Wire, clock, noHand } from "./wire.js";
 
-const KEPT = "trunkline.token"; // of this tab, so that a reload need not pair again
-const RIGID_HAND = "left"; // the core's own choice is `core.rigid_hand`, of which the markers tell
+const TOKEN_KEY = "trunkline.token"; // of this tab, so that a reload need not pair again
+const RIGID_HAND = "left"; // of the core, `core.rigid_hand`
 const INPUT_RATE = 72; // Hz
 const WIDE = 1200; // pixels of a page on which the keys do not cover the robot
-const COARSE = "trunkline.coarse"; // of this tab too: drawing was slow, so the next page begins without smooth edges
-const LATELY = 3; // s in which what has happened may be why control was lost
+const COARSE_KEY = "trunkline.coarse"; // of this tab too: drawing was slow, so the next page begins without smooth edges
+const LATELY = 3; // s for which an event counts as a cause of lost control
 const STANDS = 6; // s for which a line about what was just done stands at most
 const STILL = 0.3; // s without a grip, after which the core's targets are taken over
 const OVER = new Set(["hold", "aim", "follow", "stopped"]); // modes in which no plan is shown; it may come before its mode does
 const SHOWN_IN = new Set(["preview", "ready", "delay"]);
-const BUSY = new Set(["plan", ...SHOWN_IN, "execute", "follow"]); // modes after which it is to be read why they ended
+const BUSY = new Set(["plan", ...SHOWN_IN, "execute", "follow"]); // modes whose end has a reason to show
 // s that two pictures may take before some are left out, how much longer one then stays, and s that count at most
 const SLOW = 0.06, REST = 2, MOST = 0.08; // together less than the 0.25 s in which who moves the robot has to draw it
 const DESKTOP = { position: new Vector3(), quaternion: new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), -Math.PI / 2) };
@@ -41,7 +41,7 @@ document.adoptedStyleSheets = [sheet];
 
 class Page {
   constructor() {
-    const antialias = !isSoftware() && !sessionStorage.getItem(COARSE);
+    const antialias = !isSoftware() && !sessionStorage.getItem(COARSE_KEY);
     this.renderer = new WebGLRenderer({ canvas: find("view"), antialias, alpha: true });
     this.quality = new Quality(() => this.redraw(), devicePixelRatio);
     this.stopwatch = new Stopwatch(this.renderer.getContext(), clock, (seconds) => this.quality.took(seconds, clock()));
@@ -59,15 +59,15 @@ class Page {
     this.desktop = new DesktopHands(this.renderer.domElement, this.camera, this.orbit, this.drawn.base, this.marks, this.handles, RIGID_HAND, {
       stop: () => this.wire.stop(),
       reach: () => this.chooseReach(),
-      held: (on) => find("grip").setAttribute("aria-pressed", String(on)),
-      pressed: (code) => this.explain(code),
+      deadman: (on) => find("grip").setAttribute("aria-pressed", String(on)),
+      key: (code) => this.explain(code),
     });
-    this.confirming = new Confirming((told) => this.warn(askedTwice(told), () => this.state?.mode !== "ready", Infinity));
-    this.immersive = new Immersive(this.renderer, (type, fields) => this.wire?.say(type, fields), () => this.leftHeadset());
-    Object.assign(this, { state: null, lease: null, reason: null, frame: null, playback: null, told: null, recording: null });
+    this.confirming = new Confirming((prediction) => this.warn(doubtQuestion(prediction), () => this.state?.mode !== "ready", Infinity));
+    this.immersive = new Immersive(this.renderer, (type, fields) => this.wire?.sendJson(type, fields), () => this.leftHeadset());
+    Object.assign(this, { state: null, lease: null, reason: null, frame: null, playback: null, prediction: null, recording: null });
     Object.assign(this, { lost: "", arrived: null, inputAt: null, worst: { gap: 0, at: -Infinity }, hiddenAt: -Infinity });
     this.reaches = { rigid: null, tip: null };
-    this.ready = Promise.resolve(); // when the scene is there, whose sizes a preview needs
+    this.ready = Promise.resolve(); // the scene, whose sizes a preview needs
     this.connect();
     this.buttons();
     this.stand(DESKTOP);
@@ -82,15 +82,15 @@ class Page {
     find("help").open = innerWidth >= WIDE;
     [this.before, this.took] = [clock(), 0];
     this.hands = { left: noHand(), right: noHand() };
-    // At a desk, hands do not wait for the picture: slow drawing is no silent client.
+    // At a desk, hands do not wait for the picture: so slow drawing does not delay inputs.
     setInterval(() => this.immersive.session || this.send(this.atDesk(clock()), false, clock()), 1000 / INPUT_RATE);
     this.renderer.setAnimationLoop((_, frame) => this.draw(frame));
   }
 
   connect() {
-    const token = new URLSearchParams(location.hash.slice(1)).get("token") ?? sessionStorage.getItem(KEPT) ?? "";
+    const token = new URLSearchParams(location.hash.slice(1)).get("token") ?? sessionStorage.getItem(TOKEN_KEY) ?? "";
     if (!token) return void this.pair("This page was opened without its token.");
-    this.wire = new Wire(this.heard(), { token });
+    this.wire = new Wire(this.handlers(), { token });
   }
 
   pair(why) {
@@ -99,7 +99,7 @@ class Page {
     find("code").focus();
   }
 
-  heard() {
+  handlers() {
     return {
       welcome: (message) => this.welcome(message),
       closed: (reason, final) => {
@@ -109,38 +109,38 @@ class Page {
         this.state = this.lease = null;
         this.show(null);
         if (!final) return;
-        sessionStorage.removeItem(KEPT);
+        sessionStorage.removeItem(TOKEN_KEY);
         this.pair(remedy(reason));
       },
       lease: (message) => {
         this.lease = message;
-        const had = this.wire.controls;
+        const controlled = this.wire.controls;
         this.wire.controls = message.holder === this.wire.id;
-        this.heardOfControl(had);
+        this.leaseChanged(controlled);
       },
-      aligning: (message) => this.immersive.heard(message),
+      aligning: (message) => this.immersive.receive(message),
       state: (message) => this.changed(message),
       world: ({ world }) => {
-        this.things = world.things;
-        this.desktop.things = world.things.filter(({ support }) => support !== "held");
-        this.drawn.world(world);
+        this.objects = world.things;
+        this.desktop.objects = world.things.filter(({ support }) => support !== "held");
+        this.drawn.showWorld(world);
       },
       robot: (message) => this.robot(message),
       shell: ({ rows }) => this.drawn.shell(rows),
       preview: (message) => this.ready.then(() => this.loaded && (message.kind ? this.piece(message) : this.show(message))),
       foreseen: (message) => {
-        this.told = message;
-        this.drawn.foreseen(message);
+        this.prediction = message;
+        this.drawn.showPrediction(message);
       },
       error: ({ reason, closing }) => closing || this.warn(reason),
     };
   }
 
   welcome({ token, package: digest }) {
-    sessionStorage.setItem(KEPT, token);
+    sessionStorage.setItem(TOKEN_KEY, token);
     find("pairing").hidden = true;
     this.reason = null;
-    if (this.immersive.session) this.ask();
+    if (this.immersive.session) this.askForControl();
     if (this.loaded !== digest || this.token !== token) this.ready = this.load(digest, token);
     this.token = token;
   }
@@ -161,35 +161,35 @@ class Page {
     this.warning = { text, ended, until: clock() + seconds };
   }
 
-  /** After news of who controls; `had`: whether this page did. */
-  heardOfControl(had) {
+  /** After a message `lease`; `controlled`: whether this page controlled before. */
+  leaseChanged(controlled) {
     const now = clock();
     if (this.wire.controls) [this.lost, this.released] = ["", false];
-    else if (had && !this.released) {
+    else if (controlled && !this.released) {
       const gap = Math.max(now - this.worst.at < LATELY ? this.worst.gap : 0, now - (this.inputAt ?? now));
       this.lost = whyLost({ gap, hidden: document.hidden || now - this.hiddenAt < LATELY });
     }
     if (!this.wire.controls) this.inputAt = null;
   }
 
-  /** Why a key did nothing, where it did. */
+  /** Shows why a key does nothing, where it does nothing. */
   explain(code) {
     const { state, lease, wire } = this;
-    const offers = Boolean(state?.targets?.rigid?.offer || state?.targets?.tip?.offer || state?.targets?.better || this.told?.offer);
-    const now = { up: Boolean(wire?.up), controls: Boolean(wire?.controls), holder: lease?.holder ?? "", mode: state?.mode, gripped: this.desktop.dead, offers };
+    const offers = Boolean(state?.targets?.rigid?.offer || state?.targets?.tip?.offer || state?.targets?.better || this.prediction?.offer);
+    const now = { up: Boolean(wire?.up), controls: Boolean(wire?.controls), holder: lease?.holder ?? "", mode: state?.mode, gripped: this.desktop.deadman, offers };
     const why = whyNothing(code, now), { mode } = now;
-    if (why) this.warn(why, () => this.state?.mode !== mode || (Boolean(this.wire?.controls) !== now.controls) || this.desktop.dead !== now.gripped);
+    if (why) this.warn(why, () => this.state?.mode !== mode || (Boolean(this.wire?.controls) !== now.controls) || this.desktop.deadman !== now.gripped);
   }
 
   chooseReach() {
-    this.reachChosen = true; // what slow drawing would have is for whoever has said nothing
+    this.reachChosen = true; // the user's choice, which slow drawing does not change
     this.drawn.showReach(!this.drawn.reachShown);
   }
 
   /** As well as drawing is fast. */
   redraw() {
     if (!this.reachChosen) this.drawn.showReach(this.quality.reach);
-    if (this.quality.at > this.quality.best) sessionStorage.setItem(COARSE, "1");
+    if (this.quality.at > this.quality.best) sessionStorage.setItem(COARSE_KEY, "1");
     this.resize();
   }
 
@@ -203,7 +203,7 @@ class Page {
     if (["delay", "execute"].includes(this.state?.mode) && state.mode === "aim" && state.robot === "done") this.arrived = this.phases.map(([name]) => name);
     else if (!["aim", "hold"].includes(state.mode)) this.arrived = null;
     const wasBusy = BUSY.has(this.state?.mode) && !BUSY.has(state.mode);
-    if (wasBusy && state.notice) this.warn(state.notice, () => BUSY.has(this.state?.mode)); // the core's own is gone once it aims again
+    if (wasBusy && state.notice) this.warn(state.notice, () => BUSY.has(this.state?.mode)); // the state's notice ends once the core aims again
     this.state = state;
     if (OVER.has(state.mode)) this.show(null);
     for (const kind of ["rigid", "tip"]) {
@@ -226,9 +226,9 @@ class Page {
     this.playback = message && new Playback({ ...message, width: this.drawn.count * STRIDE });
     this.phases = message?.phases ?? [];
     this.begins = message?.begins ?? 0;
-    if (!message || this.told?.digest !== message.digest) {
-      this.told = null;
-      this.drawn.foreseen(null);
+    if (!message || this.prediction?.digest !== message.digest) {
+      this.prediction = null;
+      this.drawn.showPrediction(null);
     }
     if (!message) this.drawn.pretend(null);
     find("playing").hidden = !message;
@@ -241,8 +241,8 @@ class Page {
   buttons() {
     find("control").addEventListener("click", () => {
       this.released = Boolean(this.wire?.controls);
-      if (this.released) this.wire.say("lease", { action: "release" });
-      else this.ask();
+      if (this.released) this.wire.sendJson("lease", { action: "release" });
+      else this.askForControl();
       find("view").focus(); // else Enter, which asks for a plan, would press this button again
     });
     find("stop").addEventListener("click", () => this.wire?.stop());
@@ -274,28 +274,28 @@ class Page {
     grip.addEventListener("contextmenu", (event) => event.preventDefault()); // a finger that holds asks for one
     for (const kind of ["pointerup", "pointercancel", "lostpointercapture"]) grip.addEventListener(kind, () => this.desktop.hold(false));
     const scrub = find("scrub");
-    scrub.addEventListener("input", () => this.playing?.hold(Number(scrub.value)));
-    for (const kind of ["change", "pointerup", "keyup"]) scrub.addEventListener(kind, () => this.playing && (this.playing.held = false));
+    scrub.addEventListener("input", () => this.playing?.pauseAt(Number(scrub.value)));
+    for (const kind of ["change", "pointerup", "keyup"]) scrub.addEventListener(kind, () => this.playing && (this.playing.paused = false));
     find("pairing").addEventListener("submit", (event) => {
       event.preventDefault();
       const code = find("code").value;
-      if (this.wire) this.wire.again({ code, token: "" });
-      else this.wire = new Wire(this.heard(), { code });
+      if (this.wire) this.wire.reconnect({ code, token: "" });
+      else this.wire = new Wire(this.handlers(), { code });
     });
     find("recording").addEventListener("change", async ({ target }) => {
       const [file] = target.files;
-      const found = file && new Recording(await file.arrayBuffer());
-      const fits = found?.playback?.width === (this.drawn.count + MARKERS.length) * STRIDE;
-      this.recording = fits ? found : null;
-      if (found && !fits) this.warn("That file is no recording of this robot.");
+      const recording = file && new Recording(await file.arrayBuffer());
+      const fits = recording?.playback?.width === (this.drawn.count + MARKERS.length) * STRIDE;
+      this.recording = fits ? recording : null;
+      if (recording && !fits) this.warn("That file is no recording of this robot.");
       find("playing").hidden = !this.playing;
     });
     find("immerse").addEventListener("click", () => this.enterHeadset());
     canImmerse().then((can) => (find("immerse").hidden = !can));
   }
 
-  ask() {
-    this.wire?.say("lease", { action: "ask" });
+  askForControl() {
+    this.wire?.sendJson("lease", { action: "ask" });
   }
 
   get playing() {
@@ -310,7 +310,7 @@ class Page {
     }
     this.drawn.floor.visible = false;
     document.body.dataset.immersed = "";
-    this.wire?.again({ space: "room" });
+    this.wire?.reconnect({ space: "room" });
   }
 
   leftHeadset() {
@@ -319,7 +319,7 @@ class Page {
     this.board.hide();
     this.stand(DESKTOP);
     this.resize();
-    this.wire?.again({ space: "base" });
+    this.wire?.reconnect({ space: "base" });
   }
 
   /** Puts the base at `place`, its pose in the room. */
@@ -349,12 +349,12 @@ class Page {
   draw(frame) {
     const now = clock(), dt = Math.min(now - this.before, 0.1);
     const immersed = Boolean(frame && this.immersive.session && this.immersive.space);
-    if (!immersed && now - this.before < REST * this.took) return; // what sends and hears needs a processor too
+    if (!immersed && now - this.before < REST * this.took) return; // sending and receiving need the processor too
     this.before = now;
     if (immersed) this.send(this.inHeadset(now, frame), true, now);
     this.play(dt);
     this.mark(this.hands, immersed);
-    this.tell(immersed, dt);
+    this.showStatus(immersed, dt);
     if (!immersed) this.orbit.update();
     this.drawn.scene.background = immersed ? null : this.ground;
     this.renderer.render(this.drawn.scene, this.camera);
@@ -363,22 +363,22 @@ class Page {
     this.measure(now);
   }
 
-  /** The robot's newest pose is in the picture, where there is one: whoever sees no robot does not move it. */
+  /** The robot's newest pose is in the picture, where there is one: without it, input does not move the robot. */
   acknowledge() {
-    if (!this.wire || !this.frame || this.frame === this.shown || this.renderer.getContext().isContextLost()) return;
-    this.shown = this.frame;
+    if (!this.wire || !this.frame || this.frame === this.drawnFrame || this.renderer.getContext().isContextLost()) return;
+    this.drawnFrame = this.frame;
     this.wire.drawn = true;
   }
 
   /** How long a picture takes where it takes long: until the next could be begun. */
   measure(now) {
-    const told = () => (this.took = clock() - now > SLOW ? Math.min(clock() - now, MOST) : 0);
-    requestAnimationFrame(() => requestAnimationFrame(told));
+    const finish = () => (this.took = clock() - now > SLOW ? Math.min(clock() - now, MOST) : 0);
+    requestAnimationFrame(() => requestAnimationFrame(finish));
   }
 
   inHeadset(now, frame) {
-    const hands = this.immersive.frame(frame), { eye, aligning } = this.immersive;
-    if (aligning.place) this.stand(aligning.place);
+    const hands = this.immersive.frame(frame), { eye, alignment } = this.immersive;
+    if (alignment.place) this.stand(alignment.place);
     if (this.wire?.controls && this.wire.offset !== null) this.wire.view(eye, now);
     return hands;
   }
@@ -421,25 +421,25 @@ class Page {
     if (!immersed && !document.hidden) this.quality.input(gap, now);
     this.inputAt = now;
     const visible = immersed ? this.immersive.visible : !document.hidden;
-    this.wire.input(this.confirming.heard(hands, this.state?.mode, this.told), visible, now);
+    this.wire.input(this.confirming.filter(hands, this.state?.mode, this.prediction), visible, now);
   }
 
   play(dt) {
     const { playing } = this;
     if (!playing) return;
     const shows = this.recording || SHOWN_IN.has(this.state?.mode);
-    if (shows && playing.advance(dt) && !this.recording) this.wire.say("shown", { digest: this.digest });
+    if (shows && playing.advance(dt) && !this.recording) this.wire.sendJson("shown", { digest: this.digest });
     if (find("playing").hidden === Boolean(shows)) find("playing").hidden = !shows;
     this.drawn.pretend(playing.frames && shows ? playing.rows : null, playing.index * playing.width);
     const scrub = find("scrub"), at = playing.at.toFixed(2);
     if (scrub.max !== String(playing.duration)) scrub.max = String(playing.duration);
-    if (!playing.held && scrub.value !== at) scrub.value = at;
+    if (!playing.paused && scrub.value !== at) scrub.value = at;
     const phase = this.phases.findLast(([, since]) => since <= this.begins + playing.at)?.[0];
     const text = `${playing.at.toFixed(1)} of ${playing.duration.toFixed(1)} s${phase && !this.recording ? `, ${phase}` : ""}`;
     if (find("played").textContent !== text) find("played").textContent = text;
-    const sure = this.recording ? "A recording." : foreseenWords(this.told);
-    find("foreseen").toggleAttribute("data-doubtful", !this.recording && isDoubtful(this.told));
-    if (find("foreseen").textContent !== sure) find("foreseen").textContent = sure;
+    const caption = this.recording ? "A recording." : predictionText(this.prediction);
+    find("foreseen").toggleAttribute("data-doubtful", !this.recording && isDoubtful(this.prediction));
+    if (find("foreseen").textContent !== caption) find("foreseen").textContent = caption;
   }
 
   mark(hands, immersed) {
@@ -458,48 +458,48 @@ class Page {
     this.handles.place(movable ? desktop.wanted[desktop.chosen] : null, eye, this.camera.fov);
   }
 
-  tell(immersed, dt) {
+  showStatus(immersed, dt) {
     const { wire, state, lease, reason } = this;
     const age = this.frame && wire ? wire.age(this.frame.time) : null;
     const stale = !wire?.up || (this.frame?.flags.has("stale") ?? false) || (age ?? 0) > 1;
     this.drawn.fade(stale);
     const device = immersed ? "controllers" : this.desktop.touches ? "touch" : "keys";
-    const spoken = words({ state, lease, id: wire?.id ?? "", age: this.rounded(age), up: Boolean(wire?.up && wire.id), reason, ended: this.ended, stale, device, held: this.desktop.isHeld });
-    this.sayMore(spoken, device);
+    const status = uiText({ state, lease, id: wire?.id ?? "", age: this.rounded(age), up: Boolean(wire?.up && wire.id), reason, ended: this.ended, stale, device, pressed: this.desktop.isPressed });
+    this.addNotices(status, device);
     if (immersed) {
-      const { aligning } = this.immersive;
-      if (!aligning.done && wire?.up) [spoken.title, spoken.next] = ["Where is the robot?", aligning.next];
-      if (aligning.step === "lost") [spoken.mode, spoken.title] = ["lost", "Robot’s place lost"];
+      const { alignment } = this.immersive;
+      if (!alignment.done && wire?.up) [status.title, status.next] = ["Where is the robot?", alignment.next];
+      if (alignment.step === "lost") [status.mode, status.title] = ["lost", "Robot’s place lost"];
       const eye = this.renderer.xr.getCamera();
-      this.board.show(spoken, foreseenWords(this.told) || aligning.said, eye, dt);
+      this.board.show(status, predictionText(this.prediction) || alignment.feedback, eye, dt);
       return;
     }
-    const picture = this.quality.words(this.drawn.reachShown);
-    if (picture) spoken.facts.Picture = ofDevice(picture, device);
-    this.panel.show(spoken);
+    const picture = this.quality.hint(this.drawn.reachShown);
+    if (picture) status.facts.Picture = ofDevice(picture, device);
+    this.panel.show(status);
     document.body.toggleAttribute("data-touch", this.desktop.touches);
-    const mine = Boolean(wire?.controls), targets = state?.targets;
-    const offers = Boolean(targets?.rigid?.offer || targets?.tip?.offer || this.told?.offer), stopped = state?.mode === "stopped";
+    const controls = Boolean(wire?.controls), targets = state?.targets;
+    const offers = Boolean(targets?.rigid?.offer || targets?.tip?.offer || this.prediction?.offer), stopped = state?.mode === "stopped";
     setText(find("go").firstChild, stopped ? "Go on " : "Take the offer ");
-    find("go").hidden = !mine || !(stopped || (offers && !this.desktop.dead));
+    find("go").hidden = !controls || !(stopped || (offers && !this.desktop.deadman));
     setText(find("which"), this.desktop.chosen === this.desktop.rigid ? "Mount" : "Tip");
     find("reach").setAttribute("aria-pressed", String(this.drawn.reachShown));
-    setText(find("control"), mine ? "Release control" : lease?.holder ? "Ask for control" : "Take control");
+    setText(find("control"), controls ? "Release control" : lease?.holder ? "Ask for control" : "Take control");
     find("control").disabled = !wire?.up || wire.offset === null;
     const ready = state?.mode === "ready";
     setText(find("plan").firstChild, ready ? "Confirm " : "Ask for a plan ");
-    find("plan").disabled = !mine || !["aim", "ready"].includes(state?.mode);
-    find("grip").disabled = !mine;
+    find("plan").disabled = !controls || !["aim", "ready"].includes(state?.mode);
+    find("grip").disabled = !controls;
   }
 
-  /** What the page itself knows, where the server says nothing, or beside it. */
-  sayMore(spoken, device) {
+  /** Adds the page's own notices to the server's. */
+  addNotices(status, device) {
     const { state, warning, lost, arrived } = this, up = Boolean(this.wire?.up);
-    if (!lasts(state?.notice ?? "", { mode: state?.mode, targets: state?.targets, gripped: this.desktop.dead })) spoken.notice = "";
-    const stands = warning && warning.until > clock() && !warning.ended() ? ofDevice(warning.text, device) : "";
-    const more = stands || (up ? lost : "");
-    if (more && more !== spoken.notice) spoken.notice = spoken.notice ? `${spoken.notice}. ${more}` : more;
-    if (!spoken.notice && up && arrived && this.wire.controls) Object.assign(spoken, { notice: success(arrived, this.things ?? []), kind: "good" });
+    if (!lasts(state?.notice ?? "", { mode: state?.mode, targets: state?.targets, gripped: this.desktop.deadman })) status.notice = "";
+    const current = warning && warning.until > clock() && !warning.ended() ? ofDevice(warning.text, device) : "";
+    const added = current || (up ? lost : "");
+    if (added && added !== status.notice) status.notice = status.notice ? `${status.notice}. ${added}` : added;
+    if (!status.notice && up && arrived && this.wire.controls) Object.assign(status, { notice: success(arrived, this.objects ?? []), kind: "good" });
   }
 
   /** The age of the live robot, so that its number does not dance: it is written four times a second. */

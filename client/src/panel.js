@@ -11,33 +11,33 @@ const TITLES = {
 const COLOURS = {
   aim: MOUNT, plan: REACH, preview: REACH, ready: GHOST, delay: OFFER, execute: OFFER, follow: OFFER, stopped: WRONG, lost: WRONG,
 };
-const OLD = 0.25; // s beyond which a pose of the robot is called old
+const OLD = 0.25; // s beyond which a pose of the robot is marked as old
 
 const PLANNED = new Set(["plan", "preview", "ready", "delay"]); // what the robot did before is past
-const DO = { "token: wrong": "This address is not of the session that runs now. Open the address anew that the session has printed" };
+const REMEDIES = { "token: wrong": "This address is not of the session that runs now. Open the address anew that the session has printed" };
 
 /** What to do about the `reason` for which the server has ended a connection. */
-export const remedy = (reason) => (reason in DO ? `${DO[reason]} (${reason}).` : reason);
+export const remedy = (reason) => (reason in REMEDIES ? `${REMEDIES[reason]} (${reason}).` : reason);
 
-/** What there is to say of `page`: `mode`, `title`, `next`, `notice`, whether the robot has `arrived`, and facts by name. `ended`: it will not connect again by itself. `device`: in whose words, as `ofDevice` has it; `held`: whether a key or a button is. */
-export function words(page) {
-  const { state, lease, id, age, up, reason, ended, stale, device = "keys", held = false } = page;
+/** The status of `page` in words: `mode`, `title`, `next`, `notice`, whether the robot has `arrived`, and facts by name. `ended`: it will not connect again by itself. `device`: as in `ofDevice`; `pressed`: whether a key or the mouse is. */
+export function uiText(page) {
+  const { state, lease, id, age, up, reason, ended, stale, device = "keys", pressed = false } = page;
   const immersed = device === "controllers";
   const mode = !up ? (reason === null ? "connecting" : "lost") : (state?.mode ?? "connecting");
-  const mine = lease?.holder === id && id !== "";
-  const holder = lease?.clients?.find((one) => one.id === lease.holder);
+  const controls = lease?.holder === id && id !== "";
+  const holder = lease?.clients?.find((client) => client.id === lease.holder);
   const facts = {};
-  if (up && lease) facts.Control = mine ? "you" : holder ? holder.name || "somebody else" : "nobody";
-  if (up && lease?.asking?.length && mine) facts.Asked = `${lease.asking.length} would like to take over`;
+  if (up && lease) facts.Control = controls ? "you" : holder ? holder.name || "somebody else" : "nobody";
+  if (up && lease?.asking?.length && controls) facts.Asked = `${lease.asking.length} would like to take over`;
   const arrived = up && state?.robot === "done" && !PLANNED.has(mode);
-  const seen = age === null ? "" : `seen ${age < 0.001 ? "now" : `${Math.round(1000 * age)} ms ago`}${stale || age > OLD ? ", OLD" : ""}`;
-  if (arrived || seen) facts.Robot = [arrived && "arrived", seen].filter(Boolean).join(", ");
+  const poseAge = age === null ? "" : `seen ${age < 0.001 ? "now" : `${Math.round(1000 * age)} ms ago`}${stale || age > OLD ? ", OLD" : ""}`;
+  if (arrived || poseAge) facts.Robot = [arrived && "arrived", poseAge].filter(Boolean).join(", ");
   if (state?.fault) facts.Fault = state.fault;
   let title = TITLES[mode];
   if (mode === "delay" && Number.isFinite(state.countdown)) title = `Moves in ${state.countdown.toFixed(1)} s`;
-  const wanted = (immersed ? state?.next : state?.keys) ?? "";
-  const by = !immersed && mine && mode === "hold" ? whileHolding(held) : wanted;
-  let next = mine || !lease?.holder ? sentence(ofDevice(by, device)) : "You watch. Ask for control to aim.";
+  const action = (immersed ? state?.next : state?.keys) ?? "";
+  const instruction = !immersed && controls && mode === "hold" ? whileHolding(pressed) : action;
+  let next = controls || !lease?.holder ? sentence(ofDevice(instruction, device)) : "You watch. Ask for control to aim.";
   if (!up) next = reason === null ? "Waiting for the server." : `The connection is lost${reason ? `: ${reason}` : ""}. Trying again.`;
   if (!up && ended) next = `The server has ended the connection: ${reason}.`;
   return { mode, title, next, notice: ofDevice((up && state?.notice) || "", device), arrived, facts };
@@ -45,22 +45,22 @@ export function words(page) {
 
 const sentence = (text) => (text ? `${text[0].toUpperCase()}${text.slice(1)}.` : "");
 
-/** What the batch of futures says, in one line. */
-export function foreseenWords(told) {
-  if (!told) return "";
-  const spread = told.spread.length ? Math.round(1000 * told.spread[told.spread.length - 1]) : null;
+/** The prediction in one line. */
+export function predictionText(prediction) {
+  if (!prediction) return "";
+  const spread = prediction.spread.length ? Math.round(1000 * prediction.spread[prediction.spread.length - 1]) : null;
   const parts = [];
-  if (told.probability !== null)
-    parts.push(`Grasp holds in ${isDoubtful(told) ? "only " : ""}${percent(told.probability)} of ${told.futures} futures (${percent(told.low)} to ${percent(told.high)})`);
-  if (told.miss !== null) parts.push(`the preview ends ${Math.round(1000 * told.miss)} mm from the target`);
-  if (spread !== null) parts.push(`in ${percent(told.within)} of cases the robot’s tip ends within ${spread} mm of the preview’s, where it touches nothing`);
-  else parts.push(`how near the robot’s tip comes to the preview’s is unknown: ${told.unknown}`);
+  if (prediction.probability !== null)
+    parts.push(`Grasp holds in ${isDoubtful(prediction) ? "only " : ""}${percent(prediction.probability)} of ${prediction.futures} futures (${percent(prediction.low)} to ${percent(prediction.high)})`);
+  if (prediction.miss !== null) parts.push(`the preview ends ${Math.round(1000 * prediction.miss)} mm from the target`);
+  if (spread !== null) parts.push(`in ${percent(prediction.within)} of cases the robot’s tip ends within ${spread} mm of the preview’s, where it touches nothing`);
+  else parts.push(`how near the robot’s tip comes to the preview’s is unknown: ${prediction.unknown}`);
   return sentence(parts.join("; "));
 }
 
 const percent = (share) => `${Math.round(100 * share)} %`;
 
-/** Writes into the page; only what has changed, so that a screen reader says it once. */
+/** Writes into the page; only what has changed, so that a screen reader reads it once. */
 export class PagePanel {
   constructor(find) {
     this.parts = Object.fromEntries(["mode", "next", "notice", "facts"].map((id) => [id, find(id)]));
@@ -84,9 +84,9 @@ export class PagePanel {
 }
 
 function element(tag, text) {
-  const made = document.createElement(tag);
-  made.textContent = text;
-  return made;
+  const node = document.createElement(tag);
+  node.textContent = text;
+  return node;
 }
 
 function setText(node, text) {
@@ -144,13 +144,13 @@ export class RoomPanel {
   comeAlong(eye, dt) {
     const ahead = new Vector3(0, 0, -1).transformDirection(eye.matrixWorld).setY(0).normalize();
     const left = new Vector3(ahead.z, 0, -ahead.x);
-    const wanted = new Vector3().setFromMatrixPosition(eye.matrixWorld);
-    wanted.addScaledVector(ahead, AWAY).addScaledVector(left, ASIDE);
-    wanted.y -= BELOW;
-    const away = this.board.position.distanceTo(wanted);
+    const goal = new Vector3().setFromMatrixPosition(eye.matrixWorld);
+    goal.addScaledVector(ahead, AWAY).addScaledVector(left, ASIDE);
+    goal.y -= BELOW;
+    const away = this.board.position.distanceTo(goal);
     if (this.placed && away < LOOSE && !this.coming) return this.faceEye(eye);
     this.coming = away > 0.03;
-    this.board.position.lerp(wanted, this.placed ? 1 - Math.exp(-EASE * dt) : 1);
+    this.board.position.lerp(goal, this.placed ? 1 - Math.exp(-EASE * dt) : 1);
     this.placed = true;
     this.faceEye(eye);
   }
@@ -173,9 +173,9 @@ function wrapped(pen, x, width) {
     pen.fillStyle = colour;
     pen.textBaseline = "top";
     let line = "", lines = 0;
-    const put = (words) => {
+    const put = (line) => {
       if (lines++ >= most) return;
-      pen.fillText(words, x, y, width);
+      pen.fillText(line, x, y, width);
       y += height;
     };
     for (const word of text.split(" ")) {

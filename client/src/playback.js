@@ -1,4 +1,4 @@
-// A motion in frames at an even pace: it plays while it still comes in, and can be scrubbed once it is there.
+// A motion in frames at an even pace: it plays while it still comes in, and can be scrubbed once all of it has.
 
 export class Playback {
   /** `step`: s between frames. `duration`: s in all. `width`: numbers of a frame. */
@@ -7,12 +7,12 @@ export class Playback {
     this.width = width;
     this.duration = duration;
     this.rows = new Float32Array(width * (Math.ceil(duration / step) + 2));
-    this.frames = 0; // there so far
+    this.frames = 0; // received so far
     this.whole = false;
     this.at = 0; // s
     this.played = 0; // s, as far as it has been shown
-    this.seen = false; // whether its end has been
-    this.held = false; // by the user's hand
+    this.shownToEnd = false; 
+    this.paused = false; // by the user's hand
     this.rest = 0; // s at its end
   }
 
@@ -29,33 +29,33 @@ export class Playback {
     this.whole ||= last;
   }
 
-  /** s of the motion that are there. */
-  get there() {
+  /** s of the motion that have been received. */
+  get available() {
     return Math.max(this.frames - 1, 0) * this.step;
   }
 
   /** Goes on by `dt` s; whether the end is shown now for the first time. */
   advance(dt) {
-    if (this.held || !this.frames) return false;
-    const ended = this.whole && this.at >= this.there;
-    if (ended && this.seen) {
+    if (this.paused || !this.frames) return false;
+    const ended = this.whole && this.at >= this.available;
+    if (ended && this.shownToEnd) {
       this.rest += dt;
       if (this.rest > 1) this.at = 0; // again, after a second at its end
       return false;
     }
-    this.at = Math.min(this.at + dt, this.there);
+    this.at = Math.min(this.at + dt, this.available);
     this.played = Math.max(this.played, this.at);
-    if (!this.whole || this.at < this.there) return false;
+    if (!this.whole || this.at < this.available) return false;
     this.rest = 0;
-    const first = !this.seen;
-    this.seen = true;
+    const first = !this.shownToEnd;
+    this.shownToEnd = true;
     return first;
   }
 
-  /** To `time`, s, and stays there; no leap ahead before it has been seen whole. */
-  hold(time) {
-    this.held = true;
-    this.at = Math.min(time, this.seen ? this.there : this.played);
+  /** To `time`, s, and stays there; no leap ahead before it has been shown to its end. */
+  pauseAt(time) {
+    this.paused = true;
+    this.at = Math.min(time, this.shownToEnd ? this.available : this.played);
   }
 
   get index() {

@@ -67,7 +67,7 @@ export class Quality {
   }
 
   /** What is slow and what to do, "" where nothing is. `reachShown`: whether it is drawn now. */
-  words(reachShown) {
+  hint(reachShown) {
     const { seconds, at, best } = this;
     if (!this.isSlow && at === best) return "";
     const lowered = at > best ? `drawn coarser${this.reach ? "" : ", without the reach"}` : "";
@@ -86,7 +86,7 @@ export function isSoftware() {
   return /swiftshader|llvmpipe|software|basic render/i.test(name);
 }
 
-/** Calls `done(seconds)` when what `gl` was given since `began`, s of `now()`, is drawn, without waiting for it; one at a time. */
+/** Calls `done(seconds)` when all calls of `gl` since `began`, s of `now()`, are drawn, without waiting for it; one at a time. */
 export class Stopwatch {
   constructor(gl, now, done) {
     Object.assign(this, { gl, now, done, sync: null });

@@ -25,7 +25,7 @@ export class Marks {
     this.ends = HANDS.map(() => new Vector3(NaN, NaN, NaN));
   }
 
-  /** `rows` of a frame, the markers' from row `first` on; `starts` of both rays in the base frame, null where unseen. */
+  /** `rows` of a frame, the markers' from row `first` on; `starts` of both rays in the base frame, null where not tracked. */
   update(rows, first, starts, targets) {
     const at = (name) => (first + MARKERS.indexOf(name)) * STRIDE;
     HANDS.forEach((side, index) => {
@@ -45,10 +45,10 @@ export class Marks {
 
   /** Which hand's ray end or target is nearest to a point of the screen, within `pixels`; -1 for none. */
   nearest(toScreen, x, y, pixels) {
-    const found = [this.targets.rigid, this.targets.tip].map(({ group }) => (group.visible ? group.position : null));
+    const positions = [this.targets.rigid, this.targets.tip].map(({ group }) => (group.visible ? group.position : null));
     let best = -1, least = pixels;
     HANDS.forEach((_, index) => {
-      const target = found[this.names[index] === "mount" ? 0 : 1];
+      const target = positions[this.names[index] === "mount" ? 0 : 1];
       for (const point of [this.ends[index], target]) {
         if (!point || !Number.isFinite(point.x)) continue;
         const [u, v] = toScreen(point);
@@ -88,7 +88,7 @@ class Target {
   constructor(colour, shape) {
     this.group = new Group();
     this.solid = new Mesh(shape, new MeshBasicMaterial({ color: colour, transparent: true, opacity: 0.75 }));
-    // Seen through the robot, in which a target begins: a ring, and the solid once more, faintly.
+    // Visible through the robot, in which a target begins: a ring, and the solid once more, faintly.
     const through = { color: colour, transparent: true, depthTest: false, depthWrite: false };
     this.faint = new Mesh(shape, new MeshBasicMaterial({ ...through, opacity: 0.35 }));
     this.halo = new Mesh(new RingGeometry(0.04, 0.045, 40), new MeshBasicMaterial({ ...through, opacity: 0.9 }));
@@ -112,21 +112,21 @@ class Target {
     this.group.visible = false;
   }
 
-  /** Where a target has not been set yet, what is seen through the robot is at the `end` of its ray. `thing`: what it marks. */
-  update(rows, at, told, end, thing) {
-    const there = Number.isFinite(rows[at]);
-    this.group.visible = there || Number.isFinite(end.x);
+  /** Before a target is set, its outline through the robot is at the `end` of its ray. `object`: name of what it marks. */
+  update(rows, at, target, end, object) {
+    const isSet = Number.isFinite(rows[at]);
+    this.group.visible = isSet || Number.isFinite(end.x);
     if (!this.group.visible) return;
-    this.solid.visible = this.edges.visible = there;
-    if (there) this.group.position.fromArray(rows, at);
+    this.solid.visible = this.edges.visible = isSet;
+    if (isSet) this.group.position.fromArray(rows, at);
     else this.group.position.copy(end);
-    const outside = told?.reach === "outside", blocked = told?.reach === "blocked";
+    const outside = target?.reach === "outside", blocked = target?.reach === "blocked";
     this.ring.visible = outside || blocked;
-    this.label.set(wordsOf(told) || thing, outside || blocked ? 0xffb08a : 0xffffff);
-    const offered = told?.offer ?? null;
-    this.offer.visible = this.way.visible = Boolean(offered);
-    if (offered) {
-      this.offer.position.fromArray(offered).sub(this.group.position);
+    this.label.set(reachText(target) || object, outside || blocked ? 0xffb08a : 0xffffff);
+    const offer = target?.offer ?? null;
+    this.offer.visible = this.way.visible = Boolean(offer);
+    if (offer) {
+      this.offer.position.fromArray(offer).sub(this.group.position);
       const ends = this.way.geometry.attributes.position;
       this.offer.position.toArray(ends.array, 3);
       ends.needsUpdate = true;
@@ -141,7 +141,7 @@ class Target {
   }
 }
 
-function wordsOf(target) {
+function reachText(target) {
   if (!target) return "";
   if (target.reach === "outside") return `${Math.round(1000 * target.outside_by)} mm out of reach`;
   if (target.reach === "blocked") return `inside ${target.solid}`;

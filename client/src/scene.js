@@ -9,11 +9,11 @@ import { GHOST, MOUNT, REACH, TIP } from "./colours.js";
 import { mergedGeoms } from "./geoms.js";
 import { STRIDE } from "./wire.js";
 
-const ONE = new Vector3(1, 1, 1);
+const UNIT_SCALE = new Vector3(1, 1, 1);
 const WIDEST = 4; // m, of an obstacle that is drawn; the floor is wider
 const OBJECT = "object"; // the body of the object, where the model has one
-const FADED = 0.35; // of a live robot that is not heard of
-const SQUARE = 0.25, SQUARES = 16; // m of a square of the floor, and how many; index.html says how wide one is
+const FADED = 0.35; // of a live robot without new poses
+const SQUARE = 0.25, SQUARES = 16; // m of a square of the floor, and how many; index.html has the width as text
 const GRID = { dark: [0x4a5663, 0x343e49], light: [0x8b98a5, 0xb9c3cc] };
 const STAND = { at: [-0.04, 0], half: 0.11, gap: 0.03 }; // m, beneath a base that stands higher than `gap` above the floor
 const STRING = { long: 0.15, radius: 0.0015, hook: 0.006 }; // m, of what hangs
@@ -23,7 +23,7 @@ const WOOD = [0.55, 0.47, 0.38, 1], GRASPABLE = [0.35, 0.7, 0.9, 1];
 export class RobotScene {
   constructor() {
     this.scene = new Scene();
-    this.base = new Group(); // all of the robot's base frame, z up; where it is in the room an alignment says
+    this.base = new Group(); // all of the robot's base frame, z up; an alignment gives its pose in the room
     this.scene.add(this.base, new HemisphereLight(0xffffff, 0x6d747e, 1.35));
     const sun = new DirectionalLight(0xffffff, 1.5);
     sun.position.set(1.5, 3, 2);
@@ -76,20 +76,20 @@ export class RobotScene {
       if (this.shellPoints) this.shell(this.shellPoints);
     }
     this.showReach(this.reachShown);
-    if (this.known) this.world(this.known);
+    if (this.world) this.showWorld(this.world);
   }
 
   /** Draws by `draw` what is hidden or not there yet as well: to compile it later would take longer than an input may. */
   everythingOnce(draw) {
     this.pretend(new Float32Array(this.count * STRIDE).fill(NaN));
-    this.foreseen({ tip: [[0, 0, 0], [0, 0, 1e-6]], spread: [0, 0] });
+    this.showPrediction({ tip: [[0, 0, 0], [0, 0, 1e-6]], spread: [0, 0] });
     const hidden = [];
-    this.scene.traverse((one) => one.visible || hidden.push(one));
-    for (const one of hidden) one.visible = true;
+    this.scene.traverse((node) => node.visible || hidden.push(node));
+    for (const node of hidden) node.visible = true;
     draw();
-    for (const one of hidden) one.visible = false;
+    for (const node of hidden) node.visible = false;
     this.pretend(null);
-    this.foreseen(null);
+    this.showPrediction(null);
   }
 
   /** The robot as it is: rows of poses, of which the first are the bodies'. */
@@ -99,7 +99,7 @@ export class RobotScene {
     this.live.visible = true;
   }
 
-  /** Grey, where it is not known how the robot is. */
+  /** Grey where the robot's pose is out of date. */
   fade(stale) {
     if (!this.live || this.faded === stale) return;
     this.faded = stale;
@@ -125,30 +125,30 @@ export class RobotScene {
   placeShell(rows, row) {
     if (!this.tipReach) return;
     const at = row * STRIDE;
-    const there = Number.isFinite(rows[at]) && this.tipReach.filled;
-    this.tipReach.visible = there && this.reachShown;
-    if (!there) return;
+    const isPlaced = Number.isFinite(rows[at]) && this.tipReach.filled;
+    this.tipReach.visible = isPlaced && this.reachShown;
+    if (!isPlaced) return;
     this.tipReach.position.fromArray(rows, at);
     this.tipReach.quaternion.set(rows[at + 4], rows[at + 5], rows[at + 6], rows[at + 3]);
   }
 
-  /** All that is to be in view, in the room: bodies as in `rows`, and things. */
+  /** All that is to be in view, in the room: bodies as in `rows`, and objects. */
   extent(rows) {
     const bodies = (this.bodies ?? []).map((_, index) => new Vector3().fromArray(rows, index * STRIDE));
-    const things = (this.known?.things ?? []).map(({ position }) => new Vector3(...position));
-    return [...bodies, ...things].filter(({ x }) => Number.isFinite(x)).map((point) => this.base.localToWorld(point));
+    const objects = (this.world?.things ?? []).map(({ position }) => new Vector3(...position));
+    return [...bodies, ...objects].filter(({ x }) => Number.isFinite(x)).map((point) => this.base.localToWorld(point));
   }
 
-  showReach(shown) {
-    this.reachShown = shown;
-    if (this.reach) this.reach.visible = shown;
-    if (this.tipReach) this.tipReach.visible = shown && Boolean(this.tipReach.filled);
+  showReach(visible) {
+    this.reachShown = visible;
+    if (this.reach) this.reach.visible = visible;
+    if (this.tipReach) this.tipReach.visible = visible && Boolean(this.tipReach.filled);
   }
 
-  /** Obstacles and objects as they are believed, but for those that the model has. */
-  world(world) {
-    this.known = world;
-    this.believed?.removeFromParent();
+  /** Obstacles and objects as the server has them, but for those that the model has. */
+  showWorld(world) {
+    this.world = world;
+    this.worldMesh?.removeFromParent();
     const objects = this.bodies?.includes(OBJECT) ? [] : world.things;
     const wide = ({ low, high }) => high[0] - low[0] > WIDEST;
     this.floor.position.z = Math.min(0, ...world.boxes.map((obstacle) => (wide(obstacle) ? obstacle.high[2] : obstacle.low[2])));
@@ -160,52 +160,52 @@ export class RobotScene {
     for (const { shape, diameter, height, position, quaternion } of objects) {
       const [radius, half] = [diameter / 2, height / 2];
       const size = shape === "sphere" ? [radius] : shape === "cylinder" ? [radius, half] : [radius, radius, half];
-      const known = shape === "sphere" || shape === "cylinder" ? shape : "box";
-      geoms.push({ body: -1, shape: known, size, position, quaternion, rgba: GRASPABLE });
+      const primitive = shape === "sphere" || shape === "cylinder" ? shape : "box";
+      geoms.push({ body: -1, shape: primitive, size, position, quaternion, rgba: GRASPABLE });
     }
     geoms.push(...standOf(this.floor.position.z), ...world.things.filter(({ support }) => support === "hanging").flatMap(stringOf));
     const merged = mergedGeoms(geoms, []);
-    this.believed = merged && new Mesh(merged, new MeshLambertMaterial({ vertexColors: true }));
-    if (this.believed) this.base.add(this.believed);
+    this.worldMesh = merged && new Mesh(merged, new MeshLambertMaterial({ vertexColors: true }));
+    if (this.worldMesh) this.base.add(this.worldMesh);
   }
 
-  /** The preview's path of the tip, and how far the robot's may be from it, where that is known; null hides both. */
-  foreseen(told) {
-    for (const old of this.future ?? []) {
+  /** The tip's path in the preview, and how far the robot's tip may be from it, where that is predicted; null hides both. */
+  showPrediction(prediction) {
+    for (const old of this.predictionMeshes ?? []) {
       old.removeFromParent();
       old.geometry.dispose();
     }
-    this.future = [];
-    if (!told || told.tip.length < 2) return;
-    const points = told.tip.map((point) => new Vector3(...point));
+    this.predictionMeshes = [];
+    if (!prediction || prediction.tip.length < 2) return;
+    const points = prediction.tip.map((point) => new Vector3(...point));
     const path = new Line(new BufferGeometry().setFromPoints(points), new LineBasicMaterial({ color: TIP }));
-    this.future = [path];
+    this.predictionMeshes = [path];
     this.base.add(path);
-    if (!told.spread.length) return;
+    if (!prediction.spread.length) return;
     const band = new MeshBasicMaterial({ color: TIP, transparent: true, opacity: 0.16, depthWrite: false, side: FrontSide });
-    const tube = new Mesh(spreadTube(points, told.spread), band);
+    const tube = new Mesh(spreadTube(points, prediction.spread), band);
     tube.renderOrder = 3;
-    this.future.push(tube);
+    this.predictionMeshes.push(tube);
     this.base.add(tube);
   }
 }
 
-const UNTURNED = [1, 0, 0, 0];
+const IDENTITY = [1, 0, 0, 0];
 
 /** What the base stands on, where the floor is `below` it: no obstacle of the model, but else it would float. */
 function standOf(below) {
   if (below > -STAND.gap) return [];
   const post = { position: [...STAND.at, below / 2], size: [STAND.half, STAND.half, -below / 2] };
   const foot = { position: [...STAND.at, below + 0.01], size: [2 * STAND.half, 2 * STAND.half, 0.01] };
-  return [post, foot].map((one) => ({ body: -1, shape: "box", quaternion: UNTURNED, rgba: METAL, ...one }));
+  return [post, foot].map((geom) => ({ body: -1, shape: "box", quaternion: IDENTITY, rgba: METAL, ...geom }));
 }
 
-/** The string by which a thing hangs, and its hook. */
+/** The string by which an object hangs, and its hook. */
 function stringOf({ position: [x, y, z], diameter, height, shape, quaternion }) {
   const [w, a, b] = quaternion, upright = Math.abs(1 - 2 * (a * a + b * b) / (w * w + a * a + b * b + quaternion[3] ** 2));
   const top = z + (shape === "sphere" ? diameter : upright * height + (1 - upright) * diameter) / 2, { long, radius, hook } = STRING;
   const thread = { shape: "cylinder", position: [x, y, top + long / 2], size: [radius, long / 2] };
-  return [thread, { shape: "sphere", position: [x, y, top + long], size: [hook] }].map((one) => ({ body: -1, quaternion: UNTURNED, rgba: THREAD, ...one }));
+  return [thread, { shape: "sphere", position: [x, y, top + long], size: [hook] }].map((geom) => ({ body: -1, quaternion: IDENTITY, rgba: THREAD, ...geom }));
 }
 
 /** A mesh whose bones are in the frame of its parent, not in the room's: `detached`, bound by the identity. */
@@ -226,8 +226,8 @@ function setPoses({ skeleton }, rows, start) {
     const at = start + index * STRIDE;
     place.fromArray(rows, at);
     turn.set(rows[at + 4], rows[at + 5], rows[at + 6], rows[at + 3]);
-    if (Number.isFinite(place.x)) bone.matrixWorld.compose(place, turn, ONE);
-    else bone.matrixWorld.makeScale(0, 0, 0); // a body that is not there
+    if (Number.isFinite(place.x)) bone.matrixWorld.compose(place, turn, UNIT_SCALE);
+    else bone.matrixWorld.makeScale(0, 0, 0); // a body without a pose
   });
 }
 

@@ -1,6 +1,6 @@
 // The connection: what is fast in binary, what is rare in JSON, by the one table that the server has too.
 
-import { ANSWERS, FROM_CLIENT, FROM_SERVER, HAND, HANDS, HEAD, HEAD_BYTES, POSE, VERSION } from "./wire_table.js";
+import { FROM_CLIENT, FROM_SERVER, HAND, HANDS, HEAD, HEAD_BYTES, POSE, SERVER_MESSAGES, VERSION } from "./wire_table.js";
 
 const KINDS = new Map(Object.entries(FROM_SERVER).map(([name, kind]) => [kind.type, { name, ...kind }]));
 const FIRST_WAIT = 0.25, LONGEST_WAIT = 4; // s until a connection is tried anew; it doubles
@@ -62,7 +62,7 @@ function numbersOf(hand) {
   ];
 }
 
-/** A hand of which nothing is known. */
+/** A hand that is not tracked. */
 export const noHand = () => ({
   tracked: false, position: [0, 0, 0], quaternion: [1, 0, 0, 0], stick: [0, 0],
   trigger: false, grip: false, stick_pressed: false, primary: false, secondary: false,
@@ -71,11 +71,11 @@ export const noHand = () => ({
 /**
  * One connection that comes back by itself.
  *
- * `heard` has a function for each JSON `type` and binary kind that it cares about, and `opened`, `closed(reason, final)`.
+ * `handlers`: a function for each JSON `type` and binary kind that is used, and `opened()`, `closed(reason, final)`.
  */
 export class Wire {
-  constructor(heard, { token = "", code = "", name = "browser", space = "base" } = {}) {
-    this.heard = heard;
+  constructor(handlers, { token = "", code = "", name = "browser", space = "base" } = {}) {
+    this.handlers = handlers;
     this.hello = { token, code, name, space };
     this.id = this.key = "";
     this.received = 0;
@@ -94,17 +94,17 @@ export class Wire {
     socket.onopen = () => {
       [this.received, this.drawn] = [0, false];
       const { token, code, name, space } = this.hello;
-      this.say("hello", { version: VERSION, token, code: token ? "" : code, key: this.key, name, space });
-      this.heard.opened?.();
+      this.sendJson("hello", { version: VERSION, token, code: token ? "" : code, key: this.key, name, space });
+      this.handlers.opened?.();
     };
-    socket.onmessage = ({ data }) => socket === this.socket && this.hear(data);
+    socket.onmessage = ({ data }) => socket === this.socket && this.receive(data);
     socket.onclose = ({ reason }) => socket === this.socket && this.lost(reason);
     this.socket = socket;
     this.refused = "";
   }
 
   /** Connects anew under the same id, with another `space` for instance. */
-  again(changes) {
+  reconnect(changes) {
     Object.assign(this.hello, changes);
     const old = this.socket;
     this.open();
@@ -114,23 +114,23 @@ export class Wire {
   lost(reason) {
     this.offset = null;
     const final = Boolean(this.refused);
-    this.heard.closed?.(this.refused || reason, final);
+    this.handlers.closed?.(this.refused || reason, final);
     if (final) return;
     this.timer = setTimeout(() => this.open(), 1000 * this.wait);
     this.wait = Math.min(2 * this.wait, LONGEST_WAIT);
   }
 
-  hear(data) {
+  receive(data) {
     if (typeof data !== "string") {
       this.received += 1;
       const message = decode(data);
-      if (message) this.heard[message.kind]?.(message);
-      if (!this.controls) this.send("ack", { stamp: clock() });
+      if (message) this.handlers[message.kind]?.(message);
+      if (!this.controls) this.sendBinary("ack", { stamp: clock() });
       return;
     }
     const message = JSON.parse(data);
-    if (!(message.type in ANSWERS)) return;
-    if (message.type === "ping") this.say("pong", { number: message.number, stamp: clock() });
+    if (!(message.type in SERVER_MESSAGES)) return;
+    if (message.type === "ping") this.sendJson("pong", { number: message.number, stamp: clock() });
     if (message.type === "clock") this.offset = message.offset;
     if (message.type === "error" && message.closing) this.refused = message.reason;
     if (message.type === "welcome") {
@@ -138,33 +138,33 @@ export class Wire {
       this.hello.token = message.token;
       this.wait = FIRST_WAIT;
     }
-    this.heard[message.type]?.(message);
+    this.handlers[message.type]?.(message);
   }
 
   get up() {
     return this.socket.readyState === WebSocket.OPEN;
   }
 
-  say(type, fields) {
+  sendJson(type, fields) {
     if (this.up) this.socket.send(JSON.stringify({ type, ...fields }));
   }
 
   /** Poses and buttons of a frame of the page at `stamp`, s; it acknowledges what has come, and what was drawn. */
   input(hands, visible, stamp) {
-    this.send("input", { hands, visible, stamp, drawn: this.drawn });
+    this.sendBinary("input", { hands, visible, stamp, drawn: this.drawn });
     this.drawn = false;
   }
 
   /** The viewer's eyes in the room. */
   view(pose, stamp) {
-    this.send("view", { pose, stamp });
+    this.sendBinary("view", { pose, stamp });
   }
 
   stop() {
-    this.send("stop", { stamp: clock() });
+    this.sendBinary("stop", { stamp: clock() });
   }
 
-  send(kind, fields) {
+  sendBinary(kind, fields) {
     if (this.up) this.socket.send(encode(kind, { received: this.received, ...fields }));
   }
 

@@ -124,7 +124,7 @@ export const FROM_CLIENT = {
     "flags": {}
   }
 };
-export const SAID = {
+export const CLIENT_MESSAGES = {
   "hello": {
     "version": "required",
     "token": "",
@@ -161,7 +161,7 @@ export const SAID = {
     "type": "shown"
   }
 };
-export const ANSWERS = {
+export const SERVER_MESSAGES = {
   "welcome": {
     "id": "required",
     "key": "required",

@@ -38,7 +38,7 @@ async function open(t, width, height = 900) {
   return { page, wrongs };
 }
 
-const shown = (page) => page.evaluate(() => document.querySelector("#now").textContent);
+const statusText = (page) => page.evaluate(() => document.querySelector("#now").textContent);
 
 /** The longest trial, in which the arm moves. */
 const moving = (page) => page.evaluate(() => {
@@ -51,9 +51,9 @@ const colours = (page) => page.evaluate(() => {
   globalThis.viewer.draw();
   const { width, height } = globalThis.viewer.canvas, gl = globalThis.viewer.renderer.getContext(), bytes = new Uint8Array(4 * width * height);
   gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
-  const found = new Set();
-  for (let i = 0; i < bytes.length; i += 4) found.add((bytes[i] << 16) | (bytes[i + 1] << 8) | bytes[i + 2]);
-  return found.size;
+  const values = new Set();
+  for (let i = 0; i < bytes.length; i += 4) values.add((bytes[i] << 16) | (bytes[i + 1] << 8) | bytes[i + 2]);
+  return values.size;
 });
 
 for (const width of [1280, 400]) {
@@ -69,7 +69,7 @@ for (const width of [1280, 400]) {
     assert.ok(await page.isVisible("#left"));
     assert.ok((await colours(page)) > 50, "nothing is drawn");
     await picture(page, `certificate-${width}-beside`);
-    await page.evaluate(() => document.querySelectorAll("details").forEach((one) => (one.open = true)));
+    await page.evaluate(() => document.querySelectorAll("details").forEach((details) => (details.open = true)));
     await page.evaluate(AXE); // by the debugger's protocol, which the page's rules do not bind
     const { violations } = await page.evaluate(() => globalThis.axe.run());
     assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes[0].html}`), []);
@@ -80,10 +80,10 @@ for (const width of [1280, 400]) {
 test("scrubber, speed, play and the view work from the keyboard", async (t) => {
   const { page, wrongs } = await open(t, 1280);
   await page.selectOption("#trial", await moving(page));
-  const before = await shown(page);
+  const before = await statusText(page);
   await page.focus("#scrubber");
   for (let step = 0; step < 5; step++) await page.keyboard.press("ArrowRight");
-  assert.notEqual(await shown(page), before);
+  assert.notEqual(await statusText(page), before);
   await page.focus("#view");
   const theta = await page.evaluate(() => globalThis.viewer.turned.theta);
   await page.keyboard.press("ArrowRight");
@@ -102,12 +102,12 @@ test("scrubber, speed, play and the view work from the keyboard", async (t) => {
 
 test("errors that it shows are those of the points that it draws", async (t) => {
   const { page } = await open(t, 1280);
-  const { error, told } = await page.evaluate(() => {
+  const { error, text } = await page.evaluate(() => {
     const { replays, number, frame } = globalThis.viewer, { measured, simulated } = replays.frame(number, frame);
     const last = measured.length - 3;
-    return { error: 1e3 * Math.hypot(...[0, 1, 2].map((k) => measured[last + k] - simulated[last + k])), told: document.querySelector("#now").textContent };
+    return { error: 1e3 * Math.hypot(...[0, 1, 2].map((k) => measured[last + k] - simulated[last + k])), text: document.querySelector("#now").textContent };
   });
-  assert.ok(told.endsWith(`tip ${error.toFixed(1)} mm`), told);
+  assert.ok(text.endsWith(`tip ${error.toFixed(1)} mm`), text);
 });
 
 test("on A4 paper a picture stands where the replay is", async (t) => {

@@ -56,7 +56,7 @@ async function drag(page, kind, dx, dy) {
 }
 
 /** Of both targets: whether its solid is drawn, and what is drawn of it on top of the robot. */
-const seenThrough = (page) => until(page, () => {
+const visibleParts = (page) => until(page, () => {
   const { targets } = globalThis.trunkline.marks;
   return Object.values(targets).every(({ group }) => group.visible) && Object.values(targets).map(({ solid, faint, halo }) =>
     [solid.visible, ...[faint, halo].map(({ visible, material }) => visible && !material.depthTest)].join());
@@ -81,11 +81,11 @@ test("a cycle by mouse and keyboard: aim, plan, preview, confirm, execute, done"
   const { page, wrongs } = await open(t, browser, server);
   await loaded(page);
   await takeControl(page);
-  assert.deepEqual(await seenThrough(page), ["false,true,true", "false,true,true"]); // they begin inside the robot
+  assert.deepEqual(await visibleParts(page), ["false,true,true", "false,true,true"]); // they begin inside the robot
   await drag(page, "rigid", 16, -12);
   await drag(page, "tip", -30, -45);
   await until(page, () => globalThis.trunkline.state.targets && true);
-  assert.deepEqual(await seenThrough(page), ["true,true,true", "true,true,true"]);
+  assert.deepEqual(await visibleParts(page), ["true,true,true", "true,true,true"]);
   await picture(page, "1-aim");
   await page.keyboard.press("Enter");
   await inMode(page, "preview");
@@ -134,7 +134,7 @@ test("keys move the chosen target by a step, and the grip let go holds the robot
   await passed(page, server, ["execute", "hold", "aim"]);
 });
 
-test("the robot follows while the grip is held, and the page says why it holds then", async (t) => {
+test("the robot follows while the grip is held, and the notice has the reason why it holds then", async (t) => {
   const { page } = await open(t, browser, server);
   await loaded(page);
   await takeControl(page);
@@ -156,7 +156,7 @@ test("the robot follows while the grip is held, and the page says why it holds t
   await until(page, () => globalThis.trunkline.state.robot === "idle");
 });
 
-test("out of reach is told in words, by a ring and by an offer that R takes", async (t) => {
+test("out of reach is shown in words, by a ring and by an offer that R takes", async (t) => {
   const { page } = await open(t, browser, server);
   await loaded(page);
   await takeControl(page);
@@ -184,30 +184,30 @@ test("space stops, and R goes on", async (t) => {
   await inMode(page, "aim");
 });
 
-test("a lost connection is said, the robot turns grey, and it comes back", async (t) => {
+test("a lost connection is shown, the robot turns grey, and it comes back", async (t) => {
   const { page } = await open(t, browser, server);
   await loaded(page);
-  await server.tell("drop");
+  await server.command("drop");
   await until(page, () => document.querySelector("#mode").dataset.mode === "lost", null, "words on the lost connection");
   await until(page, () => globalThis.trunkline.drawn.faded);
-  await server.tell("listen");
+  await server.command("listen");
   await until(page, () => globalThis.trunkline.wire.up && globalThis.trunkline.state && true);
   await until(page, () => !globalThis.trunkline.drawn.faded);
 });
 
-test("a robot that is not heard of is old, and grey", async (t) => {
+test("a robot without new poses is marked as old, and grey", async (t) => {
   const { page } = await open(t, browser, server);
   await loaded(page);
-  await server.tell("silent");
+  await server.command("silent");
   await until(page, () => /OLD/.test(document.querySelector("#facts").textContent) && globalThis.trunkline.drawn.faded);
-  await server.tell("speak");
+  await server.command("speak");
   await until(page, () => !/OLD/.test(document.querySelector("#facts").textContent));
 });
 
-test("without its token the page asks for the six digits, and a wrong token is said", async (t) => {
+test("without its token the page asks for the six digits, and a wrong token is reported", async (t) => {
   const { page } = await open(t, browser, server, { url: `${server.origin}/` });
   await until(page, () => !document.querySelector("#pairing").hidden);
-  const renewed = (await server.tell("code")).findLast((line) => line.startsWith("code "));
+  const renewed = (await server.command("code")).findLast((line) => line.startsWith("code "));
   await page.fill("#code", renewed.slice("code ".length));
   await page.click("#pairing button");
   await loaded(page);
@@ -229,14 +229,14 @@ test("on a small page the list of keys hides neither the state nor the next acti
   }
 });
 
-test("the tip's marker that is dragged onto a thing marks it, and a handle moves a target along its axis alone", async (t) => {
+test("the tip's marker that is dragged onto an object marks it, and a handle moves a target along its axis alone", async (t) => {
   const server = await anew(t), { page } = await open(t, browser, server, { drawn: false });
   await loaded(page);
   await takeControl(page);
   await drag(page, "rigid", 16, -12);
   const [from, cup] = await page.evaluate(() => {
-    const { desktop } = globalThis.trunkline, [thing] = desktop.things;
-    const place = desktop.wanted[0].clone().set(...thing.position);
+    const { desktop } = globalThis.trunkline, [object] = desktop.objects;
+    const place = desktop.wanted[0].clone().set(...object.position);
     return [desktop.wanted[1 - desktop.rigid], place].map((point) => desktop.toScreen(point));
   });
   await page.mouse.move(...from);
@@ -244,7 +244,7 @@ test("the tip's marker that is dragged onto a thing marks it, and a handle moves
   await page.mouse.move(...cup, { steps: 4 });
   const away = await page.evaluate(() => {
     const { desktop } = globalThis.trunkline, wanted = desktop.wanted[1 - desktop.rigid];
-    return wanted.distanceTo(wanted.clone().set(...desktop.things[0].position));
+    return wanted.distanceTo(wanted.clone().set(...desktop.objects[0].position));
   });
   assert.ok(away < 1e-6, `the marker is ${away} m from the middle of what the pointer is on`);
   await page.waitForTimeout(300);
@@ -278,7 +278,7 @@ test("the twin's certificate is linked, and opens as a page that runs its own sc
 
 test("a doubtful grasp looks so, and its first confirmation only asks again", async (t) => {
   const server = await anew(t);
-  await server.tell("doubtful");
+  await server.command("doubtful");
   const { page } = await open(t, browser, server, { drawn: false });
   await loaded(page);
   await takeControl(page);
@@ -299,7 +299,7 @@ test("a doubtful grasp looks so, and its first confirmation only asks again", as
   await page.keyboard.up("KeyG");
 });
 
-test("a key that did nothing says why, and control that was lost does, until its cause is gone", async (t) => {
+test("the notice has why a key did nothing and why control was lost, until its cause is gone", async (t) => {
   const { page } = await open(t, browser, server, { drawn: false });
   await loaded(page);
   await until(page, () => !document.querySelector("#control").disabled);
@@ -307,8 +307,8 @@ test("a key that did nothing says why, and control that was lost does, until its
   await until(page, () => /press “Take control” first/.test(document.querySelector("#notice").textContent));
   await takeControl(page);
   await until(page, () => document.querySelector("#notice").textContent === "");
-  await server.tell("drop");
-  await server.tell("listen");
+  await server.command("drop");
+  await server.command("listen");
   await until(page, () => /Control was lost with the connection/.test(document.querySelector("#notice").textContent));
   await takeControl(page);
   await until(page, () => !/lost/.test(document.querySelector("#notice").textContent));
@@ -371,7 +371,7 @@ test("a finger needs no key: what is offered has a button, and words name it", a
   await inMode(page, "aim");
 });
 
-test("a recording is played by the ghost, and a file that is none is said", async (t) => {
+test("a recording is played by the ghost, and a file that is none is refused", async (t) => {
   const { page, wrongs } = await open(t, browser, server);
   await loaded(page);
   const rows = await page.evaluate(() => [...globalThis.trunkline.frame.rows].map((value) => (Number.isFinite(value) ? value : null)));
@@ -383,11 +383,11 @@ test("a recording is played by the ghost, and a file that is none is said", asyn
     rows.forEach((value, place) => view.setFloat32(4 + HEAD_BYTES + 4 * place, place === 0 ? time : (value ?? NaN), true));
     return Buffer.from(view.buffer);
   });
-  const give = (buffer) => page.setInputFiles("#recording", { name: "run.bin", mimeType: "application/octet-stream", buffer });
-  await give(Buffer.from("no recording"));
+  const load = (buffer) => page.setInputFiles("#recording", { name: "run.bin", mimeType: "application/octet-stream", buffer });
+  await load(Buffer.from("no recording"));
   await until(page, () => /no recording of this robot/.test(document.querySelector("#notice").textContent));
   assert.equal(await page.evaluate(() => globalThis.trunkline.recording), null);
-  await give(Buffer.concat(messages));
+  await load(Buffer.concat(messages));
   await until(page, () => document.querySelector("#foreseen").textContent === "A recording." && globalThis.trunkline.drawn.ghost.visible);
   await until(page, () => globalThis.trunkline.playing.rows[globalThis.trunkline.playing.index * globalThis.trunkline.playing.width] === 1);
   assert.deepEqual(wrongs, []);

@@ -1,6 +1,6 @@
 // What the browser tests share: a server, a headless Chromium, an emulated Quest 3, and polling.
 //
-// The page's rules forbid `eval`, so nothing here bypasses them: what is asked is asked by `evaluate`, again and again.
+// The page's rules forbid `eval`, so nothing here bypasses them: conditions are polled by `evaluate`.
 
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
@@ -22,7 +22,7 @@ const DRAWN = 10; // Hz at most at which tests draw, so that they also pass besi
 const BLIND = 36; // Hz at most without drawing
 const FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--disable-background-networking"];
 
-/** The server, round a plain robot: `url`, `tell(word)` which gives its log. */
+/** The server, round a plain robot: `url`, `command(text)` which gives its log. */
 export async function serve() {
   const child = spawn(PYTHON, ["-m", "tests.ar.session.page_server", ...(PICTURES ? [] : ["--light"])], { cwd: root, stdio: ["pipe", "pipe", "inherit"] });
   const lines = createInterface({ input: child.stdout })[Symbol.asyncIterator]();
@@ -32,7 +32,7 @@ export async function serve() {
   return {
     origin: `http://127.0.0.1:${port}`,
     url: `http://127.0.0.1:${port}/#token=${token}`,
-    async tell(text = "log") {
+    async command(text = "log") {
       child.stdin.write(`${text}\n`);
       return JSON.parse((await lines.next()).value);
     },
@@ -46,7 +46,7 @@ export async function serve() {
 /** How a browser is started. */
 export const LAUNCHED = { executablePath: BROWSER, args: FLAGS, timeout: LONGEST };
 
-/** The browser that listens already (`client/browser.mjs`), or one of a file's own. */
+/** The browser that listens already (`client/browser.mjs`), or a new one for this file. */
 export const launch = () => (LISTENS ? chromium.connect(LISTENS, { timeout: LONGEST }) : chromium.launch(LAUNCHED));
 
 /** A page at `url` of `server`, closed with the test; `wrongs` collects console errors, exceptions and requests elsewhere. Unless it is `drawn`, it does all but fill pixels. */
@@ -90,7 +90,7 @@ function blindly() {
       prototype[name] = () => {};
 }
 
-/** What software drawing says of itself, which is no fault of the page. */
+/** Messages of software drawing, which are no fault of the page. */
 const isOfDriver = (text) => /GPU stall due to ReadPixels|GL Driver Message|swiftshader|WebGL-/i.test(text);
 
 let emulated;
@@ -111,12 +111,12 @@ async function emulator() {
   return emulated;
 }
 
-/** Until `test` (run in the page with `given`) is truthy; then what it gave. */
-export async function until(page, test, given, what = test.toString()) {
+/** Until `test` (run in the page with `argument`) is truthy; returns its result. */
+export async function until(page, test, argument, what = test.toString()) {
   const end = Date.now() + LONGEST;
   for (;;) {
-    const found = await page.evaluate(test, given);
-    if (found) return found;
+    const result = await page.evaluate(test, argument);
+    if (result) return result;
     if (Date.now() > end) {
       const state = await page.evaluate(() => ({ state: globalThis.trunkline?.state, text: document.querySelector("#status")?.textContent }));
       assert.fail(`waited ${LONGEST / 1000} s for ${what}; page: ${JSON.stringify(state)}`);
@@ -131,9 +131,9 @@ export const inMode = (page, mode) => until(page, (wanted) => globalThis.trunkli
 export async function passed(page, server, modes) {
   const end = Date.now() + LONGEST;
   for (;;) {
-    const found = (await server.tell()).filter((line) => line.startsWith("mode ")).map((line) => line.slice(5)).slice(-modes.length);
-    if (found.join() === modes.join()) return;
-    if (Date.now() > end) assert.deepEqual(found, modes);
+    const latest = (await server.command()).filter((line) => line.startsWith("mode ")).map((line) => line.slice(5)).slice(-modes.length);
+    if (latest.join() === modes.join()) return;
+    if (Date.now() > end) assert.deepEqual(latest, modes);
     await page.waitForTimeout(100);
   }
 }
@@ -142,7 +142,7 @@ export async function passed(page, server, modes) {
 export const set = (page, side, button, value) =>
   page.evaluate(([hand, name, amount]) => globalThis.headset.controllers[hand].updateButtonValue(name, amount), [side, button, value]);
 
-/** Waits until the page has drawn `count` frames, so that it has heard of what was done. */
+/** Waits until the page has drawn `count` frames, so that it has the effect of an input. */
 export async function frames(page, count = 3) {
   const first = await page.evaluate(() => globalThis.trunkline.renderer.info.render.frame);
   await until(page, (least) => globalThis.trunkline.renderer.info.render.frame >= least, first + count);

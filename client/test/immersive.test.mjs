@@ -23,34 +23,34 @@ async function aligned(t) {
   await until(page, () => !document.querySelector("#immerse").hidden);
   await page.click("#immerse");
   await until(page, () => globalThis.trunkline.immersive.session && globalThis.trunkline.wire.controls);
-  await until(page, () => globalThis.trunkline.immersive.aligning.place && true);
+  await until(page, () => globalThis.trunkline.immersive.alignment.place && true);
   await press(page, "right", "a-button");
-  await until(page, () => globalThis.trunkline.immersive.aligning.done);
+  await until(page, () => globalThis.trunkline.immersive.alignment.done);
   await inMode(page, "aim");
   return opened;
 }
 
 /** Both targets set with their grips, as a user does. */
-async function aim(page, heard = true) {
+async function aim(page, setsTargets = true) {
   for (const [side, place] of [["left", [0.5, 0.1, 0.5]], ["right", [0.72, 0.1, 0.13]]]) {
     await point(page, side, place);
     await page.waitForTimeout(300); // the filter's
     await set(page, side, "squeeze", 1);
   }
   await page.waitForTimeout(600);
-  if (heard) await until(page, () => globalThis.trunkline.state.targets && true);
+  if (setsTargets) await until(page, () => globalThis.trunkline.state.targets && true);
 }
 
 test("it asks for passthrough with local-floor and anchors, and draws nothing behind the robot", async (t) => {
   const { page, wrongs } = await aligned(t);
-  const found = await page.evaluate(() => {
+  const view = await page.evaluate(() => {
     const { session } = globalThis.trunkline.immersive;
     return { blend: session.environmentBlendMode, features: [...session.enabledFeatures], ground: globalThis.trunkline.drawn.scene.background, rate: session.frameRate };
   });
-  assert.equal(found.blend, "alpha-blend");
-  assert.ok(found.features.includes("local-floor") && found.features.includes("anchors"));
-  assert.equal(found.ground, null);
-  assert.ok(found.rate >= 72 && found.rate <= 120, `${found.rate} Hz`);
+  assert.equal(view.blend, "alpha-blend");
+  assert.ok(view.features.includes("local-floor") && view.features.includes("anchors"));
+  assert.equal(view.ground, null);
+  assert.ok(view.rate >= 72 && view.rate <= 120, `${view.rate} Hz`);
   const { calls, triangles } = await page.evaluate(() => globalThis.trunkline.renderer.info.render);
   assert.ok(calls <= 60 && triangles <= 100_000, `${calls} calls, ${triangles} triangles`);
   assert.deepEqual(wrongs, []);
@@ -76,8 +76,8 @@ test("a cycle with two controllers: aim, plan, preview, confirm, execute, done",
 });
 
 test("a doubtful grasp is confirmed by the second pull of the trigger alone", async (t) => {
-  await server.tell("doubtful");
-  t.after(() => server.tell("sure"));
+  await server.command("doubtful");
+  t.after(() => server.command("sure"));
   const { page } = await aligned(t);
   await aim(page);
   for (const side of ["left", "right"]) await set(page, side, "squeeze", 0);
@@ -113,7 +113,7 @@ test("the hand that moves to the edge of reach feels a tick, once", async (t) =>
   assert.equal((await page.evaluate(() => globalThis.ticks)).filter((side) => side === "left").length, 1);
 });
 
-test("a controller that is lost or only guessed holds the robot, and it is said", async (t) => {
+test("a controller that is lost or only guessed holds the robot, and the notice names it", async (t) => {
   const { page } = await aligned(t);
   await page.evaluate(() => (globalThis.guessed = true));
   await inMode(page, "hold");
@@ -130,12 +130,12 @@ test("a controller that is lost or only guessed holds the robot, and it is said"
   await inMode(page, "aim");
 });
 
-test("a lost anchor holds the robot until it is found again", async (t) => {
+test("a lost anchor holds the robot until it is back", async (t) => {
   const { page } = await aligned(t);
   await until(page, () => globalThis.trunkline.immersive.anchor && true);
   await losesAnchors(page);
   await inMode(page, "hold");
-  await until(page, () => /not aligned/.test(globalThis.trunkline.state.notice) && globalThis.trunkline.immersive.aligning.step === "lost");
+  await until(page, () => /not aligned/.test(globalThis.trunkline.state.notice) && globalThis.trunkline.immersive.alignment.step === "lost");
   await picture(page, "8-headset-lost");
   await findsAnchors(page);
   await inMode(page, "aim");
@@ -143,69 +143,69 @@ test("a lost anchor holds the robot until it is found again", async (t) => {
 
 test("an anchor of the session before is restored, and one touch is asked for", async (t) => {
   const { page } = await aligned(t);
-  await until(page, () => globalThis.trunkline.immersive.aligning.told.anchor && true); // the server knows it
-  const before = await page.evaluate(() => globalThis.trunkline.immersive.aligning.place.position.toArray());
+  await until(page, () => globalThis.trunkline.immersive.alignment.progress.anchor && true); // the server follows it
+  const before = await page.evaluate(() => globalThis.trunkline.immersive.alignment.place.position.toArray());
   await page.evaluate(() => globalThis.trunkline.immersive.leave());
   await until(page, () => !globalThis.trunkline.immersive.session);
   await until(page, () => globalThis.trunkline.wire.up && globalThis.trunkline.wire.offset !== null);
   await page.evaluate(() => document.querySelector("#immerse").click()); // the emulator has left the canvas on top
-  await until(page, () => globalThis.trunkline.immersive.aligning.step === "tip"); // put there by eye: no tip is known yet
-  const now = await page.evaluate(() => globalThis.trunkline.immersive.aligning.place.position.toArray());
+  await until(page, () => globalThis.trunkline.immersive.alignment.step === "tip"); // put there by eye: the tip is not calibrated yet
+  const now = await page.evaluate(() => globalThis.trunkline.immersive.alignment.place.position.toArray());
   assert.ok(Math.hypot(...now.map((x, axis) => x - before[axis])) < 1e-4);
   assert.match(await page.evaluate(() => globalThis.trunkline.state.notice), /not aligned|^$/);
 });
 
 /** Where the base, and a point far out, are in the room itself, which no recentring moves. */
 const inRoom = (page) => page.evaluate(() => {
-  const { space, aligning: { place } } = globalThis.trunkline.immersive;
-  const m = Object.getOwnPropertySymbols(space).map((key) => space[key]).find((own) => own.offsetMatrix).offsetMatrix;
+  const { space, alignment: { place } } = globalThis.trunkline.immersive;
+  const m = Object.getOwnPropertySymbols(space).map((key) => space[key]).find((inner) => inner.offsetMatrix).offsetMatrix;
   return [[0, 0, 0], [0.9, 0, 0.3]].map((point) => {
     const [x, y, z] = place.position.clone().set(...point).applyQuaternion(place.quaternion).add(place.position).toArray();
     return [0, 1, 2].map((row) => m[row] * x + m[row + 4] * y + m[row + 8] * z + m[row + 12]);
   });
 });
 
-/** The headset's frame leaps in the room, and it says so, as when the view is recentred; what the page says at once. */
+/** The headset's frame leaps in the room, with the event of a recentred view; returns the messages that the page sends at once. */
 const recentre = (page) => page.evaluate(() => {
-  const { immersive } = globalThis.trunkline, { space, say } = immersive, told = [];
-  immersive.say = (type, fields) => {
-    told.push([type, fields.pose]);
-    say(type, fields);
+  const { immersive } = globalThis.trunkline, { space, sendJson } = immersive, messages = [];
+  immersive.sendJson = (type, fields) => {
+    messages.push([type, fields.pose]);
+    sendJson(type, fields);
   };
   const [c, s] = [Math.cos(0.7), Math.sin(0.7)];
-  const own = Object.getOwnPropertySymbols(space).map((key) => space[key]).find(({ offsetMatrix }) => offsetMatrix);
-  own.offsetMatrix.set([c, 0, -s, 0, 0, 1, 0, 0, s, 0, c, 0, 0.3, 0, -0.2, 1]);
+  const inner = Object.getOwnPropertySymbols(space).map((key) => space[key]).find(({ offsetMatrix }) => offsetMatrix);
+  inner.offsetMatrix.set([c, 0, -s, 0, 0, 1, 0, 0, s, 0, c, 0, 0.3, 0, -0.2, 1]);
   space.dispatchEvent(new Event("reset"));
-  immersive.say = say;
-  return told;
+  immersive.sendJson = sendJson;
+  return messages;
 });
 
-/** The headset loses all anchors, until it finds them again. */
+/** The headset loses all anchors, until `findsAnchors`. */
 const losesAnchors = (page) => page.evaluate(() => {
   const { prototype } = globalThis.XRFrame;
-  globalThis.truly = Object.getOwnPropertyDescriptor(prototype, "trackedAnchors");
+  globalThis.trackedAnchors = Object.getOwnPropertyDescriptor(prototype, "trackedAnchors");
   Object.defineProperty(prototype, "trackedAnchors", { configurable: true, get: () => new Set() });
 });
-const findsAnchors = (page) => page.evaluate(() => Object.defineProperty(globalThis.XRFrame.prototype, "trackedAnchors", globalThis.truly));
+const findsAnchors = (page) => page.evaluate(() => Object.defineProperty(globalThis.XRFrame.prototype, "trackedAnchors", globalThis.trackedAnchors));
 
-const placed = (page) => page.evaluate(() => globalThis.trunkline.immersive.aligning.place?.position.toArray());
+const placed = (page) => page.evaluate(() => globalThis.trunkline.immersive.alignment.place?.position.toArray());
 
 function assertSame(now, before) {
   for (const [index, point] of now.entries())
     assert.ok(Math.hypot(...point.map((x, axis) => x - before[index][axis])) < 1e-4, `${point} of ${before[index]}`);
 }
 
-test("a recentred view holds the robot until the anchor is seen again, and the base is where it was in the room", async (t) => {
+test("a recentred view holds the robot until the anchor is back, and the base is where it was in the room", async (t) => {
   const { page } = await aligned(t);
-  await until(page, () => globalThis.trunkline.immersive.anchor && globalThis.trunkline.immersive.aligning.told.anchor && true);
+  await until(page, () => globalThis.trunkline.immersive.anchor && globalThis.trunkline.immersive.alignment.progress.anchor && true);
   const before = await inRoom(page), was = await placed(page);
   await losesAnchors(page);
   assert.deepEqual(await recentre(page), [["anchor", null]]);
   await inMode(page, "hold");
   await findsAnchors(page);
   await until(page, ([x]) => {
-    const { aligning } = globalThis.trunkline.immersive;
-    return aligning.done && Math.abs(aligning.place.position.x - x) > 0.01;
+    const { alignment } = globalThis.trunkline.immersive;
+    return alignment.done && Math.abs(alignment.place.position.x - x) > 0.01;
   }, was, "the base in the frame that has leapt");
   await inMode(page, "aim");
   assertSame(await inRoom(page), before);
@@ -213,22 +213,22 @@ test("a recentred view holds the robot until the anchor is seen again, and the b
 
 test("a recentred view without an anchor asks to align again, and the robot holds", async (t) => {
   const { page } = await aligned(t);
-  await until(page, () => globalThis.trunkline.immersive.anchor && globalThis.trunkline.immersive.aligning.told.anchor && true);
+  await until(page, () => globalThis.trunkline.immersive.anchor && globalThis.trunkline.immersive.alignment.progress.anchor && true);
   await page.evaluate(() => (globalThis.trunkline.immersive.anchor = null));
   assert.deepEqual(await recentre(page), [["alignment", null]]);
-  await until(page, () => globalThis.trunkline.immersive.aligning.step === "place");
+  await until(page, () => globalThis.trunkline.immersive.alignment.step === "place");
   await inMode(page, "hold");
 });
 
 test("a page that is loaded anew restores the anchor, and controls nothing until it was touched", async (t) => {
   const { page } = await aligned(t);
-  await until(page, () => globalThis.trunkline.immersive.anchor && globalThis.trunkline.immersive.aligning.told.anchor && true);
+  await until(page, () => globalThis.trunkline.immersive.anchor && globalThis.trunkline.immersive.alignment.progress.anchor && true);
   const before = await inRoom(page);
   await page.reload();
   await until(page, () => globalThis.trunkline?.loaded && !document.querySelector("#immerse").hidden);
   await page.click("#immerse");
   await until(page, () => globalThis.trunkline.immersive.session && globalThis.trunkline.wire.controls);
-  await until(page, () => globalThis.trunkline.immersive.aligning.step === "tip"); // put there by eye: no tip is known yet
+  await until(page, () => globalThis.trunkline.immersive.alignment.step === "tip"); // put there by eye: the tip is not calibrated yet
   assertSame(await inRoom(page), before);
   await inMode(page, "hold");
   await aim(page, false);
@@ -238,13 +238,13 @@ test("a page that is loaded anew restores the anchor, and controls nothing until
 
 test("the stick asks for touches, and a controller whose place is guessed touches nothing", async (t) => {
   const { page } = await aligned(t);
-  await page.evaluate(() => globalThis.trunkline.wire.say("alignment", { pose: null })); // as after a recentring without an anchor
-  await until(page, () => globalThis.trunkline.immersive.aligning.step === "place");
+  await page.evaluate(() => globalThis.trunkline.wire.sendJson("alignment", { pose: null })); // as after a recentring without an anchor
+  await until(page, () => globalThis.trunkline.immersive.alignment.step === "place");
   await press(page, "right", "thumbstick");
-  await until(page, () => globalThis.trunkline.immersive.aligning.step === "tip");
+  await until(page, () => globalThis.trunkline.immersive.alignment.step === "tip");
   await page.evaluate(() => (globalThis.guessed = true));
-  await until(page, () => /not tracked/.test(globalThis.trunkline.immersive.aligning.said));
+  await until(page, () => /not tracked/.test(globalThis.trunkline.immersive.alignment.feedback));
   await page.evaluate(() => (globalThis.guessed = false));
-  await until(page, () => globalThis.trunkline.immersive.aligning.said === "");
+  await until(page, () => globalThis.trunkline.immersive.alignment.feedback === "");
   await inMode(page, "hold");
 });

@@ -7,13 +7,13 @@ import { Recording } from "../src/recording.js";
 import { decode, encode, noHand } from "../src/wire.js";
 import { FROM_CLIENT, FROM_SERVER, HAND, HEAD_BYTES, INPUT_BYTES } from "../src/wire_table.js";
 import { Ray, Vector3 } from "three";
-import { axisOf, onAxis, thingAt } from "../src/handles.js";
-import { askedTwice, isDoubtful, lasts, ofDevice, success, whyLost, whyNothing } from "../src/hints.js";
+import { axisOf, onAxis, objectAt } from "../src/handles.js";
+import { doubtQuestion, isDoubtful, lasts, ofDevice, success, whyLost, whyNothing } from "../src/hints.js";
 import { LEVELS, Quality } from "../src/quality.js";
 import { matrixOf } from "../src/geoms.js";
 import { Confirming } from "../src/confirming.js";
 import { freeArea } from "../src/views.js";
-import { foreseenWords, remedy, words } from "../src/panel.js";
+import { predictionText, remedy, uiText } from "../src/panel.js";
 
 /** A message `robot` of one row. */
 function robot(sequence, time, x) {
@@ -28,13 +28,13 @@ function robot(sequence, time, x) {
 }
 
 test("a frame of the server is read by the table", () => {
-  const found = decode(robot(7, 1.5, 0.25));
-  assert.deepEqual([found.kind, found.count, found.sequence, found.time], ["robot", 1, 7, 1.5]);
-  assert.deepEqual([...found.flags].sort(), ["moving", "stale"]);
-  assert.deepEqual([...found.rows], [0.25, 0, 0, 1, 0, 0, 0]);
-  const other = new Uint8Array(HEAD_BYTES);
-  other[0] = 250;
-  assert.equal(decode(other.buffer), null);
+  const message = decode(robot(7, 1.5, 0.25));
+  assert.deepEqual([message.kind, message.count, message.sequence, message.time], ["robot", 1, 7, 1.5]);
+  assert.deepEqual([...message.flags].sort(), ["moving", "stale"]);
+  assert.deepEqual([...message.rows], [0.25, 0, 0, 1, 0, 0, 0]);
+  const unknown = new Uint8Array(HEAD_BYTES);
+  unknown[0] = 250;
+  assert.equal(decode(unknown.buffer), null);
 });
 
 test("an input has each number in its place, and the flags of what is tracked", () => {
@@ -63,35 +63,35 @@ test("a preview plays while it comes in, ends once, and cannot be leapt through"
   assert.equal(playback.advance(0.5), false);
   assert.ok(Math.abs(playback.at - 0.2) < 1e-9, "it waits for what is not there");
   playback.add(3, new Float32Array([3, 4, 5, 6, 7, 8, 9, 10]), true);
-  playback.hold(1);
-  assert.ok(playback.at < 0.21, "no leap before it has been seen");
-  playback.held = false;
+  playback.pauseAt(1);
+  assert.ok(playback.at < 0.21, "no leap before it has been shown to its end");
+  playback.paused = false;
   const ends = [];
   for (let n = 0; n < 60; n++) ends.push(playback.advance(0.05));
   assert.equal(ends.filter(Boolean).length, 1);
-  playback.hold(0.55);
+  playback.pauseAt(0.55);
   assert.equal(playback.index, 5);
   assert.equal(playback.rows[playback.index], 5);
 });
 
 test("a recording is replayed at its own times, without a last message that is not whole", () => {
   const messages = [[0, 10, 0], [1, 10.5, 1], [2, 11, 2]].map((values) => new Uint8Array(robot(...values)));
-  const bytes = messages.flatMap((one) => [...new Uint8Array(new Uint32Array([one.length]).buffer), ...one]);
+  const bytes = messages.flatMap((message) => [...new Uint8Array(new Uint32Array([message.length]).buffer), ...message]);
   const { playback } = new Recording(new Uint8Array([...bytes, 60, 0, 0, 0, 1]).buffer);
-  assert.ok(Math.abs(playback.there - 1) < 0.02);
+  assert.ok(Math.abs(playback.available - 1) < 0.02);
   const at = (time) => playback.rows[Math.floor(time * 72) * playback.width];
   assert.deepEqual([at(0.25), at(0.75), at(1)], [0, 1, 2]);
   assert.equal(new Recording(new ArrayBuffer(3)).playback, null);
 });
 
-test("a robot that has arrived is said to have, until the next plan is asked for", () => {
+test("a robot that has arrived is shown as arrived, until the next plan is asked for", () => {
   const page = { lease: null, id: "", age: 0.02, up: true, reason: null, stale: false, immersed: false };
-  const robot = (mode, does) => words({ ...page, state: { mode, robot: does } }).facts.Robot;
+  const robot = (mode, does) => uiText({ ...page, state: { mode, robot: does } }).facts.Robot;
   assert.equal(robot("aim", "done"), "arrived, seen 20 ms ago");
   for (const [mode, does] of [["aim", "idle"], ["execute", "running"], ["plan", "done"], ["ready", "done"]]) assert.equal(robot(mode, does), "seen 20 ms ago");
 });
 
-test("what to do about a wrong token is said, and any other reason as it is", () => {
+test("a wrong token comes with a remedy, any other reason as it is", () => {
   assert.match(remedy("token: wrong"), /Open the address anew that the session has printed/);
   assert.equal(remedy("version: found 1"), "version: found 1");
 });
@@ -100,14 +100,14 @@ const FORESEEN = { probability: null, low: null, high: null, futures: 12, within
 
 test("of a place: how far the preview ends from it, and how far the robot's tip may from that", () => {
   assert.equal(
-    foreseenWords({ ...FORESEEN, miss: 0.0082, spread: [0.001, 0.012] }),
+    predictionText({ ...FORESEEN, miss: 0.0082, spread: [0.001, 0.012] }),
     "The preview ends 8 mm from the target; in 90 % of cases the robot’s tip ends within 12 mm of the preview’s, where it touches nothing.",
   );
 });
 
-test("a radius that is unknown is said to be, and why", () => {
+test("a radius that is unknown is named as such, with the reason", () => {
   assert.equal(
-    foreseenWords({ ...FORESEEN, probability: 0.84, low: 0.68, high: 0.93, unknown: "mount tilted by 95°, trials up to 90°" }),
+    predictionText({ ...FORESEEN, probability: 0.84, low: 0.68, high: 0.93, unknown: "mount tilted by 95°, trials up to 90°" }),
     "Grasp holds in 84 % of 12 futures (68 % to 93 %); how near the robot’s tip comes to the preview’s is unknown: " +
       "mount tilted by 95°, trials up to 90°.",
   );
@@ -127,13 +127,13 @@ test("slow pictures lower the quality step by step, the reach before all is coar
   now = pictures(quality, 0.2, now, now + 60);
   assert.deepEqual(applied, LEVELS.slice(1));
   assert.equal(quality.reach, false);
-  assert.match(quality.words(true), /^slow, 0.2 s a picture; drawn coarser, without the reach; H hides the reach/);
-  assert.doesNotMatch(quality.words(false), /H hides/, "what is hidden already need not be");
+  assert.match(quality.hint(true), /^slow, 0.2 s a picture; drawn coarser, without the reach; H hides the reach/);
+  assert.doesNotMatch(quality.hint(false), /H hides/, "what is hidden already need not be");
   now = pictures(quality, 0.005, now, now + 100);
   assert.equal(quality.at, 4, "it does not swing");
   pictures(quality, 0.005, now, now + 1000);
   assert.equal(quality.at, 0);
-  assert.equal(quality.words(true), "");
+  assert.equal(quality.hint(true), "");
 });
 
 test("inputs that come late lower the quality too, and a screen of one pixel a pixel begins at the level that shows it", () => {
@@ -156,17 +156,17 @@ test("a notice is in the words of the device at hand", () => {
   for (const key of ["stopped", "ready", "plan", "hold", "aim"]) assert.doesNotMatch(ofDevice(whyNothing("Enter", { up: true, controls: true, mode: key, gripped: false }), "touch"), /\bEnter\b.*press|\bpress R\b|\bG\b/);
 });
 
-test("of a notice that stands while aiming, its cause is looked at", () => {
+test("a notice lasts while aiming only as long as its cause", () => {
   const at = (rigid, tip) => ({ mode: "aim", targets: { rigid: { reach: rigid }, tip: { reach: tip } }, gripped: false });
   const outside = "tip target is 17 mm out of reach";
   assert.ok(lasts(outside, at("inside", "outside")));
   assert.ok(!lasts(outside, at("inside", "inside")));
   assert.ok(!lasts("rigid target is inside the table", at("inside", "inside")));
   assert.ok(!lasts("both targets are needed: hold a grip to set each", at("inside", "inside")));
-  assert.ok(lasts("no plan: world: the table", at("inside", "inside")), "what is not known to be over stays");
+  assert.ok(lasts("no plan: world: the table", at("inside", "inside")), "a cause that cannot be checked stays");
 });
 
-test("a key that does nothing says why, and one that does says nothing", () => {
+test("a key without effect has a reason, and one with an effect has none", () => {
   const now = { up: true, controls: true, holder: "a", mode: "aim", gripped: false, offers: false };
   assert.equal(whyNothing("Enter", now), "");
   assert.equal(whyNothing("KeyX", { ...now, up: false }), "");
@@ -180,72 +180,72 @@ test("a key that does nothing says why, and one that does says nothing", () => {
   assert.match(whyNothing("ArrowUp", { ...now, mode: "execute" }), /stay as they are/);
 });
 
-test("letting go is asked only of whom holds something", () => {
+test("letting go is asked only while something is pressed", () => {
   const page = { lease: { holder: "me", clients: [] }, id: "me", age: 0.02, up: true, reason: null, stale: false, device: "keys" };
   const state = { mode: "hold", keys: "let go of all keys for a moment", next: "let go of grips and triggers for a moment" };
-  assert.match(words({ ...page, state, held: true }).next, /Let go of G/);
-  assert.doesNotMatch(words({ ...page, state, held: false }).next, /let go/i);
-  assert.match(words({ ...page, state, device: "controllers" }).next, /grips and triggers/);
+  assert.match(uiText({ ...page, state, pressed: true }).next, /Let go of G/);
+  assert.doesNotMatch(uiText({ ...page, state, pressed: false }).next, /let go/i);
+  assert.match(uiText({ ...page, state, device: "controllers" }).next, /grips and triggers/);
 });
 
-test("why control was lost is what happened here of late", () => {
+test("the reason for lost control is what happened here of late", () => {
   assert.match(whyLost({ gap: 1.3, hidden: false }), /sent nothing for 1.3 s.*“Take control”/);
   assert.match(whyLost({ gap: 0.1, hidden: true }), /was hidden/);
   assert.doesNotMatch(whyLost({ gap: 0.1, hidden: false }), /busy|hidden/);
 });
 
-test("a grasp that is likely to fail looks so and is asked of twice, one that is likely to hold is not", () => {
+test("a grasp that is likely to fail is marked and takes two presses, one that is likely to hold does not", () => {
   assert.ok(isDoubtful({ probability: 0.4 }) && !isDoubtful({ probability: 0.84 }) && !isDoubtful({ probability: null }) && !isDoubtful(null));
-  assert.match(foreseenWords({ ...FORESEEN, probability: 0.4, low: 0.2, high: 0.6, unknown: "x" }), /^Grasp holds in only 40 %/);
-  const question = askedTwice({ probability: 0.4 });
+  assert.match(predictionText({ ...FORESEEN, probability: 0.4, low: 0.2, high: 0.6, unknown: "x" }), /^Grasp holds in only 40 %/);
+  const question = doubtQuestion({ probability: 0.4 });
   assert.match(question, /only 40 % of cases. Pull the trigger again/);
   assert.match(ofDevice(question, "keys"), /only 40 % of cases. Press Enter again/);
   assert.match(ofDevice(question, "touch"), /only 40 % of cases. tap “Confirm” again/);
 });
 
-/** What a server hears of the right trigger, and how often the user was asked, at each of `steps`: [mode, what is foreseen, trigger, grip]. */
-function heardOf(...steps) {
-  let asked = 0;
-  const confirming = new Confirming(() => (asked += 1));
-  return steps.map(([mode, told, trigger, grip = true]) => {
+/** Whether the right trigger is sent, and how often the user was asked, at each of `steps`: [mode, prediction, trigger, grip]. */
+function sentTriggers(...steps) {
+  let questions = 0;
+  const confirming = new Confirming(() => (questions += 1));
+  return steps.map(([mode, prediction, trigger, grip = true]) => {
     const hands = { left: { ...noHand(), grip }, right: { ...noHand(), trigger } };
-    return `${confirming.heard(hands, mode, told).right.trigger ? "heard" : "not"} ${asked}`;
+    return `${confirming.filter(hands, mode, prediction).right.trigger ? "sent" : "not"} ${questions}`;
   });
 }
 
 test("a press that would confirm a doubtful grasp only asks, however long it lasts; the next one confirms, of this plan alone", () => {
   const bad = { digest: "a", probability: 0.4 }, worse = { digest: "b", probability: 0.3 }, good = { digest: "c", probability: 0.9 };
   const [up, down] = [false, true];
-  assert.deepEqual(heardOf(["ready", bad, up], ["ready", bad, down], ["ready", bad, down], ["ready", bad, up], ["ready", bad, down]),
-    ["not 0", "not 1", "not 1", "not 1", "heard 1"]);
-  assert.deepEqual(heardOf(["ready", bad, down], ["ready", bad, up], ["ready", worse, down]), ["not 1", "not 1", "not 2"]);
-  assert.deepEqual(heardOf(["ready", good, down], ["ready", { digest: "d", probability: null }, down]), ["heard 0", "heard 0"]);
-  assert.deepEqual(heardOf(["ready", bad, down, false]), ["heard 0"]); // the server says that a grip is missing
-  assert.deepEqual(heardOf(["aim", null, down], ["plan", null, down], ["ready", bad, down]), ["heard 0", "heard 0", "heard 0"]); // it asks for a plan, and is no fresh press
+  assert.deepEqual(sentTriggers(["ready", bad, up], ["ready", bad, down], ["ready", bad, down], ["ready", bad, up], ["ready", bad, down]),
+    ["not 0", "not 1", "not 1", "not 1", "sent 1"]);
+  assert.deepEqual(sentTriggers(["ready", bad, down], ["ready", bad, up], ["ready", worse, down]), ["not 1", "not 1", "not 2"]);
+  assert.deepEqual(sentTriggers(["ready", good, down], ["ready", { digest: "d", probability: null }, down]), ["sent 0", "sent 0"]);
+  assert.deepEqual(sentTriggers(["ready", bad, down, false]), ["sent 0"]); // the server's notice names the missing grip
+  assert.deepEqual(sentTriggers(["aim", null, down], ["plan", null, down], ["ready", bad, down]), ["sent 0", "sent 0", "sent 0"]); // it asks for a plan, and is no fresh press
 });
 
 test("a press that begins before a preview's end confirms nothing that was not read", () => {
   const good = { digest: "c", probability: 0.9 };
-  assert.deepEqual(heardOf(["preview", null, true], ["ready", good, true], ["ready", good, false], ["ready", good, true]), ["not 0", "not 0", "not 0", "heard 0"]);
+  assert.deepEqual(sentTriggers(["preview", null, true], ["ready", good, true], ["ready", good, false], ["ready", good, true]), ["not 0", "not 0", "not 0", "sent 0"]);
 });
 
-test("what was done is said: lifted, put down, arrived", () => {
+test("the notice after a motion: lifted, put down, arrived", () => {
   const cup = { name: "the cup", support: "held" };
   assert.equal(success(["reach", "curl", "lift"], [cup]), "Held: lift of the cup is done. Now point where it goes.");
   assert.match(success(["carry", "release"], [{ ...cup, support: "standing" }]), /^Put down/);
   assert.match(success(["reach"], [{ ...cup, support: "standing" }]), /^Arrived/);
 });
 
-test("a handle moves along its own axis, and a ray meets the thing that it points at", () => {
+test("a handle moves along its own axis, and a ray meets the object that it points at", () => {
   const ray = new Ray(new Vector3(0.3, -2, 0.4), new Vector3(0, 1, 0));
   assert.deepEqual(onAxis(ray, new Vector3(0, 0, 0.1), axisOf(2)).toArray().map((x) => Math.round(1e6 * x) / 1e6), [0, 0, 0.4]);
   assert.deepEqual(onAxis(ray, new Vector3(0, 0, 0.1), axisOf(0)).toArray().map((x) => Math.round(1e6 * x) / 1e6), [0.3, 0, 0.1]);
-  assert.equal(onAxis(ray, new Vector3(), axisOf(1)), null, "seen end on");
+  assert.equal(onAxis(ray, new Vector3(), axisOf(1)), null, "end on");
   const lying = { name: "lying", shape: "cylinder", diameter: 0.04, height: 0.3, position: [0.2, 0, 0.4], quaternion: [Math.SQRT1_2, 0, Math.SQRT1_2, 0] };
   const behind = { ...lying, name: "behind", position: [0.3, 1, 0.4] };
   const inverse = ({ position, quaternion }) => matrixOf(position, quaternion).invert();
-  for (const things of [[behind, lying], [lying, behind]]) assert.equal(thingAt(ray, things, inverse, 0.01).name, "lying");
-  assert.equal(thingAt(new Ray(new Vector3(0.3, -2, 0.5), new Vector3(0, 1, 0)), [behind, lying], inverse, 0.01), null);
+  for (const objects of [[behind, lying], [lying, behind]]) assert.equal(objectAt(ray, objects, inverse, 0.01).name, "lying");
+  assert.equal(objectAt(new Ray(new Vector3(0.3, -2, 0.5), new Vector3(0, 1, 0)), [behind, lying], inverse, 0.01), null);
 });
 
 test("in a small window the robot is viewed in what the panels leave free", () => {

@@ -2,7 +2,7 @@
 
 const STOPS = [[0, 34, 78], [40, 67, 110], [87, 93, 109], [125, 124, 120], [165, 156, 116], [210, 193, 99], [254, 232, 56]];
 
-/** Red, green and blue from 0 to 1 of a share from 0 to 1; white for what is not known. */
+/** Red, green and blue from 0 to 1 of a share from 0 to 1; white for no number. */
 export function cividis(share) {
   if (!Number.isFinite(share)) return [1, 1, 1];
   const at = Math.min(Math.max(share, 0), 1) * (STOPS.length - 1);

@@ -1,19 +1,19 @@
 // The trials that the page carries: both arms' points, as numbers of `unit_m`, little-endian, 16 bits.
 
 const LOST = -32768; // of a point that the cameras did not see
-const USUAL = 0.95; // share of a trial's errors that the colours tell apart
+const USUAL = 0.95; // share of a trial's errors that the colours resolve
 
 /** What Python packed (trunkline/report/certificate/replays.py): trials by number, and each frame's points. */
 export class Replays {
-  constructor(told) {
-    const bytes = Uint8Array.from(atob(told.data), (letter) => letter.charCodeAt(0));
+  constructor(packed) {
+    const bytes = Uint8Array.from(atob(packed.data), (letter) => letter.charCodeAt(0));
     const view = new DataView(bytes.buffer);
     this.numbers = new Int16Array(bytes.length / 2);
     for (let index = 0; index < this.numbers.length; index++) this.numbers[index] = view.getInt16(2 * index, true);
-    Object.assign(this, { trials: told.trials, rate: told.frames_per_s, unit: told.unit_m, points: told.radii_m.length, radii: told.radii_m });
+    Object.assign(this, { trials: packed.trials, rate: packed.frames_per_s, unit: packed.unit_m, points: packed.radii_m.length, radii: packed.radii_m });
   }
 
-  /** Both arms in a frame, m, from the base on: `measured` has NaN where nothing was seen; and how far apart, mm. */
+  /** Both arms in a frame, m, from the base on: `measured` has NaN where no camera saw the point; and how far apart, mm. */
   frame(trial, frame) {
     const { offset, frames } = this.trials[trial], size = 3 * this.points;
     const [measured, simulated] = [0, 1].map((arm) => {
@@ -34,8 +34,8 @@ export class Replays {
   }
 }
 
-/** The points that were seen alone, with what belongs to each. */
-export function seen(points, values) {
-  const kept = values.map((_, i) => i).filter((i) => Number.isFinite(points[3 * i]));
-  return { points: kept.flatMap((i) => points.slice(3 * i, 3 * i + 3)), values: kept.map((i) => values[i]) };
+/** Only the points that the cameras saw, and their values. */
+export function visiblePoints(points, values) {
+  const indices = values.map((_, i) => i).filter((i) => Number.isFinite(points[3 * i]));
+  return { points: indices.flatMap((i) => points.slice(3 * i, 3 * i + 3)), values: indices.map((i) => values[i]) };
 }

@@ -29,7 +29,7 @@ export class Tube extends Mesh {
     const places = radii.map((_, i) => new Vector3(...points.slice(3 * i, 3 * i + 3)));
     const curve = new CatmullRomCurve3(places, false, "centripetal");
     const { position, normal, color } = this.geometry.attributes;
-    const tangent = new Vector3(), side = new Vector3(), other = new Vector3(), way = new Vector3();
+    const tangent = new Vector3(), side = new Vector3(), binormal = new Vector3(), outward = new Vector3();
     for (let row = 0; row <= along; row++) {
       const at = row / along, low = Math.min(Math.floor(at * (radii.length - 1)), radii.length - 2), share = at * (radii.length - 1) - low;
       const mixed = (from, to) => from + share * (to - from);
@@ -37,12 +37,12 @@ export class Tube extends Mesh {
       curve.getTangent(at, tangent);
       if (row === 0) side.set(1, 0, 0).addScaledVector(tangent, -tangent.x).normalize();
       else side.addScaledVector(tangent, -side.dot(tangent)).normalize();
-      other.crossVectors(tangent, side);
+      binormal.crossVectors(tangent, side);
       for (let k = 0; k < around; k++) {
         const angle = (2 * Math.PI * k) / around, index = row * around + k;
-        way.set(0, 0, 0).addScaledVector(side, Math.cos(angle)).addScaledVector(other, Math.sin(angle));
-        normal.setXYZ(index, way.x, way.y, way.z);
-        position.setXYZ(index, place.x + radius * way.x, place.y + radius * way.y, place.z + radius * way.z);
+        outward.set(0, 0, 0).addScaledVector(side, Math.cos(angle)).addScaledVector(binormal, Math.sin(angle));
+        normal.setXYZ(index, outward.x, outward.y, outward.z);
+        position.setXYZ(index, place.x + radius * outward.x, place.y + radius * outward.y, place.z + radius * outward.z);
         color.setXYZ(index, ...colours[low].map((value, c) => mixed(value, colours[low + 1][c]) ** GAMMA));
       }
     }

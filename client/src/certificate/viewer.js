@@ -5,7 +5,7 @@ import {
   Spherical, Vector3, WebGLRenderer,
 } from "three";
 import { cividis, gradient } from "./cividis.js";
-import { Replays, seen } from "./replays.js";
+import { Replays, visiblePoints } from "./replays.js";
 import { Tube } from "./tube.js";
 
 const MEASURED = [0.93, 0.55, 0.1]; // orange, where the colours of errors are blue to yellow
@@ -13,12 +13,12 @@ const TURN = 0.12, ZOOM = 1.15; // rad and times, of a key
 const WIDER = 1.06; // times the arm, of the net that stands for the measured one around the simulated
 const NEAREST = 0.15, FARTHEST = 5; // m
 
-const the = (id) => document.getElementById(id);
+const find = (id) => document.getElementById(id);
 
 class Viewer {
   constructor(replays) {
     this.replays = replays;
-    this.canvas = the("view");
+    this.canvas = find("view");
     this.renderer = new WebGLRenderer({ canvas: this.canvas, antialias: true, preserveDrawingBuffer: true });
     this.renderer.setScissorTest(true);
     this.scene = new Scene();
@@ -48,10 +48,10 @@ class Viewer {
   }
 
   listen() {
-    the("trial").append(...this.groups());
-    the("trial").addEventListener("change", () => this.choose(Number(the("trial").value)));
-    the("play").addEventListener("click", () => this.play(!this.playing));
-    the("scrubber").addEventListener("input", () => this.seek(Number(the("scrubber").value) / this.replays.rate));
+    find("trial").append(...this.groups());
+    find("trial").addEventListener("change", () => this.choose(Number(find("trial").value)));
+    find("play").addEventListener("click", () => this.play(!this.playing));
+    find("scrubber").addEventListener("input", () => this.seek(Number(find("scrubber").value) / this.replays.rate));
     for (const input of document.querySelectorAll("input[name=layout]")) input.addEventListener("change", () => this.draw());
     this.canvas.addEventListener("keydown", (event) => this.key(event));
     this.canvas.addEventListener("pointerdown", (event) => this.canvas.setPointerCapture(event.pointerId));
@@ -63,7 +63,7 @@ class Viewer {
       event.preventDefault();
       this.zoom(Math.exp(event.deltaY / 600));
     }, { passive: false });
-    the("scale").style.background = gradient();
+    find("scale").style.background = gradient();
   }
 
   /** Options of the list of trials, by split and kind. */
@@ -79,9 +79,9 @@ class Viewer {
   choose(number) {
     this.number = number;
     this.scale = this.replays.scale(number);
-    the("largest").textContent = `${this.scale} mm and more`;
-    the("scrubber").max = String(this.trial.frames - 1);
-    for (const id of ["scrubber", "play"]) the(id).disabled = this.trial.frames < 2;
+    find("largest").textContent = `${this.scale} mm and more`;
+    find("scrubber").max = String(this.trial.frames - 1);
+    for (const id of ["scrubber", "play"]) find(id).disabled = this.trial.frames < 2;
     const box = new Box3();
     for (let frame = 0; frame < this.trial.frames; frame += Math.max(1, Math.floor(this.trial.frames / 20))) {
       const { simulated } = this.replays.frame(number, frame);
@@ -94,15 +94,15 @@ class Viewer {
     this.seek(0);
   }
 
-  play(wanted) {
-    this.playing = wanted && this.trial.frames > 1;
-    the("play").textContent = this.playing ? "Pause" : "Play";
+  play(on) {
+    this.playing = on && this.trial.frames > 1;
+    find("play").textContent = this.playing ? "Pause" : "Play";
     if (!this.playing) return;
     if (this.frame >= this.trial.frames - 1) this.at = 0;
     let last = performance.now();
     const step = (now) => {
       if (!this.playing) return;
-      this.seek(this.at + ((now - last) / 1e3) * Number(the("speed").value));
+      this.seek(this.at + ((now - last) / 1e3) * Number(find("speed").value));
       last = now;
       if (this.frame >= this.trial.frames - 1) this.play(false);
       else requestAnimationFrame(step);
@@ -116,15 +116,15 @@ class Viewer {
     const { measured, simulated, errors } = this.replays.frame(this.number, this.frame);
     const colours = errors.map((error) => cividis(error / this.scale));
     this.simulated.follow(simulated, this.replays.radii, colours);
-    const known = seen(measured, this.replays.radii);
-    const orange = known.values.map(() => MEASURED);
-    this.measured.follow(known.points, known.values, orange);
-    this.net.follow(known.points, known.values.map((radius) => WIDER * radius), orange);
-    const found = errors.slice(1).filter(Number.isFinite), tip = errors.at(-1);
-    const mean = found.reduce((sum, error) => sum + error, 0) / Math.max(found.length, 1);
-    the("scrubber").value = String(this.frame);
-    the("scrubber").setAttribute("aria-valuetext", `${this.at.toFixed(2)} s`);
-    the("now").textContent = `${this.at.toFixed(2)} s: mean ${mean.toFixed(1)} mm, tip ${Number.isFinite(tip) ? `${tip.toFixed(1)} mm` : "not seen"}`;
+    const visible = visiblePoints(measured, this.replays.radii);
+    const orange = visible.values.map(() => MEASURED);
+    this.measured.follow(visible.points, visible.values, orange);
+    this.net.follow(visible.points, visible.values.map((radius) => WIDER * radius), orange);
+    const distances = errors.slice(1).filter(Number.isFinite), tip = errors.at(-1);
+    const mean = distances.reduce((sum, error) => sum + error, 0) / Math.max(distances.length, 1);
+    find("scrubber").value = String(this.frame);
+    find("scrubber").setAttribute("aria-valuetext", `${this.at.toFixed(2)} s`);
+    find("now").textContent = `${this.at.toFixed(2)} s: mean ${mean.toFixed(1)} mm, tip ${Number.isFinite(tip) ? `${tip.toFixed(1)} mm` : "not seen"}`;
     this.draw();
   }
 
@@ -159,25 +159,25 @@ class Viewer {
     this.renderer.setSize(width, height, false);
     const beside = document.querySelector("input[name=layout]:checked").value === "beside";
     const views = beside ? [[0, width / 2, [this.measured]], [width / 2, width / 2, [this.simulated]]] : [[0, width, [this.simulated, this.net]]];
-    for (const [left, wide, shown] of views) {
-      for (const tube of [this.measured, this.simulated, this.net]) tube.visible = shown.includes(tube);
+    for (const [left, wide, tubes] of views) {
+      for (const tube of [this.measured, this.simulated, this.net]) tube.visible = tubes.includes(tube);
       this.camera.aspect = wide / height;
       this.camera.updateProjectionMatrix();
       this.renderer.setViewport(left, 0, wide, height);
       this.renderer.setScissor(left, 0, wide, height);
       this.renderer.render(this.scene, this.camera);
     }
-    the("left").hidden = the("right").hidden = !beside;
+    find("left").hidden = find("right").hidden = !beside;
   }
 }
 
-const told = the("replays");
-if (told) {
+const element = find("replays");
+if (element) {
   try {
-    globalThis.viewer = new Viewer(new Replays(JSON.parse(told.textContent)));
+    globalThis.viewer = new Viewer(new Replays(JSON.parse(element.textContent)));
     document.body.dataset.replay = "ready";
   } catch (error) {
-    the("replay-note").textContent = `No replay: this browser does not draw in 3D (${error.message}). The picture shows some poses.`;
+    find("replay-note").textContent = `No replay: this browser does not draw in 3D (${error.message}). The picture shows some poses.`;
     document.body.dataset.replay = "none";
   }
 }

@@ -4,7 +4,7 @@
 
 The true server and its processes on the simulated robot; the committed page in a headless Chromium, by its buttons, its
 slider and its keys. Drawing is by software, and all share a processor. So page and robot may be silent for longer, the
-plan is kept back until its state's picture is taken, and the page hears of no later state while that of the delay is.
+plan is kept back until its state's picture is taken, and the page gets no later state while that of the delay is.
 All else is as conf/live and conf/teleop have it. `make browser` installs the browser.
 """
 
@@ -44,27 +44,28 @@ AIMED = (
 )
 LED = (("Digit1", {"ArrowLeft": 15}), ("Digit2", {"ArrowLeft": 15}))
 WATCHED, MOVED = 0.55, 0.5  # shares of the preview and of the mount's way, at which their pictures are taken
-BACK = 0.05  # share by which the preview is taken back, as its slider hears only of what changes
+BACK = 0.05  # share by which the preview is taken back, as its slider reports only changes
 
 MODE = "document.querySelector('#mode').dataset.mode"
 # nothing is wrong or late
 CALM = "!document.querySelector('#notice').innerText && !/OLD|Fault/.test(document.querySelector('#facts').innerText)"
-# in the delay the page hears of no later state, until it may
+# in the delay the page gets no later state until `showLater`
 STILL = """(() => {
-  const own = trunkline.changed;
+  const original = trunkline.changed;
   let later = null;
   trunkline.changed = (state) => {
     if (trunkline.state?.mode === "delay") later = state;
-    else own.call(trunkline, state);
+    else original.call(trunkline, state);
   };
-  trunkline.hearOn = () => {
+  trunkline.showLater = () => {
     delete trunkline.changed;
     if (later) trunkline.changed(later);
   };
 })()"""
 SETTLED = """(() => {
   const { desktop, state } = trunkline, { rigid, tip } = state.targets ?? {};
-  return rigid?.reach === "inside" && tip?.reach === "inside" && performance.now() / 1000 > desktop.until.grip + 0.5;
+  const isReleased = performance.now() / 1000 > desktop.pressedUntil.grip + 0.5;
+  return rigid?.reach === "inside" && tip?.reach === "inside" && isReleased;
 })()"""
 # m from the mount to its target
 AWAY = """(() => {
@@ -166,18 +167,19 @@ async def taken(camera: Camera, previewer: Kept) -> None:
     await camera.until(f"trunkline.playback.played > {WATCHED} * trunkline.playback.duration", "half of the preview")
     place = await camera.page.place("#scrub", WATCHED - BACK)
     await camera.page.mouse("mousePressed", *place)  # where the slider is held, it stays
-    await camera.until("trunkline.playback.held", "a slider that is held")
+    await camera.until("trunkline.playback.paused", "a slider that is held")
     await camera.drawn()
     await camera.take("preview")
     await camera.page.mouse("mouseReleased", *place)
-    await camera.take("ready", f"trunkline.told && trunkline.playback.at >= trunkline.playback.there && {CALM}")
+    ended = "trunkline.playback.at >= trunkline.playback.available"
+    await camera.take("ready", f"trunkline.prediction && {ended} && {CALM}")
     way = await camera.page.value(AWAY)
     await camera.page.key("KeyG", "rawKeyDown")
     await camera.drawn()
     await camera.page.value(STILL)
     await camera.page.key("Enter")
     await camera.take("delay", "true")
-    await camera.page.value("trunkline.hearOn()")
+    await camera.page.value("trunkline.showLater()")
     await camera.take("execute", f"{AWAY} < {(1 - MOVED) * way}")
     await camera.until(f"{MODE} === 'aim' && trunkline.state.robot === 'done'", "the motion's end")
     await camera.page.key("KeyF")

@@ -1,33 +1,33 @@
-// How the base gets its place in the room. The server decides and says what is next; here it is put in place by eye.
+// Alignment: the base's pose in the room. The server runs the procedure; here the base is placed by eye.
 
 import { Quaternion, Vector3 } from "three";
 
 const AHEAD = 1.2; // m from the viewer, at which the base is put first
 const UPWARDS = new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), -Math.PI / 2); // z up as y up
 
-/** Of a session: `place` is the base's pose in the room as it is drawn, null until it is known; `told` what the server said last. */
-export class Aligning {
+/** Of a session. `place`: the base's pose in the room as it is drawn, null before there is one. `progress`: the server's latest message. */
+export class Alignment {
   constructor() {
     this.begin();
   }
 
   begin() {
-    this.told = null;
+    this.progress = null;
     this.place = null;
     this.carried = null;
-    this.adjusting = false; // put there by eye though the server asks for a touch
+    this.adjusting = false; // placed by eye although the server asks for a touch
   }
 
-  heard(told) {
-    const leapt = told.step === "place" && this.step !== "place";
-    this.told = told;
-    this.adjusting &&= told.step === "check";
-    if (told.place) this.place = fromWire(told.place);
+  receive(progress) {
+    const leapt = progress.step === "place" && this.step !== "place";
+    this.progress = progress;
+    this.adjusting &&= progress.step === "check";
+    if (progress.place) this.place = fromWire(progress.place);
     else if (leapt) this.place = null;
   }
 
   get step() {
-    return this.adjusting ? "place" : (this.told?.step ?? "place");
+    return this.adjusting ? "place" : (this.progress?.step ?? "place");
   }
 
   get done() {
@@ -35,15 +35,16 @@ export class Aligning {
   }
 
   get next() {
-    return this.told?.next ?? "";
+    return this.progress?.next ?? "";
   }
 
-  get said() {
-    return this.told?.said ?? "";
+  /** On the last touch, in words. */
+  get feedback() {
+    return this.progress?.said ?? "";
   }
 
-  /** `hands` with `position` (Vector3) and the buttons that were `pressed`, null where not tracked; `eye`: the viewer's pose. What the user wants: "here", "touch" or "". */
-  hear({ left, right }, eye) {
+  /** Takes both controllers: `position` (Vector3) and the buttons `pressed`, null where not tracked; `eye`: the viewer's pose. Returns the user's request: "here", "touch" or "". */
+  update({ left, right }, eye) {
     if (!this.place) this.put(eye);
     const { step } = this;
     if (step === "place") this.carry(left, right);
