@@ -69,7 +69,8 @@ class PoseProblem:
         measured = np.flatnonzero(visible)
         self._targets = None
         if quaternions is not None:
-            self._targets = rotation_from_wxyz(np.where(visible[:, None], quaternions, [1.0, 0, 0, 0])).as_matrix()
+            sound = np.where(np.reshape(visible, (-1, 1)), quaternions, [1.0, 0, 0, 0])
+            self._targets = rotation_from_wxyz(sound).as_matrix()
         # the chain numbers its bodies from the base
         self.measured = measured[np.argsort(model.site_bodyid[self.sites[measured]])]
         self.hinges = int(np.bincount(model.jnt_bodyid).max())  # of each joint

@@ -360,8 +360,8 @@ class Session(Entry):
         for index, trial in enumerate(self.trials):
             where = f"trials.{index}"
             if not trial.of_table or self.tables is None:
-                said = {"label": trial.label is not None, "table": bool(trial.table), "rows": trial.rows is not None}
-                key = next((key for key, there in said.items() if there), None)
+                fields = {"label": trial.label is not None, "table": bool(trial.table), "rows": trial.rows is not None}
+                key = next((key for key, is_there in fields.items() if is_there), None)
                 if key is not None:
                     raise ValueError(f"{where}.{key}: found it without `tables`, or of a log, expected none")
                 continue

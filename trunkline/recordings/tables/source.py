@@ -118,7 +118,7 @@ def _without_stale(poses: PoseStream) -> PoseStream:
     stale = stale_samples(poses.positions)
     if not stale.any():
         return poses
-    names = ", ".join(name for name, some in zip(poses.names, stale.any(axis=0), strict=True) if some)
+    names = ", ".join(poses.names[body] for body in np.flatnonzero(np.any(stale, axis=0)))
     note = f"of the table {stale.sum()} samples that only repeat the one before, to the last bit, dropped ({names})"
     positions = np.where(stale[..., None], np.nan, poses.positions)
     turns = None if poses.quaternions is None else np.where(stale[..., None], np.nan, poses.quaternions)
