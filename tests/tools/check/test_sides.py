@@ -49,6 +49,22 @@ def test_a_turn_is_said_from_its_limit_on(model, pulled):
     assert side_lines([turned(pulled[0], limit + 2)] * FEWEST, model)
 
 
+@pytest.mark.parametrize("degrees", [35, -40])
+def test_a_trial_in_another_frame_is_said(model, pulled, degrees):
+    (line,) = side_lines([*pulled[1:], turned(pulled[0], degrees)], model)
+    assert line.startswith(f"base: trial {pulled[0].name}: tendons bend the arm to sides that are turned by ")
+    assert float(line.partition("turned by ")[2].partition("°")[0]) == pytest.approx(degrees, abs=5)
+    assert line.endswith("against the other trials: are its poses in another frame?")
+    assert side_lines([*pulled[2:], turned(pulled[0], degrees)], model) == [], "two beside it are too few"
+
+
+def test_a_trial_that_bends_as_far_aside_as_honest_ones_do_is_not(model, pulled):
+    (line,) = side_lines([*pulled[:3], turned(pulled[0], 60)], model)
+    limit = 60 + 25 - float(line.partition("turned by ")[2].partition("°")[0])
+    assert side_lines([*pulled[:3], turned(pulled[0], limit - 2)], model) == []
+    assert side_lines([*pulled[:3], turned(pulled[0], limit + 2)], model)
+
+
 def test_trials_that_disagree_or_tell_nothing_have_no_say(model, pulled):
     either = [turned(trial, degrees) for trial, degrees in zip(pulled, (40, -40, 40, -40), strict=True)]
     assert side_lines(either, model) == []

@@ -9,30 +9,53 @@ from trunkline.model.places import marker_places
 from trunkline.recordings.trials.experiments import EXPERIMENTS, PULL
 from trunkline.recordings.trials.trial import Trial
 
-FEWEST = 2  # trials that tell it
+FEWEST, BESIDE = 2, 3  # trials that tell it: of all, and those beside one that differs
 UPRIGHT = np.radians(5)  # of the mount, up to which an arm bends to where it is pulled
 DEEP = 0.8  # of a trial's deepest pull, from which on its frames count
 TOGETHER = 0.9  # of the pulls, that has to be left where they are added as vectors: the deepest takes most of others
 BENT = 0.05  # of the arm's length, by which the farthest marker has to be aside
 TURNED = np.radians(15)  # from which on it is said
 ALIKE = 1 / 3  # of that, by which trials may differ
+OTHERWISE = np.radians(25)  # from the others' mean, likewise of one trial; honest ones differ by 15° at most
 BEND = 1e-4  # rad, of every joint, by which the sides of tendons are measured
 
 
 def side_lines(trials: list[Trial], model: mujoco.MjModel) -> list[str]:
-    """By how much all trials that are pulled are bent to other sides than described, all the same way, in a sentence;
-    none where they are not."""
+    """By how much trials that are pulled are bent to other sides than described: all of them the same way, or one of
+    them otherwise than the others. A sentence each; none where they are not."""
     sides, places = tendon_sides(model), marker_places(model)
-    turns = np.array([turn for trial in trials if (turn := _turn(trial, sides, places)) is not None])
+    turns = [(trial.name, turn) for trial in trials if (turn := _turn(trial, sides, places)) is not None]
     if len(turns) < FEWEST:
         return []
+    return _all_turned(np.array([turn for _, turn in turns])) + _one_turned(turns)
+
+
+def _all_turned(turns: np.ndarray) -> list[str]:
     mean = float(np.angle(np.sum(np.exp(1j * turns))))
-    spread = float(np.median(np.abs(np.angle(np.exp(1j * (turns - mean))))))
+    spread = float(np.median(np.abs(_wrapped(turns - mean))))
     if abs(mean) <= TURNED or spread > ALIKE * abs(mean):
         return []
     problem = f"tendons bend the arm to sides that are turned by {np.degrees(mean):.0f}° about z of the base against"
     remedy = "are x and y of the base body those of the arm's description?"
     return [f"base: {problem} those where they are described, on average over {len(turns)} trials: {remedy}"]
+
+
+def _one_turned(turns: list[tuple[str, float]]) -> list[str]:
+    """Those trials that lie apart from the mean of the others, which have to agree among themselves."""
+    lines = []
+    for index, (name, turn) in enumerate(turns):
+        others = np.array([other for _, other in turns[:index] + turns[index + 1 :]])
+        middle = float(np.angle(np.sum(np.exp(1j * others))))
+        spread = float(np.median(np.abs(_wrapped(others - middle))))
+        apart = float(_wrapped(turn - middle))
+        if len(others) >= BESIDE and abs(apart) > OTHERWISE and spread <= ALIKE * abs(apart):
+            problem = f"tendons bend the arm to sides that are turned by {np.degrees(apart):.0f}° about z of the base"
+            lines.append(f"base: trial {name}: {problem} against the other trials: are its poses in another frame?")
+    return lines
+
+
+def _wrapped(angle: np.ndarray | float) -> np.ndarray:
+    return np.angle(np.exp(1j * np.asarray(angle)))
 
 
 def tendon_sides(model: mujoco.MjModel) -> dict[str, complex]:
