@@ -56,7 +56,8 @@ def contents(made):
 
 def test_the_file_is_whole_in_order_and_indexed(made, contents):
     topics, _ = contents
-    with open(made[0] / "out.mcap", "rb") as file:
+    root, trials = made
+    with open(root / "out.mcap", "rb") as file:
         reader = make_reader(file, validate_crcs=True)
         summary, times = reader.get_summary(), [m.log_time for _, _, m in reader.iter_messages(log_time_order=False)]
     assert times == sorted(times)
@@ -64,11 +65,11 @@ def test_the_file_is_whole_in_order_and_indexed(made, contents):
     assert statistics.message_count == len(times) == sum(map(len, topics.values()))
     assert (statistics.message_start_time, statistics.message_end_time) == (times[0], times[-1])
     assert len(summary.chunk_indexes) == statistics.chunk_count > 0
-    assert len(summary.metadata_indexes) == 3
+    assert [index.name for index in summary.metadata_indexes] == [f"trial {trial.name}" for trial in trials]
     assert sum(statistics.channel_message_counts.values()) == len(times)
     names = [schema.name for schema in summary.schemas.values()]
-    assert sorted(names) == ["foxglove.FrameTransforms", "foxglove.Log", "foxglove.SceneUpdate", "trunkline.Errors",
-                             "trunkline.Pulls"]  # fmt: skip
+    assert sorted(names) == ["foxglove.FrameTransforms", "foxglove.Log", "foxglove.PointCloud", "foxglove.SceneUpdate",
+                             "trunkline.Errors", "trunkline.Pulls"]  # fmt: skip
 
 
 def test_measured_and_simulated_bodies_are_where_they_are_in_the_trial(made, contents):
@@ -156,6 +157,32 @@ def edges(cone) -> list[np.ndarray]:
     turn = Rotation.from_quat([getattr(pose.orientation, axis) for axis in "xyzw"])
     center = np.array([getattr(pose.position, axis) for axis in "xyz"])
     return [center + turn.apply([0, 0, side * cone.size.z / 2]) for side in (-1, 1)]
+
+
+def test_bodies_are_points_too_where_they_are_in_colors_of_measured_and_simulated(contents):
+    topics, _ = contents
+    colors = []
+    for name in ("measured", "simulated"):
+        places = {time: [[getattr(link.translation, axis) for axis in "xyz"] for link in message.transforms]
+                  for time, message in topics[f"/{name}/tf"]}  # fmt: skip
+        assert [time for time, _ in topics[f"/{name}/points"]] == [time for time, _ in topics[f"/{name}/arm"]]
+        for time, message in topics[f"/{name}/points"]:
+            points = unpacked(message)
+            assert message.frame_id == "base"
+            np.testing.assert_allclose([points[axis] for axis in "xyz"], np.transpose(places[time]), atol=1e-7)
+        colors.append({tuple(int(point[color]) for color in ("red", "green", "blue", "alpha")) for point in points})
+    assert [len(different) for different in colors] == [1, 1]
+    assert not colors[0] & colors[1]
+    sizes = [len(message.data) // message.point_stride for _, message in topics["/measured/points"]]
+    assert set(sizes) == {3, 4}  # what nobody saw is no point
+
+
+def unpacked(message) -> np.ndarray:
+    """The points of a foxglove.PointCloud by its own description. A record of its fields, (N,)."""
+    kinds = {1: "u1", 7: "<f4"}
+    names, offsets, types = zip(*[(f.name, f.offset, kinds[f.type]) for f in message.fields], strict=True)
+    layout = {"names": names, "formats": types, "offsets": offsets, "itemsize": message.point_stride}
+    return np.frombuffer(message.data, np.dtype(layout))
 
 
 @pytest.mark.parametrize("end", [(0, 0, -1), (0, 0, 1), (1, 0, 0), (0.3, -0.5, -0.2), (-0.1, 0.2, 0.6)])

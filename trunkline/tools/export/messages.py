@@ -12,6 +12,8 @@ from foxglove_schemas_protobuf.CylinderPrimitive_pb2 import CylinderPrimitive
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.Log_pb2 import Log
+from foxglove_schemas_protobuf.PackedElementField_pb2 import PackedElementField
+from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
 from foxglove_schemas_protobuf.Pose_pb2 import Pose
 from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
 from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
@@ -25,6 +27,12 @@ from google.protobuf.timestamp_pb2 import Timestamp
 
 BASE = "base"  # the frame that all others are in
 PACKAGE = "trunkline"
+RGBA = ("red", "green", "blue", "alpha")
+POINT = np.dtype([(axis, "<f4") for axis in "xyz"] + [(share, "u1") for share in RGBA])
+FIELDS = [
+    *(PackedElementField(name=n, offset=4 * i, type=PackedElementField.FLOAT32) for i, n in enumerate("xyz")),
+    *(PackedElementField(name=n, offset=12 + i, type=PackedElementField.UINT8) for i, n in enumerate(RGBA)),
+]
 
 
 def transforms(
@@ -65,6 +73,17 @@ def _cone(start: np.ndarray, end: np.ndarray, thick: float, thin: float, color: 
         size=Vector3(x=widest, y=widest, z=length),
         bottom_scale=2 * thick / widest, top_scale=2 * thin / widest, color=color,
     )  # fmt: skip
+
+
+def cloud(stamp: int, points: np.ndarray, color: Color) -> PointCloud:
+    """Those of points (N, 3) that are finite, m in 32 bits. Rerun draws these, and no scene."""
+    points = points[np.isfinite(points).all(axis=1)]
+    packed = np.empty(len(points), POINT)
+    packed["x"], packed["y"], packed["z"] = points.T
+    for name in RGBA:
+        packed[name] = round(255 * getattr(color, name[0]))
+    return PointCloud(timestamp=_time(stamp), frame_id=BASE, pose=Pose(position=Vector3(), orientation=Quaternion(w=1)),
+                      point_stride=POINT.itemsize, fields=FIELDS, data=packed.tobytes())  # fmt: skip
 
 
 def line(stamp: int, text: str) -> Log:

@@ -6,18 +6,19 @@ import numpy as np
 from foxglove_schemas_protobuf.Color_pb2 import Color
 from google.protobuf.message import Message
 from mcap.well_known import MessageEncoding, SchemaEncoding
-from mcap.writer import Writer
+from mcap.writer import IndexType, Writer
 from mcap_protobuf.schema import build_file_descriptor_set
 
 from trunkline.model.arm_model import ArmModel
 from trunkline.program import COMMAND
-from trunkline.tools.export.messages import BASE, identifier, line, numbers_type, scene, transforms
+from trunkline.tools.export.messages import BASE, cloud, identifier, line, numbers_type, scene, transforms
 from trunkline.tools.export.tracks import Track
 
 MEASURED, SIMULATED = "measured", "simulated"
 TRIAL, ERRORS, COMMANDS, PULLS = "/trial", "/errors_mm", "/commands_mm", "/pulls_mm"
 MEAN, TIP = "mean", "tip"
 COLORS = {MEASURED: Color(r=0.13, g=0.13, b=0.13, a=1.0), SIMULATED: Color(r=0.16, g=0.44, b=0.59, a=0.6)}
+BRIGHT = {MEASURED: Color(r=0.9, g=0.62, b=0.0, a=1.0), SIMULATED: Color(r=0.34, g=0.71, b=0.91, a=1.0)}  # on black
 GRAVITY = tuple(f"gravity_{axis}_m_s2" for axis in "xyz")
 THINNEST = 3e-3  # m, as which a body without a shape is drawn
 FASTEST = 40.0  # shapes of the arm a second, at most
@@ -33,7 +34,8 @@ class Recording:
         self._tip = int(np.argmax(arm.model.site_bodyid[arm.marker_sites(markers)]))
         self._errors = numbers_type("Errors", dict.fromkeys([MEAN, TIP, *map(identifier, markers)]))
         self._pulls = numbers_type("Pulls", self._tendons)
-        self._writer, self._stamp = Writer(file), BEGIN
+        indexed = IndexType.CHUNK | IndexType.MESSAGE | IndexType.METADATA  # of attachments it would be an empty group
+        self._writer, self._stamp = Writer(file, index_types=indexed), BEGIN
         self._writer.start(library=COMMAND)
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
@@ -53,7 +55,8 @@ class Recording:
         numbers = {"begin_ns": begin, "end_ns": self._stamp, "load_kg": trial.load, "error_mm": _mean(errors),
                    "tip_error_mm": tip} | dict(zip(GRAVITY, trial.gravity, strict=True))  # fmt: skip
         words = {"trial": trial.name, "experiment": trial.experiment, "split": trial.split}
-        self._writer.add_metadata("trial", words | {name: f"{value:.12g}" for name, value in numbers.items()})
+        words |= {name: f"{value:.12g}" for name, value in numbers.items()}
+        self._writer.add_metadata(f"trial {trial.name}", words)  # Rerun keeps the last of a name
         self._stamp += PAUSE
 
     def finish(self) -> None:
@@ -71,13 +74,14 @@ class Recording:
                 self._write(topic, self._pulls(**dict.fromkeys(self._tendons, np.nan) | pulls))
 
     def _shape(self, name: str, bodies: tuple[str, ...], points: np.ndarray) -> None:
-        """From the mount through the bodies' centers, each as thick as it is."""
+        """From the mount through the bodies' centers, each as thick as it is; and the centers alone."""
         model = self._arm.model
         owners = model.site_bodyid[self._arm.marker_sites(bodies)]
         order = np.argsort(owners)
         radii = [model.geom_size[model.geom_bodyid == body, 0].max(initial=THINNEST) for body in owners[order]]
         chain = np.concatenate([np.zeros((1, 3)), points[order]])
         self._write(f"/{name}/arm", scene(self._stamp, name, chain, np.array([radii[0], *radii]), COLORS[name]))
+        self._write(f"/{name}/points", cloud(self._stamp, points, BRIGHT[name]))
 
     def _write(self, topic: str, message: Message) -> None:
         name = message.DESCRIPTOR.full_name
