@@ -34,7 +34,7 @@ from trunkline.pipeline.config import PROJECT, load_folder
 
 ADDRESS, SIZE, YIELDS = Address(18452), (760, 640), 3  # of the page: pixels, and how nice its browser is
 COLOURS = 128  # of a picture's palette
-PATIENCE = 60.0  # s for a state to come
+PATIENCE = 180.0  # s for a state to come
 SILENCE, STALE = 10.0, 1.0  # s for which the page, its inputs and pictures, and the robot's process may be late
 EYE, AT = (1.29, 1.04, 1.94), (0.35, 0.43, 0.05)  # m, in the room: where the picture is taken from, and what it is of
 # presses of each arrow, 1 cm each, for the mount's target and for the tip's
