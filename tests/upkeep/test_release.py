@@ -191,8 +191,14 @@ def test_no_row_and_no_baseline_of_the_project_is_of_test():
         assert [(stage, key) for stage, keys in metrics.items() for key in keys if of_test(stage, key)] == []
 
 
+def goals_so_far():
+    """The project's, but for those of arms that are not measured before a release."""
+    goals = read_goals(ROOT / GOALS)
+    return {folder: rows for folder, rows in goals.items() if folder != str(FAMILIES) or (ROOT / FAMILIES).is_file()}
+
+
 def test_each_goal_of_the_project_has_a_metric_of_test():
-    for folder, rows in read_goals(ROOT / GOALS).items():
+    for folder, rows in goals_so_far().items():
         if folder == str(FAMILIES):
             code = KeptResult.read(ROOT / FAMILIES).origin.digest
             metrics = arm_metrics(pd.read_csv(ROOT / FAMILIES.with_suffix(".csv"), dtype={"code": str}), code)
@@ -207,5 +213,5 @@ def test_what_the_project_released_names_its_goals():
     released = read_released(ROOT / RELEASED)
     assert released is not None
     assert {folder: set(rows) for folder, rows in released.met.items()} == {
-        folder: set(rows) for folder, rows in read_goals(ROOT / GOALS).items()
+        folder: set(rows) for folder, rows in goals_so_far().items()
     }
