@@ -77,8 +77,7 @@ def cells(folder: Path) -> dict[str, float | str]:
 
 
 def measure(family: str, seed: int) -> dict[str, float | str]:
-    """Record, identify and score an arm; where a stage refuses its session, which is none that a lab would mend, that
-    stage in place of errors."""
+    """Record, identify and score an arm. Where a stage refuses its session, the stage's name in place of errors."""
     begun = time.perf_counter()
     with tempfile.TemporaryDirectory() as name:
         set_up(Path(name), family, seed)

@@ -462,8 +462,8 @@ def _family_rows(root: Path) -> list[str]:
     what += "[with laws that the model lacks](docs/results/families.md)"
     stale = " (**STALE**)" if result.state(root) == "STALE" else ""
     refused = next((line for line in result.lines if line.startswith("Sessions that are refused")), "")
-    stale += f"; **{refused.count(' by ')} more refused**" if refused else ""
-    errors = f"mean {position} / {tip} %, worst arm {worst_position} / {worst_tip} %{stale}"
+    more = f"; **{refused.count(' by ')} more refused**" if refused else ""
+    errors = f"mean {position} / {tip} %, worst arm {worst_position} / {worst_tip} %{stale}{more}"
     return [f"| {what} | {errors} | baseline: mean rest shape, tip {null} % |"]
 
 

@@ -31,8 +31,7 @@ def side_lines(trials: list[Trial], model: mujoco.MjModel) -> list[str]:
 
 
 def _all_turned(turns: np.ndarray) -> list[str]:
-    mean = float(np.angle(np.sum(np.exp(1j * turns))))
-    spread = float(np.median(np.abs(_wrapped(turns - mean))))
+    mean, spread = _middle(turns)
     if abs(mean) <= TURNED or spread > ALIKE * abs(mean):
         return []
     problem = f"tendons bend the arm to sides that are turned by {np.degrees(mean):.0f}° about z of the base against"
@@ -45,13 +44,18 @@ def _one_turned(turns: list[tuple[str, float]]) -> list[str]:
     lines = []
     for index, (name, turn) in enumerate(turns):
         others = np.array([other for _, other in turns[:index] + turns[index + 1 :]])
-        middle = float(np.angle(np.sum(np.exp(1j * others))))
-        spread = float(np.median(np.abs(_wrapped(others - middle))))
+        middle, spread = _middle(others)
         apart = float(_wrapped(turn - middle))
         if len(others) >= BESIDE and abs(apart) > OTHERWISE and spread <= ALIKE * abs(apart):
             problem = f"tendons bend the arm to sides that are turned by {np.degrees(apart):.0f}° about z of the base"
             lines.append(f"base: trial {name}: {problem} against the other trials: are its poses in another frame?")
     return lines
+
+
+def _middle(turns: np.ndarray) -> tuple[float, float]:
+    """Mean of angles, and the median of how far they are from it; rad."""
+    mean = float(np.angle(np.sum(np.exp(1j * turns))))
+    return mean, float(np.median(np.abs(_wrapped(turns - mean))))
 
 
 def _wrapped(angle: np.ndarray | float) -> np.ndarray:
