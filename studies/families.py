@@ -108,14 +108,16 @@ def family_table(rows: list[dict]) -> str:
             numbers = [f"{number:.3g}" for error in errors for number in (error.mean(), error.max())]
             cell = f"{pd.to_numeric(of[f'{kind}_null_tip']).mean():.3g}"
             lines.append(f"| {family} | {len(of)} | {words[kind]} | {' | '.join([*numbers, cell])} |")
-    least = table.loc[(table["held"] / table["intervals"]).idxmin()]
     holding, intervals, seconds = (int(every[name].sum()) for name in ("held", "intervals", "seconds"))
+    worst = ""
+    if len(table):
+        least = table.loc[(table["held"] / table["intervals"]).idxmin()]
+        worst = f"; worst arm {int(least['held'])} of {int(least['intervals'])} ({least['arm']})"
     refused = [f"{row['arm']} by {row['refused']}" for row in rows if row["refused"] != "no"]
     return "\n".join([
         *lines,
         *([f"Sessions that are refused, and shall not be: {', '.join(refused)}."] if refused else []),
-        f"95 % intervals of parameters, given the model, that hold the truth: {holding} of {intervals}; "
-        f"worst arm {int(least['held'])} of {int(least['intervals'])} ({least['arm']}).",
+        f"95 % intervals of parameters, given the model, that hold the truth: {holding} of {intervals}{worst}.",
         f"{(every['sealed'] == 'yes').sum()} of {len(every)} arms sealed; {seconds / 60 / len(every):.0f} min an arm.",
     ])  # fmt: skip
 

@@ -43,10 +43,13 @@ def run(module: str, folder: Path) -> None:
 
     Raises:
         InputError: it fails, having said why.
+        ChildProcessError: it was killed, which shows nothing about its inputs.
     """
     path = os.pathsep.join(filter(None, [str(PROJECT), os.environ.get("PYTHONPATH")]))
     command = [sys.executable, "-m", module]
     done = subprocess.run(command, cwd=folder, env=os.environ | {"PYTHONPATH": path}, stdout=sys.stderr, check=False)
+    if done.returncode < 0:
+        raise ChildProcessError(f"{module}: killed by signal {-done.returncode}")
     if done.returncode:
         raise InputError(f"{module}: ended with {done.returncode}, expected a stage that ends well")
 

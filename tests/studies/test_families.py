@@ -7,7 +7,9 @@ import pytest
 from demo.families import families
 from demo.record import Config
 from studies.families import PIPELINE, arms, cells, family_table, set_up
+from studies.recovery import run
 from tests.support.folders import TABLE_OF_NOTHING
+from trunkline.errors import InputError
 from trunkline.identification.stages import STAGES
 from trunkline.pipeline.config import check_settings, load_config, settings_of
 from trunkline.pipeline.stage import write_json
@@ -81,6 +83,7 @@ def test_the_table_has_mean_and_worst_and_the_readme_shows_its_last_row(tmp_path
     assert any("3 of 6; worst arm 1 of 2" in line for line in lines)
     assert "Sessions that are refused, and shall not be: oval 2 by filter." in lines
     assert lines[-1] == "1 of 4 arms sealed; 1 min an arm."
+    assert "hold the truth: 0 of 0." in family_table(rows[-1:])
     (tmp_path / "tests").mkdir()
     (tmp_path / "tests/limits.yaml").write_text("rehearse: {reach.rate: {min: 0.5}}\n")
     (tmp_path / "docs/results").mkdir(parents=True)
@@ -91,3 +94,13 @@ def test_the_table_has_mean_and_worst_and_the_readme_shows_its_last_row(tmp_path
     assert ("3 simulated arms" in text) == with_rows
     shown = "| mean 2 / 4 %, worst arm 4 / 8 %; **1 more refused** | baseline: mean rest shape, tip 4 % |"
     assert (shown in text) == with_rows
+
+
+@pytest.mark.parametrize(
+    ("code", "error"), [("sys.exit(1)", InputError), ("os.kill(os.getpid(), 9)", ChildProcessError)]
+)
+def test_a_stage_that_was_killed_is_no_refusal(tmp_path, monkeypatch, code, error):
+    (tmp_path / "stage_of_a_test.py").write_text(f"import os, sys\n{code}\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    with pytest.raises(error):
+        run("stage_of_a_test", tmp_path)
