@@ -218,6 +218,14 @@ def test_rehearsals_arrive_from_workers_too(monkeypatch, tmp_path):
         scheduler._connected.cache_clear()
 
 
+def test_a_client_waits_for_its_loop_as_long_as_a_busy_machine_takes(cluster, monkeypatch):
+    """Dask's thread gives up after 10 s."""
+    monkeypatch.setattr("distributed.utils._CollectErrorThread", None)
+    client = workers.Cluster(cluster.scheduler_address)
+    assert client.threads() == 2
+    client._client.close()
+
+
 def test_a_mistake_in_the_work_comes_back_as_it_is(spreading):
     spreading()
     with pytest.raises(InputError, match="trial 3: found nothing"):

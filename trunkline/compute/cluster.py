@@ -56,7 +56,9 @@ class Cluster:
         self._shared: dict[int, tuple[Any, Any]] = {}  # value and its future, by the value's id
         self._checked: set[tuple[str, str]] = set()  # workers' addresses, each with a package
         try:
-            self._client: Any = distributed.Client(address, timeout=CONNECTING, set_as_default=False)
+            self._client: Any = distributed.Client(
+                address, timeout=CONNECTING, set_as_default=False, loop=_running_loop()
+            )
         except ValueError:
             raise InputError(f"{VARIABLE}: found {address!r}, expected an address such as tcp://host:8786") from None
         except OSError as error:  # a TimeoutError is one
@@ -156,6 +158,17 @@ class Cluster:
                 self._shared.pop(next(iter(self._shared)))
             self._shared[id(shared)] = shared, self._client.submit(_itself, pickle.dumps(shared), pure=False)
         return self._shared[id(shared)][1]
+
+
+def _running_loop() -> Any:
+    """An event loop in a thread. Dask makes one too, but fails where a busy machine does not start it within 10 s."""
+    from tornado.ioloop import IOLoop
+
+    loop, started = IOLoop(make_current=False), threading.Event()
+    loop.add_callback(started.set)
+    threading.Thread(target=loop.start, name="Dask client", daemon=True).start()
+    started.wait()
+    return loop
 
 
 def difference(package: str, expected: dict[str, str]) -> str:
