@@ -9,6 +9,7 @@ from pathlib import Path
 
 from trunkline.errors import in_one_line
 from upkeep import imports, names, sizes
+from upkeep.follow import follow, parameters_of
 from upkeep.sources import Sources, code_in, python_in, read_checkout, read_revision
 from upkeep.walk import Index, going_back, walk
 
@@ -74,12 +75,16 @@ def classes_line(classes: dict[str, int], most: int = 5) -> str:
 
 
 def trip(code: Sources, start: str) -> dict[str, str]:
-    """Files that a reader of a function enters, and how often he goes back; a dash where there is no such function."""
+    """Files that a reader of a function enters, and how often he goes back, if he follows every call, and if he follows
+    the parameter of it that returns most; a dash where there is no such function."""
     index, (path, _, name) = Index.of(code), start.partition(":")
-    label = f"from {start}: files entered, times back"
+    every, parameter = (f"from {start}, {what}: files entered, times back" for what in ("every call", "one parameter"))
     if (path, name) not in index.functions:
-        return {label: "–"}
-    return {label: "{}, {}".format(*going_back(walk(index, (path, name))))}
+        return {every: "–", parameter: "–"}
+    trips = {each: follow(index, (path, name), each) for each in parameters_of(index.functions[path, name])}
+    longest = max(trips.items(), key=lambda item: item[1][1], default=None)
+    followed = "{1}, {2} ({0})".format(longest[0], *longest[1]) if longest else "–"
+    return {every: "{}, {}".format(*going_back(walk(index, (path, name)))), parameter: followed}
 
 
 def table(columns: dict[str, dict[str, str]]) -> str:

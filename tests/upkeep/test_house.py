@@ -7,6 +7,7 @@ import pytest
 
 from trunkline.errors import InputError
 from upkeep import house, imports, names, sizes
+from upkeep.follow import Trip, follow
 from upkeep.sources import code_in, python_in, read_checkout, read_revision
 from upkeep.walk import Index, going_back, walk
 
@@ -288,6 +289,62 @@ def test_going_back_is_to_a_file_that_was_opened_before(trail, counts):
     assert going_back(trail.split()) == counts
 
 
+ENDS = "import numpy as np\nimport b\nfrom c import C\n"
+READ = "def read(x): return x\n"
+OBJECT = "from b import read\nclass C:\n    def __init__(self, x): read(x)\n    def use(self): return read(self)\n"
+
+
+@pytest.mark.parametrize(("start", "stays"), [
+    ("b.read(x)", "a b"),
+    ("b.read(x.loss)", "a b"),
+    ("b.read([y for y in x])", "a b"),
+    ("b.read(sorted(x))", "a b"),
+    ("b.read(y=1, x=x)", "a b"),
+    ("y, z = x, 1\n    b.read(z)\n    b.read(y)", "a b"),
+    ("for y in x:\n        b.read(y)", "a b"),
+    ("with x as y:\n        b.read(y)", "a b"),
+    ("if (y := x):\n        b.read(y)", "a b"),
+    ("try:\n        pass\n    except ValueError:\n        b.read(x)", "a b"),
+    ("C(b.read(x))", "a b c"),
+    ("y = C(x)\n    y.use()", "a c b"),
+    ("y = b.read(x)\n    C(y)", "a b c"),
+    ("y = start(x)\n    b.read(x)", "a b"),
+    ("b.read(1)", "a"),
+    ("b.read(np.array(x))", "a"),
+    ("b.read(x > 1)", "a"),
+    ("b.read(f'{x}')", "a"),
+    ("b.read(Bounds(x))", "a"),
+    ("y = 1\n    b.read(y)", "a"),
+])  # fmt: skip
+def test_a_parameter_is_followed_to_where_it_ends(start, stays):
+    sources = {"a.py": f"{ENDS}def start(x):\n    {start}\n", "b.py": READ, "c.py": OBJECT}
+    trip = Trip(Index.of(sources))
+    trip.enter(("a.py", "start"), {"x"})
+    assert " ".join(file.removesuffix(".py") for file in trip.files) == stays
+
+
+def test_what_is_put_into_an_object_is_followed_no_further():
+    sources = {"a.py": "import b\nfrom c import C\ndef start(x): return b.read(C(x))", "b.py": READ, "c.py": OBJECT}
+    assert follow(Index.of(sources), ("a.py", "start"), "x") == (3, 0), "read by C.__init__, and not in `start`"
+    sources["c.py"] = "class C:\n    def __init__(self, x): pass\n"
+    assert follow(Index.of(sources), ("a.py", "start"), "x") == (2, 0)
+
+
+@pytest.mark.parametrize(("passed", "counts"), [
+    ("b.read(x)", (2, 0)),
+    ("b.read(x)\n    b.read(x)", (2, 0)),
+    ("b.read(x)\n    b.more(x)", (2, 0)),
+    ("b.read(x)\n    near(x)", (2, 1)),
+    ("b.read(x)\n    near(x)\n    b.more(x)", (2, 2)),
+])  # fmt: skip
+def test_a_return_is_a_stay_in_a_file_that_the_trip_had_left(passed, counts):
+    sources = {
+        "a.py": f"import b\ndef start(x):\n    {passed}\ndef near(x): pass\n",
+        "b.py": READ + "def more(x): pass\n",
+    }
+    assert follow(Index.of(sources), ("a.py", "start"), "x") == counts
+
+
 SOURCES = {
     "README.md": "# A\n\ntext\n",
     "docs/a.md": "1\n2\n",
@@ -325,12 +382,21 @@ def test_every_row_of_the_table():
         "class names defined more than once": "1 (A ×2)",
         "dataclasses": "0",
         "numeric constants of modules (with unit)": "2 (1)",
-        "from trunkline/pipeline/identify.py:run: files entered, times back": "1, 0",
+        "from trunkline/pipeline/identify.py:run, every call: files entered, times back": "1, 0",
+        "from trunkline/pipeline/identify.py:run, one parameter: files entered, times back": "–",
     }
 
 
 def test_a_function_that_is_not_there_has_no_trip():
-    assert list(house.trip({}, "a.py:f").values()) == ["–"]
+    assert list(house.trip({}, "a.py:f").values()) == ["–", "–"]
+
+
+def test_the_trip_of_the_parameter_that_returns_most_is_shown():
+    sources = {
+        "a.py": "import b\ndef start(x, y):\n    b.read(x)\n    near(x)\n    b.read(y)\ndef near(x): pass\n",
+        "b.py": READ,
+    }
+    assert list(house.trip(sources, "a.py:start").values())[1] == "2, 1 (x)"
 
 
 def test_the_command_prints_both_revisions(checkout, capsys):
@@ -338,7 +404,7 @@ def test_the_command_prints_both_revisions(checkout, capsys):
     rows = capsys.readouterr().out.splitlines()
     assert rows[:2] == ["| measure | first | now |", "| --- | --- | --- |"]
     assert "| stages, demo, examples, rehearsal | 1 files, 1 lines | 1 files, 1 lines |" in rows
-    assert "| from new.py:f: files entered, times back | – | – |" in rows
+    assert "| from new.py:f, every call: files entered, times back | – | – |" in rows
     assert "| README.md | 0 lines | 1 lines |" in rows
     assert house.main([str(checkout)]) == 0
     assert capsys.readouterr().out.startswith("| measure | now |\n")
