@@ -34,6 +34,7 @@ from upkeep.truth_table import TRUTH, expectation, holds, identified
 
 PIPELINE = ("ingest", "filter", "build_mjcf", *STAGES, "score")
 EVERY = "every"  # trial, of all kinds
+FINER = (1, 2, 4)  # times as many steps of the simulated arm: stiff draws diverge with the family's
 
 
 def arms(code: str, open_arms: int, sealed: int) -> dict[str, tuple[str, int]]:
@@ -46,11 +47,12 @@ def arms(code: str, open_arms: int, sealed: int) -> dict[str, tuple[str, int]]:
     return chosen
 
 
-def set_up(folder: Path, family: str, seed: int) -> None:
+def set_up(folder: Path, family: str, seed: int, finer: int = 1) -> None:
     """Write the settings of an arm's lab and of the stages into `folder`: the project's, but the last model is scored
-    on every kind of trial."""
+    on every kind of trial. finer: times as many steps of the simulated arm as its family has."""
     lab_seed, plant = draw_arm(family, seed)
-    shutil.copytree(PROJECT / "demo/conf", folder / "demo/conf")
+    plant["substeps"] *= finer
+    shutil.copytree(PROJECT / "demo/conf", folder / "demo/conf", dirs_exist_ok=True)
     OmegaConf.save(OmegaConf.create(plant), folder / f"demo/conf/record/plant/{family}.yaml")
     record = {"record": {"seed": lab_seed, "plant": family}}
     OmegaConf.save(OmegaConf.merge(OmegaConf.load(PROJECT / "demo/params.yaml"), record), folder / "demo/params.yaml")
@@ -76,12 +78,26 @@ def cells(folder: Path) -> dict[str, float | str]:
     return row | {"held": sum(decided), "intervals": len(decided), "refused": "no"}
 
 
+def record(folder: Path, family: str, seed: int) -> None:
+    """Set up an arm and record it, with finer steps where its simulation diverges.
+
+    Raises:
+        InputError: it does with the finest too.
+    """
+    for finer in FINER:
+        set_up(folder, family, seed, finer)
+        try:
+            return run("demo.record", folder)
+        except InputError:
+            if finer == FINER[-1]:
+                raise
+
+
 def measure(family: str, seed: int) -> dict[str, float | str]:
     """Record, identify and score an arm. Where a stage refuses its session, the stage's name in place of errors."""
     begun = time.perf_counter()
     with tempfile.TemporaryDirectory() as name:
-        set_up(Path(name), family, seed)
-        run("demo.record", Path(name))
+        record(Path(name), family, seed)
         row: dict[str, float | str] = {"held": 0, "intervals": 0}
         for stage in PIPELINE:
             try:

@@ -1,12 +1,13 @@
 """The study of families: the project's settings, sealed arms that follow the code, and a table of mean and worst."""
 
 import json
+from contextlib import nullcontext
 
 import pytest
 
 from demo.families import families
 from demo.record import Config
-from studies.families import PIPELINE, arms, cells, family_table, set_up
+from studies.families import PIPELINE, arms, cells, family_table, record, set_up
 from studies.recovery import run
 from tests.support.folders import TABLE_OF_NOTHING
 from trunkline.errors import InputError
@@ -30,6 +31,21 @@ def test_an_arm_is_identified_by_the_project_s_settings_and_scored_on_every_kind
         assert repr(ours) == repr(committed), "classes of a stage are made anew"
     lab = load_config(Config, "record", tmp_path / "demo")
     assert all([lab.experiments.pulls, lab.experiments.motions, lab.experiments.loads])
+
+
+@pytest.mark.parametrize("diverged", [0, 2, 3])
+def test_a_simulation_that_diverges_is_repeated_with_finer_steps(tmp_path, monkeypatch, diverged):
+    steps = []
+
+    def recorded(module, folder):
+        steps.append(load_config(Config, "record", folder / "demo").plant.substeps)
+        if len(steps) <= diverged:
+            raise InputError("diverged")
+
+    monkeypatch.setattr("studies.families.run", recorded)
+    with pytest.raises(InputError) if diverged == 3 else nullcontext():
+        record(tmp_path, "oval", 1)
+    assert steps == [4, 8, 16][: diverged + 1]
 
 
 def test_sealed_arms_follow_the_code_and_open_ones_do_not():
