@@ -91,7 +91,7 @@ class ArmAtWork:
             seconds += ROWS / COMMAND_RATE
             now = begin + min(seconds / ramp, 1.0) * (pulls - begin)
             truths.append(self.advance(now, ROWS))
-            if watch.seen(seconds, truths[-1] + NOISE * rng.standard_normal(3)) and seconds > ramp + WINDOW:
+            if watch.observe(seconds, truths[-1] + NOISE * rng.standard_normal(3)) and seconds > ramp + WINDOW:
                 self._sent = pulls
                 return np.mean(truths[-round(1.0 / (ROWS / COMMAND_RATE)) :], axis=0), watch.tip, seconds
         self._sent = pulls
@@ -119,11 +119,11 @@ def correct(arm: ArmAtWork, chain: Chain, target: np.ndarray, commands: np.ndarr
     loop, result, sent = TipCorrection(chain, gravity, goal, commands, CorrectionSettings()), Corrected([]), None
     while sent is None or not np.array_equal(loop.commands, sent):
         sent = loop.commands
-        truth, seen, seconds = arm.bring(chain.straight_lengths - sent, RAMP if result.errors else FIRST_RAMP, rng)
+        truth, measured, seconds = arm.bring(chain.straight_lengths - sent, RAMP if result.errors else FIRST_RAMP, rng)
         result.seconds += [seconds] * bool(result.errors)
         result.errors.append(float(np.linalg.norm((truth - origin) @ turn - goal)))
-        if not loop.ended and np.isfinite(seen).all():
-            loop.measured((seen - origin) @ turn)
+        if not loop.ended and np.isfinite(measured).all():
+            loop.measured((measured - origin) @ turn)
         elif not loop.ended:
             loop.refuse("the arm does not rest")
     result.reason = loop.ended
@@ -164,14 +164,14 @@ def measure(targets: int) -> None:
     def rest(index: int, noise: np.random.Generator) -> np.ndarray:
         return hanging(index).bring(chain.straight_lengths - commands[index], FIRST_RAMP, noise)[0]
 
-    own = twin.copy()
-    position_of(own)[:] = (np.array(everyone("own tips", rest, targets)) - origin) @ turn
-    rested = np.isfinite(own).all(axis=1)
-    across = across_surface(chain, commands[rested], gravity_of(twin)[rested], position_of(own - twin)[rested])
+    reached = twin.copy()
+    position_of(reached)[:] = (np.array(everyone("own tips", rest, targets)) - origin) @ turn
+    rested = np.isfinite(reached).all(axis=1)
+    across = across_surface(chain, commands[rested], gravity_of(twin)[rested], position_of(reached - twin)[rested])
     print(f"| targets | error, mm | after {' | '.join(map(str, SHOWN))} corrections | where it stays |")
     print(f"|---|---|{'---:|' * (len(SHOWN) + 1)}")
     notes = []
-    for name, of in (("own surface", own[rested]), ("twin's surface", twin)):
+    for name, of in (("own surface", reached[rested]), ("twin's surface", twin)):
         indices = np.flatnonzero(rested) if of is not twin else np.arange(targets)
         answers = network(of)["commands"]
 

@@ -13,7 +13,7 @@ def rests(way, seconds=4.0, hidden=lambda time: False) -> float | None:
     watch, rng = RestWatch(), np.random.default_rng(0)
     for time in np.arange(0.0, seconds, 1 / RATE):
         tip = np.array([way(time), 0.2, -0.3]) + NOISE * rng.standard_normal(3)
-        if watch.seen(time, np.full(3, np.nan) if hidden(time) else tip):
+        if watch.observe(time, np.full(3, np.nan) if hidden(time) else tip):
             np.testing.assert_allclose(watch.tip, [way(time - WINDOW / 2), 0.2, -0.3], atol=0.3e-3)
             return time
     return None

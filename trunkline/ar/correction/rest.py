@@ -15,7 +15,7 @@ class RestWatch:
     def __init__(self) -> None:
         self._samples: deque[tuple[float, np.ndarray]] = deque()
 
-    def seen(self, time: float, tip: np.ndarray) -> bool:
+    def observe(self, time: float, tip: np.ndarray) -> bool:
         """A sample at `time`, s, (3,) m; NaN where no camera saw it. Whether the tip has been at rest for WINDOW s."""
         self._samples.append((time, tip))
         while time - self._samples[0][0] > WINDOW:
@@ -24,8 +24,8 @@ class RestWatch:
             return False
         times, tips = np.array([at for at, _ in self._samples]), np.array([tip for _, tip in self._samples])
         blocks = ((time - times) // BLOCK).astype(int)
-        seen = np.isfinite(tips).all(axis=1)
-        means = [tips[seen & (blocks == block)].mean(axis=0) for block in np.unique(blocks[seen])]
+        visible = np.isfinite(tips).all(axis=1)
+        means = [tips[visible & (blocks == block)].mean(axis=0) for block in np.unique(blocks[visible])]
         return len(means) >= 0.8 * WINDOW / BLOCK and bool(np.ptp(means, axis=0).max() <= STILL)
 
     @property
