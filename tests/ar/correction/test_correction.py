@@ -221,3 +221,49 @@ def test_the_jacobian_is_that_of_small_changes(chain, pulls):
         begin = np.where(np.arange(3) == motor, np.minimum(commands, rest.lengths[0] - step), commands)
         ways = [tip_of(chain, begin - change * np.eye(3)[motor]) for change in (0.0, step)]
         np.testing.assert_allclose((ways[1] - ways[0]) / step, jacobian[:, motor], rtol=0.02, atol=0.02)
+
+
+def test_two_steps_are_those_of_the_page(chain):
+    """With all cables taut and steps that no bound cuts: the least of what is missing and of caution, and a Kalman
+    filter's update of both."""
+    commands = pulled(chain, 0.03, 0.02, 0.01)
+    start = tip_of(chain, commands)
+    missing = np.array([0.3e-3, -0.2e-3, 0.4e-3])
+    jacobian = tip_by_pulls(chain, actuated(chain, commands[None], DOWN), DOWN)
+    variance = (correction.UNSURE**2 * (jacobian**2).sum() / 3) * np.eye(3)
+    loop = TipCorrection(chain, DOWN, start + missing, commands, replace(SETTINGS, tolerance=1e-6))
+    assert not loop.arrived
+    tip = start
+    for moved in (np.array([0.5e-3, 0.1e-3, 0.2e-3]), np.zeros(3)):
+        loop.measured(tip)
+        left = start + missing - tip
+        step = np.linalg.solve(jacobian.T @ jacobian + correction.CAUTION * variance, jacobian.T @ left)
+        np.testing.assert_allclose(commands - loop.commands, step, atol=1e-8)
+        gain = variance @ step / (step @ variance @ step + correction.FRICTION**2)
+        jacobian = jacobian + np.outer(moved - jacobian @ step, gain)
+        variance = variance - np.outer(gain, variance @ step)
+        commands, tip = loop.commands, tip + moved
+
+
+@pytest.mark.parametrize(("errors", "halved"), [([50, 50.2], 0), ([50, 50.4], 1), ([50, 40, 45], 1), ([50, 40, 39], 0)])
+def test_a_step_is_bad_that_leaves_the_tip_farther_off_than_the_best_did(chain, errors, halved):
+    commands = pulled(chain, 0.03, 0.02, 0.01)
+    start = tip_of(chain, commands)
+    loop = TipCorrection(chain, DOWN, start, commands, SETTINGS)
+    for error in errors:
+        loop.measured(start + [1e-3 * error, 0.0, 0.0])
+    assert loop._radius == SETTINGS.longest / 2**halved
+
+
+def test_where_no_motor_helps_or_the_twin_would_not_rest_nothing_is_sent(chain, monkeypatch):
+    commands = pulled(chain, 0.02, 0.0, 0.0)
+    start = tip_of(chain, commands)
+    loop = TipCorrection(chain, DOWN, start + [0.004, 0.0, 0.0], commands, SETTINGS)
+    monkeypatch.setattr(loop, "_change", lambda missing: np.zeros(3))
+    loop.measured(start)
+    assert loop.ended == "no motor brings the tip nearer"
+    loop = TipCorrection(chain, DOWN, start + [0.004, 0.0, 0.0], commands, SETTINGS)
+    monkeypatch.setattr(correction, "actuated", lambda *of: replace(actuated(*of), converged=np.array([False])))
+    loop.measured(start)
+    assert loop.ended == "a motor would be at its largest force"
+    assert np.array_equal(loop.commands, commands)
