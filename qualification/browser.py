@@ -17,6 +17,8 @@ FLAGS = ("--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-
          "--ignore-gpu-blocklist", "--disable-background-networking", "--remote-debugging-port=0")  # fmt: skip
 PATIENCE = 30.0  # s for the browser to come
 LOOKS = 0.02  # s between looks at a page
+# As root, a browser would draw before all else; as a user has it, it may not.
+AS_USER = ("setpriv", "--bounding-set=-sys_nice", "--inh-caps=-sys_nice") if os.geteuid() == 0 else ()
 # a frame counts once something was drawn in it, by whatever call of WebGL
 COUNT = """
 globalThis.drawn = 0;
@@ -114,7 +116,7 @@ async def browsing(url: str, size: tuple[int, int], nice: int = 0) -> AsyncItera
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         window = f"--window-size={size[0]},{size[1]}"
         browser = await asyncio.create_subprocess_exec(
-            "nice", "-n", str(nice), program, *FLAGS, f"--user-data-dir={folder}", window, "about:blank",
+            *AS_USER, "nice", "-n", str(nice), program, *FLAGS, f"--user-data-dir={folder}", window, "about:blank",
             start_new_session=True, stdout=asyncio.subprocess.DEVNULL, stderr=asyncio.subprocess.DEVNULL,
         )  # fmt: skip
         try:
