@@ -463,8 +463,10 @@ def _family_rows(root: Path) -> list[str]:
     stale = " (**STALE**)" if result.state(root) == "STALE" else ""
     refused = next((line for line in result.lines if line.startswith("Sessions that are refused")), "")
     more = f"; **{refused.count(' by ')} more refused**" if refused else ""
-    errors = f"mean {position} / {tip} %, worst arm {worst_position} / {worst_tip} %{stale}{more}"
-    return [f"| {what} | {errors} | baseline: mean rest shape, tip {null} % |"]
+    errors = f"mean {position} / {tip} %, worst arm {worst_position} / {worst_tip} %"
+    if float(worst_position) > GOAL["e_position"] or float(worst_tip) > GOAL["e_tip"]:
+        errors = f"**{errors}**"
+    return [f"| {what} | {errors}{stale}{more} | baseline: mean rest shape, tip {null} % |"]
 
 
 def _command_row(root: Path) -> str:

@@ -108,7 +108,7 @@ def test_the_table_has_mean_and_worst_and_the_readme_shows_its_last_row(tmp_path
         write_json(tmp_path / "docs/results/families.json", result)
     text = headline(tmp_path)
     assert ("3 simulated arms" in text) == with_rows
-    shown = "| mean 2 / 4 %, worst arm 4 / 8 %; **1 more refused** | baseline: mean rest shape, tip 4 % |"
+    shown = "| **mean 2 / 4 %, worst arm 4 / 8 %**; **1 more refused** | baseline: mean rest shape, tip 4 % |"
     assert (shown in text) == with_rows
 
 
