@@ -1,5 +1,6 @@
 """Work spread over a real cluster of two processes: the same bits, whoever dies on the way; mistakes are one line."""
 
+import gc
 import json
 import os
 import signal
@@ -218,12 +219,30 @@ def test_rehearsals_arrive_from_workers_too(monkeypatch, tmp_path):
         scheduler._connected.cache_clear()
 
 
-def test_a_client_waits_for_its_loop_as_long_as_a_busy_machine_takes(cluster, monkeypatch):
-    """Dask's thread gives up after 10 s."""
-    monkeypatch.setattr("distributed.utils._CollectErrorThread", None)
-    client = workers.Cluster(cluster.scheduler_address)
-    assert client.threads() == 2
-    client._client.close()
+@pytest.mark.parametrize("enabled", [True, False])
+def test_no_old_client_is_collected_while_one_begins_or_ends(monkeypatch, enabled):
+    """It would wait for a lock that the new one holds."""
+    collecting = []
+
+    class Client:
+        def __init__(self, *_, **__):
+            collecting.append(gc.isenabled())
+
+        def wait_for_workers(self, *_, **__):
+            raise TimeoutError
+
+        def close(self, timeout):
+            collecting.append(gc.isenabled())
+
+    monkeypatch.setattr("distributed.Client", Client)
+    (gc.enable if enabled else gc.disable)()
+    try:
+        with pytest.raises(InputError, match="no workers"):
+            workers.Cluster("tcp://127.0.0.1:9")
+        assert collecting == [False, False]
+        assert gc.isenabled() == enabled
+    finally:
+        gc.enable()
 
 
 def test_a_mistake_in_the_work_comes_back_as_it_is(spreading):

@@ -1,6 +1,7 @@
 """Work on the workers of a Dask scheduler."""
 
 import functools
+import gc
 import hashlib
 import logging
 import os
@@ -56,9 +57,8 @@ class Cluster:
         self._shared: dict[int, tuple[Any, Any]] = {}  # value and its future, by the value's id
         self._checked: set[tuple[str, str]] = set()  # workers' addresses, each with a package
         try:
-            self._client: Any = distributed.Client(
-                address, timeout=CONNECTING, set_as_default=False, loop=_running_loop()
-            )
+            with _uncollected():
+                self._client: Any = distributed.Client(address, timeout=CONNECTING, set_as_default=False)
         except ValueError:
             raise InputError(f"{VARIABLE}: found {address!r}, expected an address such as tcp://host:8786") from None
         except OSError as error:  # a TimeoutError is one
@@ -66,7 +66,8 @@ class Cluster:
         try:
             self._client.wait_for_workers(1, timeout=FIRST_WORKER)
         except OSError as error:
-            self._client.close(timeout=1)
+            with _uncollected():
+                self._client.close(timeout=1)
             raise InputError(f"{VARIABLE}: found no workers at {address}, expected at least one") from error
 
     def answers(self) -> bool:
@@ -160,15 +161,18 @@ class Cluster:
         return self._shared[id(shared)][1]
 
 
-def _running_loop() -> Any:
-    """An event loop in a thread. Dask makes one too, but fails where a busy machine does not start it within 10 s."""
-    from tornado.ioloop import IOLoop
-
-    loop, started = IOLoop(make_current=False), threading.Event()
-    loop.add_callback(started.set)
-    threading.Thread(target=loop.start, name="Dask client", daemon=True).start()
-    started.wait()
-    return loop
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """No cycle of objects is collected meanwhile. A client of Dask that is collected waits for a lock, which another
+    one holds while it begins or ends: where that is in the same thread, for ever."""
+    enabled = gc.isenabled()
+    gc.collect()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
 
 
 def difference(package: str, expected: dict[str, str]) -> str:
