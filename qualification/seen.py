@@ -26,8 +26,8 @@ import onnxruntime
 
 from demo.plants.bench import COMMAND_RATE, LOOSE
 from demo.plants.choice import plant_of
-from demo.plants.stranger import CALM, LONGEST_REST, REST_STEP, STILL, Stranger
-from demo.plants.stranger_kernel import come_to_rest, simulate, tip
+from demo.plants.stranger import Stranger
+from demo.plants.stranger_kernel import simulate, tip
 from demo.rig import ROOT, Config
 from trunkline.ar.correction.correction import CorrectionSettings, TipCorrection
 from trunkline.ar.correction.rest import WINDOW, RestWatch
@@ -66,12 +66,7 @@ class ArmAtWork:
     def __init__(self, plant: Stranger, gravity: np.ndarray) -> None:
         self._plant, self._gravity = plant, plant.mount.inv().apply(gravity)
         self._sent = np.full(plant.tendons, -LOOSE)
-        self._state = plant._state(self._sent)
-        steps = round(LONGEST_REST / REST_STEP)
-        come_to_rest(
-            plant.links, self._state, self._gravity, 0.0, self._sent, plant.straight, REST_STEP, steps, CALM, STILL
-        )
-        self._state.v[:] = 0.0
+        self._state = plant._rest(self._gravity, 0.0, self._sent)
 
     def advance(self, pulls: np.ndarray, rows: int) -> np.ndarray:
         """The tip, m, after so many rows with these `pulls` (K,), m."""
@@ -93,7 +88,7 @@ class ArmAtWork:
             truths.append(self.advance(now, ROWS))
             if watch.observe(seconds, truths[-1] + NOISE * rng.standard_normal(3)) and seconds > ramp + WINDOW:
                 self._sent = pulls
-                return np.mean(truths[-round(1.0 / (ROWS / COMMAND_RATE)) :], axis=0), watch.tip, seconds
+                return np.mean(truths[-round(WINDOW * COMMAND_RATE / ROWS) :], axis=0), watch.tip, seconds
         self._sent = pulls
         return np.full(3, np.nan), np.full(3, np.nan), seconds
 
