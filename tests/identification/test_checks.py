@@ -87,6 +87,20 @@ def test_a_small_share_of_a_deep_pull_is_no_exchange(model, third, refused):
         check_trials([trial], model)
 
 
+def test_what_looks_like_an_exchange_in_one_trial_is_refuted_by_the_others(model):
+    """Two cables that are let out by nearly the same, through holes that are askew."""
+    askew = replace(static_pull(model, [-44, 22, 25]), commands=1e-3 * np.array([[-44, 25, 21]]))
+    others = [static_pull(model, pulls) for pulls in ([-300, 50, -300], [-300, -300, 40])]
+    with pytest.raises(InputError, match="names exchanged"):
+        check_trials([askew], model)
+    check_trials([askew, *others], model)
+    exchanged = [with_columns(trial, [0, 2, 1]) for trial in others]
+    with pytest.raises(InputError, match="names exchanged"):
+        check_trials([askew, *exchanged], model)
+    with pytest.raises(InputError, match=f"trial {exchanged[0].name}: .*names exchanged"):  # clear by itself
+        check_trials([*others, exchanged[0]], model)
+
+
 def test_static_pulls_that_other_things_bend_too_pass(model):
     """What gravity bends further than tendons do, and what all tendons press."""
     trials = [static_pull(model, [10, -300, -300], 90), static_pull(model, [-300, 10, 5], 120)]

@@ -17,6 +17,7 @@ PLACES = 12  # frames of a trial in which several tendons pull in turn
 SHORTER = 0.75  # of the cables' stretch that other names may leave at least, where those given are right
 STRETCH = 2.5e-3  # m, all tendons together, in the mean over frames, from which on more stretch than need be counts
 SHARE = 0.1  # of the deepest pull of each frame, likewise: guide holes that are askew by some degrees cost as much
+CLEAR = 0.3  # of the deepest pull, likewise, from which on an exchange is clear in one trial: holes cost 0.13 at most
 ALIKE = 0.5  # of how well pulls and path lengths agree at best; two of three tendons exchanged: -0.5, out of six: 0.5
 SHORTEST, LONGEST = 0.4, 1.5  # of a pull, by which its path is shorter: weak motors and cables that stretch take of it
 OFF = 1e-2  # m between a pull and its path, which an arm bent at rest may have too
@@ -36,11 +37,19 @@ def check_trials(trials: list[Trial], model: mujoco.MjModel) -> None:
     for trial in trials:
         check_names(trial, model)
     trials = [trial for trial in trials if len(trial.markers) > 1]  # of a tip alone, many shapes lead there
+    trials = [trial for trial in trials if trial.tendons]
+    driven = [trial for trial in trials if EXPERIMENTS[trial.experiment].needs_motors]
     for trial in trials:
-        if trial.tendons:
-            kind = EXPERIMENTS[trial.experiment]
-            (check_lengths if kind.needs_motors and kind.level is None else check_sides)(trial, model)
-    check_scales([trial for trial in trials if trial.tendons and EXPERIMENTS[trial.experiment].needs_motors], model)
+        if not _by_lengths(trial):
+            check_sides(trial, model)
+    check_lengths([trial for trial in trials if _by_lengths(trial)], model)
+    check_scales(driven, model)
+
+
+def _by_lengths(trial: Trial) -> bool:
+    """Whether several motors may pull at once, each as far as it likes."""
+    kind = EXPERIMENTS[trial.experiment]
+    return kind.needs_motors and kind.level is None
 
 
 def check_names(trial: Trial, model: mujoco.MjModel) -> None:
@@ -88,32 +97,48 @@ def check_sides(trial: Trial, model: mujoco.MjModel) -> None:
     )
 
 
-def check_lengths(trial: Trial, model: mujoco.MjModel) -> None:
-    """Refuse a trial in which tendons are longer than commanded by far, and other tendons are not.
+def check_lengths(trials: list[Trial], model: mujoco.MjModel) -> None:
+    """Refuse trials in which tendons are longer than commanded by far, and other tendons are not.
 
     A tendon may be slack, but is hardly longer than its motor lets it be, whatever else bends the arm: gravity, other
-    tendons, its own momentum. The model's tendons are threaded through poses that were measured. By how much each
-    would be stretched in all is compared with what is left if names are exchanged in the best way; tendons that all
-    pull against each other leave the same with any names.
+    tendons, its own momentum. By how much each would be stretched in all is compared with what is left if names are
+    exchanged in the best way; tendons that all pull against each other leave the same with any names. Where two are let
+    out by nearly the same, guide holes that are askew look like an exchange too: what is not clear in a trial must not
+    be refuted by the others.
+    """
+    stretches = [_stretch(trial, model) for trial in trials]
+    for trial, (stretch, mirrored, deepest) in zip(trials, stretches, strict=True):
+        exchange = linear_sum_assignment(stretch)
+        named, best = np.trace(stretch), stretch[exchange].sum()
+        if named - best < max(STRETCH, SHARE * deepest) or best >= SHORTER * named:
+            continue
+        alike = [other for t, (other, _, _) in zip(trials, stretches, strict=True) if t.tendons == trial.tendons]
+        if named - best < CLEAR * deepest and sum(np.trace(other) - other[exchange].sum() for other in alike) <= 0:
+            continue
+        worst = int(np.argmax(np.diag(stretch)))
+        fault = f"found the path of {trial.tendons[worst]!r} {1e3 * stretch[worst, worst]:.0f} mm longer than commanded"
+        cause = "signs reversed" if mirrored < best else "names exchanged"
+        raise InputError(
+            f"session.yaml: tendons: trial {trial.name}: {fault}, which fits with {cause}, expected a tendon to be "
+            "slack or about as long as its command: are names exchanged, signs reversed, is the base body turned about "
+            "the arm, or the frame left-handed?"
+        )
+
+
+def _stretch(trial: Trial, model: mujoco.MjModel) -> tuple[np.ndarray, float, float]:
+    """By how much each path is longer than each tendon's command lets it be, m (K commands, K paths), in the mean over
+    frames; of all paths, if commands had the other sign; and the deepest pull, in the mean too.
+
+    The model's tendons are threaded through poses that were measured.
     """
     measured = np.flatnonzero(trial.measured.mean(axis=1) >= MEASURED_SHARE)
     frames = measured[:: max(len(measured) // PLACES, 1)]
     tendons = [model.tendon(name).id for name in trial.tendons]
     shorter = np.array([model.tendon_length0 - _path_lengths(trial, model, frame) for frame in frames])[:, tendons]
-    stretch = np.maximum(trial.commands[frames, :, None] - shorter[:, None, :], 0).mean(axis=0)  # (K names, K paths)
-    named, best = np.trace(stretch), stretch[linear_sum_assignment(stretch)].sum()
-    counts = max(STRETCH, SHARE * float(trial.commands[frames].max(axis=1).mean()))
-    if named - best < counts or best >= SHORTER * named:
-        return
-    worst = int(np.argmax(np.diag(stretch)))
-    fault = f"found the path of {trial.tendons[worst]!r} {1e3 * stretch[worst, worst]:.0f} mm longer than commanded"
-    mirrored = np.maximum(-trial.commands[frames] - shorter, 0).mean(axis=0).sum()
-    cause = "signs reversed" if mirrored < best else "names exchanged"
-    raise InputError(
-        f"session.yaml: tendons: trial {trial.name}: {fault}, which fits with {cause}, expected a tendon to be "
-        "slack or about as long as its command: are names exchanged, signs reversed, is the base body turned about "
-        "the arm, or the frame left-handed?"
-    )
+    commands = trial.commands[frames]
+    stretch = np.maximum(commands[:, :, None] - shorter[:, None, :], 0).mean(axis=0)
+    mirrored = float(np.maximum(-commands - shorter, 0).mean(axis=0).sum())
+    return stretch, mirrored, float(commands.max(axis=1).mean())
 
 
 def check_scales(trials: list[Trial], model: mujoco.MjModel) -> None:
