@@ -1,5 +1,7 @@
 """Samples that are no measurement: far away, at the origin, not finite, without a rotation."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from trunkline.recordings.cleaning.checks import Findings
@@ -25,21 +27,9 @@ def valid_samples(
     cells = np.ix_(rows, np.array(columns, int))
     positions = reference.scale * poses.positions[cells]
     present = poses.present[cells]
-    finite = np.asarray(np.isfinite(positions).all(axis=-1))
-    far = finite & np.any(np.abs(positions) > FARTHEST, axis=-1)
-    nowhere = np.asarray(finite & np.all(positions == 0, axis=-1))
-    if reference.base is not None and nowhere[:, 0].sum() == finite[:, 0].sum():
-        nowhere[:, 0] = False
-    findings.dropped(far, f"with a position beyond {FARTHEST:g} m", names)
-    findings.dropped(nowhere, "exactly at the origin, where a driver puts what it does not see,", names)
-    positions[far | nowhere] = np.nan
-    twice = _coinciding(positions, reference.base is not None)
-    findings.dropped(twice, "exactly at the place of another body, as of one that is not seen,", names)
-    positions[twice] = np.nan
-    away = _out_of_reach(positions, reference.distances)
-    findings.dropped(away, "farther away than the arm reaches, as of a body that is not seen,", names)
-    positions[away] = np.nan
-    present &= ~(far | nowhere | twice | away)
+    for flagged, words in unmeasured(positions, reference.base is not None, reference.distances):
+        findings.dropped(flagged, words, names)
+        present &= ~flagged
     good = np.isfinite(positions).all(axis=-1)
     quaternions = None
     if poses.quaternions is not None:
@@ -54,6 +44,31 @@ def valid_samples(
     findings.dropped(bad, "with a position that is not finite", names)
     positions[~good] = np.nan
     return positions, quaternions
+
+
+def unmeasured(
+    positions: np.ndarray, marked_base: bool, distances: np.ndarray | None
+) -> Iterator[tuple[np.ndarray, str]]:
+    """Which samples (T, B) of (T, B, 3) m are no measurement, and what is wrong with them; each becomes NaN in place.
+
+    Args:
+        marked_base: whether the first body marks the base, which may be the origin throughout.
+        distances: usual ones between bodies, m, None where they are unknown. Shape (1 + S, 1 + S).
+    """
+    finite = np.asarray(np.isfinite(positions).all(axis=-1))
+    far = finite & np.any(np.abs(positions) > FARTHEST, axis=-1)
+    nowhere = np.asarray(finite & np.all(positions == 0, axis=-1))
+    if marked_base and nowhere[:, 0].sum() == finite[:, 0].sum():
+        nowhere[:, 0] = False
+    yield far, f"with a position beyond {FARTHEST:g} m"
+    yield nowhere, "exactly at the origin, where a driver puts what it does not see,"
+    positions[far | nowhere] = np.nan
+    twice = _coinciding(positions, marked_base)
+    yield twice, "exactly at the place of another body, as of one that is not seen,"
+    positions[twice] = np.nan
+    away = _out_of_reach(positions, distances)
+    yield away, "farther away than the arm reaches, as of a body that is not seen,"
+    positions[away] = np.nan
 
 
 def _coinciding(positions: np.ndarray, marked_base: bool) -> np.ndarray:

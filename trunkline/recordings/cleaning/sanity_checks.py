@@ -6,6 +6,7 @@ check compares a trial with that, with the session's other trials, or with what 
 
 import re
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Literal
@@ -116,7 +117,19 @@ def _misplaced(raw: RawTrial, usual: np.ndarray, names: tuple[str, ...], least: 
         return [f"unit: {place}, expected all logs of a session in one unit"]
     if len(names) == 2:  # one point alone comes as near to the base as the arm bends
         return []
-    faults = []
+    return list(misplaced(distances, usual, names, least).values())
+
+
+def misplaced(distances: np.ndarray, usual: np.ndarray, names: Sequence[str], least: float) -> dict[int, str]:
+    """Bodies, by index, most of whose `NEAREST` neighbors are at other distances than usual, with a sentence each.
+
+    Args:
+        distances: between the bodies, m, NaN where one is not seen. Shape (B, B).
+        usual: likewise, as of `usual_distances`. Shape (B, B).
+        names: of the bodies.
+        least: m, by which the median of a body's distances has to differ.
+    """
+    faults = {}
     for body, name in enumerate(names):
         others = np.argsort(usual[body])[:NEAREST]
         others = others[np.isfinite((distances - usual)[body, others])]
@@ -127,7 +140,7 @@ def _misplaced(raw: RawTrial, usual: np.ndarray, names: tuple[str, ...], least: 
             if near != worst:
                 place += f", {_mm(distances[body, near])} from {names[near]!r} for {_mm(usual[body, near])}"
             expected = f"expected neighbours at distances that differ by less than {_mm(least)}"
-            faults.append(f"{name!r} is {place}, {expected}")
+            faults[body] = f"{name!r} is {place}, {expected}"
     return faults
 
 
