@@ -1,0 +1,194 @@
+"""Whether a live stream of poses can be true: what stalls, lies or is no measurement is named, and its poses go.
+
+A pose to which a check objects is NaN at once, or at the next look at the last frames, LOOKS s later. If the objection
+lasts for LASTS s, it is a fault of the stream: outliers and short occlusions are none. A fault persists. Rules of
+positions are those by which `ingest` reads logs (`trunkline/recordings/cleaning/`):
+
+- no measurement: at the origin, at another body's place, farther than cameras see or the arm reaches (`unmeasured`);
+- stale: the same to the last bit as in the frame before (`stale_samples`);
+- exchanged labels (`find_label_swaps`), and a body that is elsewhere by its distances to its neighbors (`misplaced`);
+- no rotation (`is_rotation`).
+
+Of the stream alone: silence, frames that do not count up or whose stamps do not, and frames that come later than they
+did at first. A stream that is late, or in which nothing but the stamps changes, from its first frame on, cannot be told
+by the first of these; the latter shows once a whole window of all bodies is the same.
+"""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from trunkline.ar.tracking.tracker import CameraFrame, ExpectedBodies, TrackedPoses
+from trunkline.recordings.cleaning.invalid_samples import unmeasured
+from trunkline.recordings.cleaning.label_swaps import find_label_swaps
+from trunkline.recordings.cleaning.sanity_checks import misplaced
+from trunkline.recordings.logs.transforms import is_rotation
+from trunkline.recordings.signals.repeats import stale_samples
+
+WINDOW = 120  # frames that are looked at together
+LOOKS = 0.05  # s from one look at the window to the next: it costs more than all else
+SWAPPED = 12  # frames in which exchanged labels are looked for
+SEARCHES = (
+    0.25  # s for which they are, once a body came nearer to where another was; a search takes longer than a frame
+)
+LASTS = 0.1  # s after which an objection is a fault; outliers last for a frame or two
+DRIFT = 2e-4  # by which clocks may differ in rate; quartzes differ by less
+STREAM = ""  # in place of a body, for objections to the stream as a whole
+
+
+@dataclass(frozen=True)
+class StreamLimits:
+    """silence: s without a frame. age: s that a frame may be old when it comes. distance: share of the arm's length by
+    which a body's distances to its neighbors may differ, as `plausible.distance` of conf/ingest."""
+
+    silence: Annotated[float, Field(gt=0, le=10)] = 0.15
+    age: Annotated[float, Field(gt=0, le=10)] = 0.1
+    distance: Annotated[float, Field(gt=0, le=0.5)] = 0.1
+
+
+class StreamChecks:
+    """Of the frames of one stream. `fault`: its first, in one line; "" while there is none."""
+
+    def __init__(self, expected: ExpectedBodies, limits: StreamLimits) -> None:
+        self.fault = ""
+        self._expected, self._limits = expected, limits
+        self._since: dict[tuple[str, str], float] = {}  # of objections, by rule and body
+        self._dropped: dict[str, set[str]] = {}  # by rule, as of the last look at the window
+        self._last: CameraFrame | None = None
+        self._offset, self._received, self._looked = math.inf, math.nan, -math.inf
+        self._counted: deque[tuple[float, int]] = deque()  # of the last second: when each frame came, and its number
+        self._window: deque[np.ndarray] = deque(maxlen=WINDOW)
+        self._search, self._places = math.inf, np.full((len(expected.names), 3), np.nan)  # from the first frame on
+        usual = expected.distances
+        self._least = math.inf if usual is None else limits.distance * float(np.nanmax(usual[0]))
+        self._names = expected.names if expected.marked_base else ("base", *expected.names)  # as in `distances`
+
+    def take(self, now: float, frame: CameraFrame) -> TrackedPoses | None:
+        """The poses of a frame that came at `now`, s of the monotonic clock; None for one that comes after a later."""
+        last, behind = self._last, ""
+        if not (math.isfinite(frame.stamp) and math.isfinite(frame.sent)):
+            behind = f"found the stamp {frame.stamp} in frame {frame.number}, expected a time"
+        elif last is not None and not (frame.number > last.number and frame.stamp > last.stamp):
+            came = f"found frame {frame.number}, stamped {frame.stamp:.3f} s, after {last.number}, {last.stamp:.3f} s"
+            behind = f"{came}, expected both to grow"
+        self._object(now, "order", {STREAM: behind} if behind else {})
+        if behind:
+            return None
+        age = self._age(now, frame)
+        self._last, self._received = frame, now
+        self._since.pop(("unreadable", STREAM), None)
+        rate, loss = self._count(now, frame.number)
+        positions, quaternions = self._measured(now, frame)
+        return TrackedPoses(self._expected.names, now - age, positions, quaternions, age, rate, loss, self.fault)
+
+    def unreadable(self, now: float, reason: str) -> None:
+        """That a message came which is no frame; `reason` in one line."""
+        self._object(now, "unreadable", {STREAM: reason}, ends=False)
+
+    def wait(self, now: float) -> None:
+        """That nothing came until `now`, s."""
+        silent = now - self._received
+        if silent > self._limits.silence and not self.fault:
+            self.fault = f"found no frame for {silent:.2f} s, expected one within {self._limits.silence:g} s"
+
+    def _object(self, now: float, rule: str, sentences: dict[str, str], ends: bool = True) -> None:
+        """What a rule objects to now, by body; where it `ends`, it objects to no others any more."""
+        if ends:
+            self._since = {key: at for key, at in self._since.items() if key[0] != rule or key[1] in sentences}
+        for body, sentence in sentences.items():
+            if now - self._since.setdefault((rule, body), now) >= LASTS and not self.fault:
+                self.fault = " ".join(sentence.split())
+
+    def _age(self, now: float, frame: CameraFrame) -> float:
+        """s from the exposure until `now`, without the shortest way of a message."""
+        since = 0.0 if math.isnan(self._received) else now - self._received
+        self._offset = min(self._offset + DRIFT * since, now - frame.sent)
+        age = now - self._offset - frame.stamp
+        old = f"found poses that are {age:.2f} s old when they come, expected at most {self._limits.age:g} s"
+        self._object(now, "age", {STREAM: old} if age > self._limits.age else {})
+        return age
+
+    def _count(self, now: float, number: int) -> tuple[float, float]:
+        """Rate, Hz, and share of lost frames, of the last second."""
+        self._counted.append((now, number))
+        while now - self._counted[0][0] > 1.0:
+            self._counted.popleft()
+        (begin, first), steps = self._counted[0], len(self._counted) - 1
+        if not steps or now <= begin:
+            return 0.0, 0.0
+        return steps / (now - begin), 1.0 - steps / (number - first)
+
+    def _measured(self, now: float, frame: CameraFrame) -> tuple[np.ndarray, np.ndarray]:
+        """The poses (B, 3) and (B, 4) of a frame, NaN where they are none."""
+        names = self._expected.names
+        positions = np.where(frame.tracked[:, None], frame.positions, np.nan)
+        finite = np.isfinite(positions).all(axis=1)
+        rotation = is_rotation(frame.quaternions)
+        self._drop(now, "finite", frame.tracked & ~finite, "a position that is not finite,")
+        self._drop(now, "rotation", frame.tracked & ~rotation, "a NaN, zero or unnormalised quaternion,")
+        positions[~(finite & rotation)] = np.nan
+        self._window.append(positions.copy())
+        crossed = self._crossed(positions)
+        if crossed or self._search == math.inf:
+            self._search = now + SEARCHES
+        if crossed or now - self._looked >= LOOKS:
+            self._looked = now
+            self._look(now)
+        gone = self._misplaced(now, positions).union(*self._dropped.values())
+        positions[[names.index(name) for name in gone]] = np.nan
+        quaternions = np.where(np.isfinite(positions[:, :1]), frame.quaternions, np.nan)
+        return positions, quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
+
+    def _drop(self, now: float, rule: str, flagged: np.ndarray, what: str) -> set[str]:
+        """Bodies (B,) that are flagged, to which a rule objects with what is the matter."""
+        bodies = [self._expected.names[body] for body in np.flatnonzero(flagged)]
+        self._object(now, rule, {name: f"{name!r}: found {what} expected measured poses" for name in bodies})
+        return set(bodies)
+
+    def _misplaced(self, now: float, positions: np.ndarray) -> set[str]:
+        """Names of bodies elsewhere."""
+        usual = self._expected.distances
+        if usual is None or len(usual) < 3:
+            return set()
+        places = self._expected.with_base(positions)
+        distances = np.linalg.norm(places[:, None] - places, axis=-1)
+        bodies = {
+            self._names[body]: text for body, text in misplaced(distances, usual, self._names, self._least).items()
+        }
+        swapped = self._dropped.get("swap", set())
+        self._object(now, "misplaced", {name: bodies[name] for name in bodies if name not in swapped})
+        return set(bodies) & set(self._expected.names)
+
+    def _crossed(self, positions: np.ndarray) -> bool:
+        """Whether a body (B, 3) m is nearer to where another was last than to where it was itself."""
+        apart = np.linalg.norm(positions[:, None] - self._places, axis=-1)
+        both = np.isfinite(np.diagonal(apart))
+        nearest = np.argmin(np.where(np.isfinite(apart), apart, np.inf), axis=1)
+        visible = np.isfinite(positions[:, 0])
+        self._places[visible] = positions[visible]
+        return bool(np.any(nearest[both] != np.flatnonzero(both)))
+
+    def _look(self, now: float) -> None:
+        """At the window, for what a single frame does not show."""
+        raw, expected = np.array(self._window), self._expected
+        steps = np.diff(raw, axis=0)
+        steps = steps[np.isfinite(steps)]
+        same = f"found the same poses of all bodies in {WINDOW} frames, to the last bit, expected noise"
+        self._object(now, "still", {STREAM: same} if len(raw) == WINDOW and steps.size and not steps.any() else {})
+        stale = stale_samples(raw)[-1]
+        self._dropped["stale"] = self._drop(now, "stale", stale, "poses that only repeat the one before,")
+        places = expected.with_base(raw)
+        if expected.distances is not None and now <= self._search:
+            swapped = np.zeros(places.shape[1], bool)
+            for swap in find_label_swaps(places[-SWAPPED:], expected.distances, expected.marked_base):
+                swapped[list(swap.bodies)] |= swap.frames[-1]
+            swapped = swapped[len(swapped) - len(expected.names) :]
+            others = " and ".join(repr(expected.names[body]) for body in np.flatnonzero(swapped))
+            self._dropped["swap"] = self._drop(now, "swap", swapped, f"the labels {others} taken for each other,")
+        for flagged, words in unmeasured(places, expected.marked_base, expected.distances):
+            flagged = flagged[-1, places.shape[1] - len(expected.names) :]
+            self._dropped[words] = self._drop(now, words, flagged, f"poses {words}")
