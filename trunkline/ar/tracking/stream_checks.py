@@ -10,8 +10,8 @@ positions are those by which `ingest` reads logs (`trunkline/recordings/cleaning
 - no rotation (`is_rotation`).
 
 Of the stream alone: silence, frames that do not count up or whose stamps do not, and frames that come later than they
-did at first. A stream that is late, or in which nothing but the stamps changes, from its first frame on, cannot be told
-by the first of these; the latter shows once a whole window of all bodies is the same.
+did at first: one that is late from its first frame on does not show. Where all bodies repeat from the first frame on,
+that shows after a whole window, WINDOW frames. Exchanged labels that appear within a gap may show late, or not at all.
 """
 
 import math
