@@ -5,6 +5,7 @@ from pathlib import Path
 import onnx
 import torch
 
+from trunkline.files import file_digest
 from trunkline.kinematics.dataset.samples import read_samples
 from trunkline.kinematics.ik.inputs import inputs_of
 from trunkline.kinematics.ik.learn import Learning, learn
@@ -20,10 +21,11 @@ from trunkline.recordings.trials.trial import read_trials
 from trunkline.report.figures.network import error_map_figure, learning_figure, tip_error_figure
 from trunkline.report.figures.style import save_figure
 from trunkline.settings import settings
+from trunkline.twin.discrepancy import FILE, read_lacking
 
 SAMPLES = Path("data/processed/fk_dataset/samples.parquet")
 TRIALS = Path("data/processed/filter")
-ARTIFACTS = Path("artifacts/train_ik")
+ARTIFACTS, LACKING = Path("artifacts/train_ik"), Path("artifacts") / FILE
 
 
 @settings
@@ -42,7 +44,8 @@ def main(config: Config) -> None:
         reach = load_rig("train_ik.rig", config.rig)
         rig = Rig(reach, conditions_of(read_trials(TRIALS, DECIDING)).pulls)
     inputs = inputs_of(table)
-    learned = learn(model, chain, table, config, rig)
+    lacking = read_lacking(LACKING, file_digest(Path(config.model)))
+    learned = learn(model, chain, table, config, rig, lacking and lacking.sure_pulls)
 
     with output_folder(ARTIFACTS) as folder:
         onnx.save(learned.exported, str(folder / "ik.onnx"))

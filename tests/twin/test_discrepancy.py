@@ -17,7 +17,7 @@ SCALES = np.array([[0.002, 0.01, 0.0612345678], [0.004, 0.02, 0.03]])
 
 
 def lacking(model: str) -> Lacking:
-    return Lacking(model, Discrepancy(SCALES, 16), 60.0, 10.0, 0.04, 0.05)
+    return Lacking(model, Discrepancy(SCALES, 16), 60.0, 10.0, 0.04, 0.05, 0.03)
 
 
 def test_the_package_has_it_as_the_artifacts_have(sources, tmp_path):  # noqa: F811

@@ -90,7 +90,7 @@ def test_a_vector_that_says_otherwise_is_named(program, plain_answered, tmp_path
     steps = document["sequences"][-1]["steps"] if name == "steps" else document["cases"]
     answers = [item["intent" if name == "steps" else "answer"] for item in reversed(steps)]
     if name == "network":
-        answers[0]["doubtful"] = not answers[0]["doubtful"]
+        answers[0]["unsure"] = not answers[0]["unsure"]
     else:
         assert any(moved_a_little(item) for item in answers)
     data = json.dumps(document).replace("NaN", "null").encode()

@@ -21,8 +21,9 @@ from trunkline.recordings.trials.conditions import PULLED
 
 FILE = Path("report/discrepancy.json")  # in a folder of artifacts
 UNITS = {"scales": ["m", "1", "1"], "tilt_deg": "deg", "pulled_tilt_deg": "deg", "pull": "m", "pulls": "m",
-         "load": "kg"}  # fmt: skip
+         "sure_pulls": "m", "load": "kg"}  # fmt: skip
 SAME_TILT = 1e-6  # deg, of rounding
+SURE = 0.01  # of the arm's length: a tip that may be further off is worth a warning
 DIGITS = 6  # of a scale; trials leave each open by far more
 
 
@@ -64,7 +65,8 @@ class Lacking:
     """What a model lacks, and what the trials that tell it went up to.
 
     model: SHA-256 of its file. tilt_deg: of the mount. pulled_tilt_deg: of the mount while a motor pulled. pull: of one
-    motor, m. pulls: of all motors together, m. load: at the tip, kg.
+    motor, m. pulls: of all motors together, m. sure_pulls: likewise, up to which the certificate has the tip within
+    `SURE` of the arm's length; 0 where none says so. load: at the tip, kg.
     """
 
     model: str
@@ -73,6 +75,7 @@ class Lacking:
     pulled_tilt_deg: float
     pull: float
     pulls: float
+    sure_pulls: float = 0.0
     load: float = 0.0  # held-out trials with a load tell nothing of the model alone
 
     def beyond(self, pulls: np.ndarray, tilt_deg: float) -> str:
@@ -90,7 +93,8 @@ class Lacking:
 
     def table(self) -> dict:
         """As JSON has it."""
-        bounds = {name: getattr(self, name) for name in ("tilt_deg", "pulled_tilt_deg", "pull", "pulls", "load")}
+        names = ("tilt_deg", "pulled_tilt_deg", "pull", "pulls", "sure_pulls", "load")
+        bounds = {name: getattr(self, name) for name in names}
         scales = [[float(f"{scale:.{DIGITS}g}") for scale in triple] for triple in self.discrepancy.scales.tolist()]
         return {"model": self.model, "trials": self.discrepancy.trials, "units": UNITS, "conditions": bounds,
                 "scales": scales}  # fmt: skip

@@ -38,10 +38,15 @@ def describe_network(data: bytes, file: str, tendons: list[str], source: str) ->
         outputs={value.name: _text(model, value.name, source) for value in model.graph.output},
         output_order=outputs,
         doubt_beyond=float(_text(model, "doubt_beyond_m", source)),
+        sure_pulls=_sure_pulls(model),
         operators=sorted({node.op_type for node in model.graph.node}),
     )
     external = any(uses_external_data(tensor) for tensor in model.graph.initializer)
     return block, lint_network(opset, external)
+
+
+def _sure_pulls(model: onnx.ModelProto) -> float | None:
+    return next((float(entry.value) for entry in model.metadata_props if entry.key == "sure_pulls_m"), None)
 
 
 def _names(model: onnx.ModelProto, key: str, source: str) -> list[str]:

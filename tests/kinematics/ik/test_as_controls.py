@@ -31,7 +31,8 @@ def exact(chain, wrong: str | None = None):
         answer = refine(chain, poses, first, steps=30)
         commands = answer.lengths if wrong else answer.commands
         tip, doubtful = position_of(poses), answer.steps < 0
-        return {"commands": commands, "lengths": answer.lengths, "tip": tip, "doubtful": doubtful}
+        return {"commands": commands, "lengths": answer.lengths, "tip": tip, "doubtful": doubtful,
+                "unsure": doubtful}  # fmt: skip
 
     return ask
 

@@ -8,7 +8,7 @@ import pytest
 from trunkline.errors import InputError
 from trunkline.kinematics.ik.inference import ask
 from trunkline.kinematics.ik.network import InverseKinematics
-from trunkline.kinematics.ik.onnx import to_onnx
+from trunkline.kinematics.ik.onnx import SurePulls, to_onnx
 
 POSE = np.array([[0.3, 0.1, 0.0, -0.4, 1.0, 0.0, 0.0, 0.0], [0.2, 0.1, 0.1, -0.3, 0.6, 0.0, -0.8, 0.0]])
 QUATERNION = slice(4, 8)
@@ -88,3 +88,13 @@ def test_a_tip_foreseen_far_from_its_target_is_doubted(network):
             near[:, 1:4] = ask(network, near)["tip"] + [0, 0, distance]
         np.testing.assert_array_equal(ask(network, near)["doubtful"], doubtful)
     assert np.isfinite(tip).all()
+
+
+@pytest.mark.parametrize(("most", "unsure"), [(-1e-4, True), (1e-4, False), (None, True)])
+def test_beyond_the_pulls_that_a_certificate_vouches_for_it_is_unsure_and_without_one_everywhere(model, most, unsure):
+    """Two motors pull by 5 and 7 mm; the third lets out, which makes up for nothing."""
+    commands = ask(session(model), POSE)["commands"].astype(float)[0]
+    straight = commands + [0.005, 0.007, -0.03]
+    network = InverseKinematics(8, POSE, np.tile(commands, (2, 1)), np.tile(commands, (2, 1)) + 0.01)
+    sure = None if most is None else SurePulls(straight, 0.012 + most)
+    assert ask(session(to_onnx(network, ["a", "b", "c"], 0.05, sure)), POSE)["unsure"].tolist() == [unsure] * len(POSE)

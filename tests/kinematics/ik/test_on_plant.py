@@ -84,7 +84,7 @@ def test_within_are_those_whose_pulls_add_up_to_no_more_than_the_session_s(model
     def ask(poses):
         commands = np.tile(chain.straight_lengths, (len(poses), 1))
         commands -= np.stack([sums[: len(poses)] / 2, sums[: len(poses)] / 2, np.full(len(poses), -0.05)], axis=1)
-        return {"commands": commands, "doubtful": np.zeros(len(poses), bool)}
+        return {"commands": commands, **dict.fromkeys(("doubtful", "unsure"), np.zeros(len(poses), bool))}
 
     result = score(model, chain, drawn, Shifted(model, chain), ask, pulls=sums[5] - 1e-10 + off)
     assert result["within"]["targets"] == min(of, len(drawn.targets))
@@ -120,3 +120,12 @@ def test_beyond_the_session_s_pulls_where_the_tip_comes_is_in_doubt(model, chain
     half = score(model, chain, drawn, Shifted(model, chain, 0.02 * chain.length), pulls=float(np.sort(pulls)[5]))
     assert (half["beyond_1pct"], half["beyond_1pct_unsaid"], half["doubted"]) == (12, 6, 0.5)
     assert half["within"]["beyond_1pct_unsaid"] == 6
+
+
+@pytest.mark.parametrize("warning", ["doubtful", "unsure"])
+def test_either_warning_of_the_network_s_counts(model, chain, drawn, warning):
+    def ask(poses):
+        return exact(chain)(poses) | {warning: np.arange(len(poses)) < 4}
+
+    far = score(model, chain, drawn, Shifted(model, chain, 0.02 * chain.length), ask, pulls=np.inf)
+    assert (far["beyond_1pct"], far["beyond_1pct_unsaid"]) == (12, 8)

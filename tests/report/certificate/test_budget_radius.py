@@ -13,7 +13,15 @@ from trunkline.recordings.trials.conditions import Conditions
 from trunkline.recordings.trials.splits import IDENTIFY, TEST, VALIDATE
 from trunkline.report.certificate import budget as budgets
 from trunkline.report.certificate.arms import arm_of
-from trunkline.report.certificate.budget import Inputs, UncertaintySource, budget, held_out, parameter_shifts, radius_of
+from trunkline.report.certificate.budget import (
+    Inputs,
+    UncertaintySource,
+    budget,
+    held_out,
+    parameter_shifts,
+    radius_of,
+    sure_pulls,
+)
 from trunkline.report.certificate.certificate import FEWEST, inputs_of
 from trunkline.report.certificate.facts import uncertainty_facts
 from trunkline.report.certificate.held_out import at_rest, tip_residuals
@@ -201,3 +209,16 @@ def test_what_is_open_is_said_for_one_reason_the_first(change, says):
     lines = open_lines({"parameters": {"mount_tilt_x": ROW | change}})
     assert len(lines) == (says is not None)
     assert says is None or f"mount_tilt_x {'is told ' if 'side' in says else ''}{says}" in lines[0]
+
+
+@pytest.mark.parametrize(
+    ("radius", "most"),
+    [([1, 1, 1, 1, 1, 1, 1, 1, 1, 1], 10), ([1, 1, 1, 1, 1, 1, 1, 1, 1, 9], 10), ([1, 1, 9, 1, 1, 1, 1, 1, 9, 9], 2),
+     ([9, 1, 1, 1, 1, 1, 1, 1, 1, 1], 10), ([9, 9, 1, 1, 1, 1, 1, 1, 1, 1], 0), ([np.inf] * 10, 0), ([], 0)],
+)  # fmt: skip
+def test_pulls_are_sure_as_far_as_nine_of_ten_poses_with_less_are_near_enough(radius, most):
+    """Poses of 1 to 10 mm of pull, in any order; 5 mm are near enough. Poses without pull say nothing of pulls."""
+    radius = np.array([*radius, *[1] * 50], float)
+    pulls = np.concatenate([1.0 + np.arange(len(radius) - 50), np.zeros(50)])
+    order = np.random.default_rng(0).permutation(len(radius))
+    assert sure_pulls(1e-3 * pulls[order], 1e-3 * radius[order], 5e-3) == pytest.approx(1e-3 * most)

@@ -66,6 +66,7 @@ internal sealed class More {
                                        out var again) && again.Tip == found.Tip, "the answer without an exception");
     var told = Json(found);
     told.Remove("doubtful");
+    told.Remove("unsure");
     told["pulls"] = Json(_shared.Kinematics.PullsOf(found));
     return told;
   }

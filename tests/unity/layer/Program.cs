@@ -354,6 +354,7 @@ internal static class Program {
                                (float)Number(asked["tolerance"]));
       var answer = Json(found);
       answer.Remove("doubtful");
+      answer.Remove("unsure");
       answer["pulls"] = Json(network.Kinematics.PullsOf(found));
       Compare("bend", Block(one)["answer"], answer);
     }

@@ -56,11 +56,11 @@ class Answers:
         return TARGETS.dump_python(targets, mode="json")
 
     def network(self, pose) -> Case:
-        """Its outputs, and whether they are to be doubted."""
+        """Its outputs, and the warnings with them."""
         outputs = {name: values[0] for name, values in ask(self._session, np.array([pose])).items()}
-        doubtful = bool(outputs.pop("doubtful"))
+        warnings = {name: bool(outputs.pop(name)) for name in ("doubtful", "unsure")}
         rounded = {name: np.round(values.astype(float), DIGITS).tolist() for name, values in outputs.items()}
-        return rounded | {"doubtful": doubtful}
+        return rounded | warnings
 
     @property
     def inputs(self) -> int:

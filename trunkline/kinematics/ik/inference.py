@@ -15,7 +15,9 @@ def ask(runtime: onnxruntime.InferenceSession, poses: np.ndarray) -> dict[str, n
     """What the network of `train_ik` answers, by the name of the output.
 
     "commands" and "lengths" (N, K) and "tip" (N, 3) as in `network.Answer`, m, and "doubtful" (N,): whether the tip is
-    foreseen so far from its target that the arm cannot take the pose.
+    foreseen so far from its target that the arm cannot take the pose. "unsure" (N,): whether the motors pull by more in
+    all than up to where the certificate has the arm's tip within 1 % of its length from there; true where the file has
+    no such limit.
 
     Args:
         poses: gravity (angle in rad, or a unit vector), tip position (m) and unit quaternion (w first, either sign) in
@@ -37,7 +39,14 @@ def ask(runtime: onnxruntime.InferenceSession, poses: np.ndarray) -> dict[str, n
         if len(bad):
             raise InputError(f"pose {bad[0]}: found {name} {values[bad[0]]}, expected finite numbers")
     missed = np.linalg.norm(answers["tip"] - position_of(inputs[taken.name]), axis=1)
-    return answers | {"doubtful": missed > float(meaning["doubt_beyond_m"])}
+    return answers | {"doubtful": missed > float(meaning["doubt_beyond_m"]), "unsure": _unsure(answers, meaning)}
+
+
+def _unsure(answers: dict[str, np.ndarray], meaning: dict[str, str]) -> np.ndarray:
+    if "sure_pulls_m" not in meaning:
+        return np.ones(len(answers["commands"]), bool)
+    pulls = np.array(json.loads(meaning["straight_lengths_m"])) - answers["commands"]
+    return np.maximum(pulls, 0).sum(axis=1) > float(meaning["sure_pulls_m"])
 
 
 def checked(poses: np.ndarray, inputs: list[str]) -> np.ndarray:

@@ -22,7 +22,7 @@ from trunkline.kinematics.ik.inference import ask
 from trunkline.kinematics.ik.inputs import draw_gravity, gravity_columns, inputs_of, position_of
 from trunkline.kinematics.ik.network import OUTPUTS, InverseKinematics
 from trunkline.kinematics.ik.on_plant import Rig, score_on_plant
-from trunkline.kinematics.ik.onnx import to_onnx
+from trunkline.kinematics.ik.onnx import SurePulls, to_onnx
 from trunkline.kinematics.ik.refine import refine
 from trunkline.kinematics.ik.score import (
     TipErrors,
@@ -101,12 +101,14 @@ class Learned:
 
 
 def learn(
-    model: mujoco.MjModel, chain: Chain, table: pd.DataFrame, learning: Learning, rig: Rig | None = None
-) -> Learned:
+    model: mujoco.MjModel, chain: Chain, table: pd.DataFrame, learning: Learning, rig: Rig | None = None,
+    sure_pulls: float | None = None,
+) -> Learned:  # fmt: skip
     """Train on the samples of `table` that are not held out, and score on those that are and on others.
 
     Args:
-        model: whose `chain` it is. rig: what drives the arm itself.
+        model: whose `chain` it is. rig: what drives the arm itself. sure_pulls: as `Lacking` has it, m; None where no
+            certificate was made.
     """
     network, curve = fit(table, chain, learning)
     columns = inputs_of(table)
@@ -116,7 +118,8 @@ def learn(
     deepest = chain.straight_lengths - sent_before.min(axis=0)
     between = unseen_targets(chain, sampled, learning.unseen, learning.seed, deepest)
     doubtful = doubt_beyond(network, held_out[columns].to_numpy(), chain.length)
-    exported = to_onnx(network, [model.tendon(t).name for t in range(chain.tendons)], doubtful)
+    sure = None if sure_pulls is None else SurePulls(chain.straight_lengths, sure_pulls)
+    exported = to_onnx(network, [model.tendon(t).name for t in range(chain.tendons)], doubtful, sure)
     runtime = onnxruntime.InferenceSession(exported.SerializeToString(), providers=["CPUExecutionProvider"])
     errors, difference, answers = {}, 0.0, {}
     for name, targets in (("held out", held_out), ("unseen angles", between)):

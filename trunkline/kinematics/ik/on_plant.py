@@ -75,7 +75,7 @@ def _score(chain: Chain, ask: Ask, targets: np.ndarray, reach, most: float) -> d
     end.rested = np.isfinite(tips).all(axis=1)
     across = across_surface(chain, answer["commands"], gravity_of(targets), tips - position_of(targets))
     within = np.maximum(pulls, 0).sum(axis=1) <= most
-    end.doubtful = end.doubtful | ~within
+    end.doubtful = end.doubtful | answer["unsure"] | ~within
     summary = _summary(end, across, chain.length)
     return summary | {"within": _summary(end[within], across[within], chain.length) if within.any() else {"targets": 0}}
 

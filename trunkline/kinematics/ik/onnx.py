@@ -1,6 +1,7 @@
 """The network as one ONNX file of opset 15, with what its inputs and outputs mean written in it."""
 
 import json
+from dataclasses import dataclass
 
 import numpy as np
 import onnx
@@ -20,12 +21,26 @@ GRAVITY = {
 }
 
 
-def to_onnx(network: InverseKinematics, tendons: list[str], doubt_beyond: float) -> onnx.ModelProto:
+@dataclass(frozen=True)
+class SurePulls:
+    """Up to which the certificate has the arm's tip near its twin's.
+
+    straight_lengths: of each tendon, the arm straight, m. Shape (K,). most: sum of what all motors draw in, m.
+    """
+
+    straight_lengths: np.ndarray
+    most: float
+
+
+def to_onnx(
+    network: InverseKinematics, tendons: list[str], doubt_beyond: float, sure: SurePulls | None = None
+) -> onnx.ModelProto:
     """A model from `pose` (N, 7, 8 or 10) to `commands` (N, K), `lengths` (N, K) and `tip` (N, 3), float32.
 
     Args:
         tendons: names, in the order of the columns of commands and lengths.
         doubt_beyond: m; a foreseen tip further than this from its target is a reason to doubt. Only written down.
+        sure: also only written down; None where no certificate says it.
     """
     nodes, constants = [], []
 
@@ -95,13 +110,21 @@ def to_onnx(network: InverseKinematics, tendons: list[str], doubt_beyond: float)
     graph = helper.make_graph(nodes, "inverse_kinematics", [pose], outputs, constants)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
     model.producer_name = "trunkline"
-    helper.set_model_props(model, _meaning(network, tendons, doubt_beyond))
+    helper.set_model_props(model, _meaning(network, tendons, doubt_beyond) | _surety(sure))
     onnx.checker.check_model(model, full_check=True)
     return model
 
 
 def _inputs(network: InverseKinematics) -> list[str]:
     return next(inputs for inputs in (POSE, TILT, DIRECTION) if len(inputs) == network.inputs)
+
+
+def _surety(sure: SurePulls | None) -> dict[str, str]:
+    """Metadata."""
+    if sure is None:
+        return {}
+    straight = json.dumps([round(float(length), 9) for length in sure.straight_lengths])
+    return {"straight_lengths_m": straight, "sure_pulls_m": f"{sure.most:.6g}"}
 
 
 def _meaning(network: InverseKinematics, tendons: list[str], doubt_beyond: float) -> dict[str, str]:

@@ -20,6 +20,7 @@ from trunkline.twin.discrepancy import Discrepancy
 from trunkline.twin.posterior import Posterior
 
 COVERAGE = 0.95
+SURE_SHARE = 0.9  # of the poses with no more pull
 FRICTION, LACKING, NOISE = "friction", "what the model lacks", "cameras"
 LEAST = 1e-7  # m, below which an input moves no tip
 
@@ -150,6 +151,19 @@ def budget(inputs: Inputs, poses: StaticPoses, arms: int, each: int, rng: np.ran
     sources.append(UncertaintySource(NOISE, "normal, of each coordinate", inputs.noise * 1e3, "mm", np.inf, every))
     both = np.einsum("ink,jnk,ij->n", moves, moves, parameters.correlation - np.eye(len(parameters.names)))
     return Budget(tips, sources, both, radius_of(offsets))
+
+
+def sure_pulls(pulls: np.ndarray, radius: np.ndarray, most: float) -> float:
+    """The largest sum of pulls, m, up to which the tip is within `most`, m, in `SURE_SHARE` of the poses with a pull.
+
+    Args:
+        pulls: of all motors together, m. Shape (N,). radius: as `Budget.radius`. Shape (N,).
+    """
+    pulled = pulls > 0
+    pulls, near = pulls[pulled], radius[pulled] <= most
+    order = np.argsort(pulls)
+    share = np.cumsum(near[order]) / np.arange(1, len(pulls) + 1)
+    return float(pulls[order][share >= SURE_SHARE].max(initial=0.0))
 
 
 def radius_of(offsets: np.ndarray) -> np.ndarray:

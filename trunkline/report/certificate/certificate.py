@@ -20,7 +20,7 @@ from trunkline.recordings.trials.inventory import missing_lines, recorded_of_eac
 from trunkline.recordings.trials.splits import DECIDING, VALIDATE
 from trunkline.recordings.trials.trial import Trial, sessions_of
 from trunkline.report.certificate.arms import arm_of
-from trunkline.report.certificate.budget import Budget, Inputs, budget, held_out
+from trunkline.report.certificate.budget import Budget, Inputs, budget, held_out, sure_pulls
 from trunkline.report.certificate.coverage import Bring, covered
 from trunkline.report.certificate.facts import error_rows, parameter_facts, uncertainty_facts
 from trunkline.report.certificate.held_out import at_rest, tip_residuals
@@ -28,7 +28,7 @@ from trunkline.report.certificate.poses import draw_poses, posed
 from trunkline.report.certificate.replays import packed
 from trunkline.report.certificate.words import Use, limits_of, next_step, verdict
 from trunkline.settings import Seed
-from trunkline.twin.discrepancy import Lacking
+from trunkline.twin.discrepancy import SURE, Lacking
 from trunkline.twin.twin import Twin
 from trunkline.version import __version__
 
@@ -129,7 +129,12 @@ def certify(
     if uncertainty["measured"]:
         numbers["coverage"] = uncertainty["measured"]
     replays = packed(prediction, model, trials[0].markers)
-    lacking = Lacking(twin.provenance.digest, inputs.lacking, **vars(conditions)) if inputs.lacking else None
+    lacking = None
+    if inputs.lacking:
+        pulls = np.maximum(arm_of(model).chain.straight_lengths - poses.commands, 0).sum(axis=1)
+        sure = sure_pulls(pulls, tip_budget.radius, SURE * length)
+        uncertainty["sure_pulls_mm"] = 1e3 * sure
+        lacking = Lacking(twin.provenance.digest, inputs.lacking, **vars(conditions), sure_pulls=sure)
     return Certificate(facts, numbers, replays, held_out_shapes(prediction), tip_budget, lacking)
 
 

@@ -169,6 +169,8 @@ def _uncertainty(facts: dict, pictures: dict[str, bytes]) -> str:
             f"{constant:.2g} mm everywhere, {shares['of_what_gravity_moves']:.2g} % of how far gravity moves the tip "
             f"and {shares['of_what_cables_move']:.2g} % of how far the cables do, root mean squares."
         )
+        if sure := uncertainty["sure_pulls_mm"]:
+            lacking += f" Where motors pull by {sure:.0f} mm in all or less, the tip is within 1 % of the length."
     mounted = ""
     if session := uncertainty.get("mounted_as_in"):
         mounted = f" It is of the arm as it was mounted in the session {escape(session)}."

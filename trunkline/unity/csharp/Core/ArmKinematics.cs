@@ -18,8 +18,9 @@ public interface INetwork {
 }
 
 /// <summary>What the network answers of one pose: the motors' commands and the tendons' path lengths, m, in the order
-/// of network.output_order, where the tip will come to rest, m, base frame, and whether that is so far from its target
-/// that the arm cannot take the pose.</summary>
+/// of network.output_order, where the tip will come to rest, m, base frame, whether that is so far from its target
+/// that the arm cannot take the pose, and whether the motors pull so far that the arm's tip may be further from there than 1 %
+/// of its length.</summary>
 public sealed class Answer {
   /// <summary>m, one a tendon. They are no pulls: <see cref="ArmKinematics.PullsOf"/> makes these of them.</summary>
   public readonly double[] Commands;
@@ -29,13 +30,16 @@ public sealed class Answer {
   public readonly Vector Tip;
   /// <summary>The tip is further from its target than the manifest's network.doubt_beyond.</summary>
   public readonly bool Doubtful;
+  /// <summary>The motors pull by more in all than the manifest's network.sure_pulls.</summary>
+  public readonly bool Unsure;
 
   /// <summary>As the fields of the same names.</summary>
-  public Answer(double[] commands, double[] lengths, Vector tip, bool doubtful) {
+  public Answer(double[] commands, double[] lengths, Vector tip, bool doubtful, bool unsure) {
     Commands = commands;
     Lengths = lengths;
     Tip = tip;
     Doubtful = doubtful;
+    Unsure = unsure;
   }
 }
 
@@ -51,6 +55,7 @@ public sealed class ArmKinematics {
   private readonly IReadOnlyList<double> _restLengths;
   private readonly int _tendons;
   private readonly double _doubtBeyond;
+  private readonly double _surePulls;
   private double[][] _poses;  // of Bend, filled anew at each
 
   /// <param name="network">Runs the package's file.</param>
@@ -58,9 +63,10 @@ public sealed class ArmKinematics {
   /// <param name="tendons">Names of the columns of commands and lengths: network.output_order.</param>
   /// <param name="restLengths">m, of each of them, the arm straight: model.rest_lengths.</param>
   /// <param name="doubtBeyond">m: network.doubt_beyond.</param>
+  /// <param name="surePulls">m: network.sure_pulls; NaN where the manifest has none.</param>
   /// <exception cref="InputError">The network is of other inputs or outputs.</exception>
   public ArmKinematics(INetwork network, IReadOnlyList<string> inputs, IReadOnlyList<string> tendons,
-                       IReadOnlyList<double> restLengths, double doubtBeyond) {
+                       IReadOnlyList<double> restLengths, double doubtBeyond, double surePulls) {
     var outputs = network.Outputs;
     int count = tendons.Count;
     bool known = outputs.Count == 3 && outputs[0] == count && outputs[1] == count && outputs[2] == 3;
@@ -74,6 +80,7 @@ public sealed class ArmKinematics {
     _restLengths = restLengths;
     _tendons = count;
     _doubtBeyond = doubtBeyond;
+    _surePulls = surePulls;
   }
 
   /// <summary>What the network answers of one pose: gravity (angle in rad, or a unit vector), tip position (m) and unit
@@ -182,7 +189,8 @@ public sealed class ArmKinematics {
     var found = Asked(new Vector(cos * tip.X + sin * tip.Y, -sin * tip.X + cos * tip.Y, tip.Z), angle);
     var there = new Vector(cos * found.Tip.X - sin * found.Tip.Y, sin * found.Tip.X + cos * found.Tip.Y, found.Tip.Z);
     // A tendon that stands where another one did does what that one did.
-    return new Answer(Rolled(found.Commands, turns), Rolled(found.Lengths, turns), there, found.Doubtful);
+    return new Answer(Rolled(found.Commands, turns), Rolled(found.Lengths, turns), there, found.Doubtful,
+                      found.Unsure);
   }
 
   // What the network gave: rows of numbers, one after the other, and the poses that it was asked for.
@@ -205,7 +213,12 @@ public sealed class ArmKinematics {
     var tip = outputs.Tip(row);
     int at = (row + 1) * _inputs.Count - 7;
     double missed = Distance(tip, new Vector(outputs.Asked[at], outputs.Asked[at + 1], outputs.Asked[at + 2]));
-    return new Answer(Row(outputs.Commands, row), Row(outputs.Lengths, row), tip, missed > _doubtBeyond);
+    var commands = Row(outputs.Commands, row);
+    double pulls = 0;
+    for (int tendon = 0; tendon < _tendons; tendon++) {
+      pulls += Math.Max(_restLengths[tendon] - commands[tendon], 0);
+    }
+    return new Answer(commands, Row(outputs.Lengths, row), tip, missed > _doubtBeyond, !(pulls <= _surePulls));
   }
 
   private static double[] Rolled(double[] values, int turns) {

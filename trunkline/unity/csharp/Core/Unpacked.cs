@@ -97,7 +97,8 @@ public static class Unpacked {
     JsonBlock block = manifest.Block("network"), lengths = manifest.Block("model").Block("rest_lengths");
     var tendons = block.Texts("output_order");
     var rest = Array.ConvertAll(tendons, lengths.Number);
-    return new ArmKinematics(network, block.Texts("input_order"), tendons, rest, block.Number("doubt_beyond"));
+    double sure = block.Has("sure_pulls") ? block.Number("sure_pulls") : double.NaN;
+    return new ArmKinematics(network, block.Texts("input_order"), tendons, rest, block.Number("doubt_beyond"), sure);
   }
 
   private static bool Same(double[] one, double[] other) {

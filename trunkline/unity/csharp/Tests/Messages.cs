@@ -130,7 +130,7 @@ internal static class Messages {
 
   public static Dictionary<string, object> Json(Answer answer) => new Dictionary<string, object> {
     ["commands"] = Json(answer.Commands), ["lengths"] = Json(answer.Lengths), ["tip"] = Json(answer.Tip),
-    ["doubtful"] = answer.Doubtful,
+    ["doubtful"] = answer.Doubtful, ["unsure"] = answer.Unsure,
   };
 
   public static Dictionary<string, object> Json(Wrist wrist) => new Dictionary<string, object> {
