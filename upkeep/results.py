@@ -28,7 +28,8 @@ FOLDER = Path("docs/results")
 COMMANDS = ("studies", "benchmarks", "qualification")  # rooms whose commands keep results
 RECORDED = re.compile(r"\b(?:recorded|qualify|Rows)\(\"(\w+)\"")
 # the commit of each tag, as a tag may not travel with a clone
-ARCHIVES = {"results-1": "f922469a", "results-2": "3a340d6b", "results-3": "c0c74707", "results-4": "4b65c18e"}
+ARCHIVES = {"results-1": "f922469a", "results-2": "3a340d6b", "results-3": "c0c74707", "results-4": "4b65c18e",
+            "results-5": "0860a52f"}  # fmt: skip
 
 
 class Both(io.TextIOBase):
