@@ -24,8 +24,8 @@ from demo.plants.stranger import Stranger
 from demo.rig import ROOT as LAB
 from demo.rig import Config as Lab
 from rehearsal.operator.hands import as_hands_move
-from rehearsal.robot.scene import Scene, SceneObject
-from rehearsal.robot.stand_in import SUBSTEPS, StandIn, StandInRobot, Truth
+from rehearsal.robot.scene import LabScene, SceneObject
+from rehearsal.robot.stand_in import SUBSTEPS, StandIn, StandInRobot, TrueState
 from trunkline.ar.hybrid.worlds import SupportSurface
 from trunkline.frames import wxyz_from_rotation
 from trunkline.kinematics.panda.kinematics import Q_MAX, Q_MIN, mount_pose
@@ -111,7 +111,7 @@ class GraspTrial:
         self.lift = joints_for(MOUNT + [0, 0, LIFT], rotation, offset, self.grasp)
         self.aside = joints_for(MOUNT - [0, ASIDE, 0], rotation, offset, self.grasp)
         shape = (placement.shape, placement.diameter, placement.height, placement.mass)
-        far = Scene(None, SceneObject(*shape, [5.0, 5.0, 5.0]), {})
+        far = LabScene(None, SceneObject(*shape, [5.0, 5.0, 5.0]), {})
         centres, _ = StandInRobot(arm, far, settings, self.grasp, seed, LOOSENED).links()
         unit = int(np.searchsorted(np.cumsum(arm.chain.lengths), arm.chain.length - placement.beyond))
         side = rotation[:, 0] * [1, 1, 0] / np.linalg.norm(rotation[:2, 0])
@@ -120,7 +120,7 @@ class GraspTrial:
             turn = Rotation.from_rotvec(np.pi / 2 * side)  # its axis level, across the bending plane
             object = SceneObject(*shape, middle.tolist(), wxyz_from_rotation(turn).tolist(), True)
             hook = middle + [0, 0, placement.diameter / 2 + STRING]
-            self.scene = Scene(FLOOR, object, {}, hook.tolist())
+            self.scene = LabScene(FLOOR, object, {}, hook.tolist())
         else:
             object = SceneObject(*shape, [0.0, 0.0, 0.0])
             place = middle - object.grip
@@ -129,9 +129,9 @@ class GraspTrial:
             object.position = place.tolist()
             top = place - [0, 0, object.half_height]
             table = SupportSurface(top.tolist(), TABLES[placement.shape], "wood")
-            self.scene = Scene(FLOOR, object, {"table": table})
+            self.scene = LabScene(FLOOR, object, {"table": table})
         self.robot = StandInRobot(arm, self.scene, settings, self.aside, seed, LOOSENED, substeps)
-        self.pictures: list[tuple[str, np.ndarray, Truth]] = []
+        self.pictures: list[tuple[str, np.ndarray, TrueState]] = []
 
     def go(self, duration: float, start: np.ndarray, end: np.ndarray, pulls: tuple[np.ndarray, np.ndarray]) -> None:
         for n in range(round(duration / TIME_STEP)):

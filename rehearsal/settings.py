@@ -7,7 +7,7 @@ from typing import Annotated, Literal, TypeVar
 from omegaconf import OmegaConf
 from pydantic import Field
 
-from rehearsal.operator.hands import Person
+from rehearsal.operator.hands import HumanOperator
 from rehearsal.robot.stand_in import StandIn
 from trunkline.ar.preview.settings import Previewing
 from trunkline.pipeline.config import validated
@@ -85,8 +85,8 @@ def stand_in() -> StandIn:
     return _read(StandIn, "robot/stand_in.yaml")
 
 
-def person() -> Person:
-    return _read(Person, "operator/typical.yaml")
+def person() -> HumanOperator:
+    return _read(HumanOperator, "operator/typical.yaml")
 
 
 def free() -> Free:

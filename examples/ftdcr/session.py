@@ -28,7 +28,7 @@ VALIDATED = 6  # every so many-th pattern of train.csv is of the split validate,
 MARGIN = 0.1  # s around a pattern, less than the time between poses
 
 
-class Pose(NamedTuple):
+class SettledPose(NamedTuple):
     """A settled pose. time: s. pulls: mm of each motor. tip: mm in the robot's base frame, z along the straight arm."""
 
     time: float
@@ -37,7 +37,7 @@ class Pose(NamedTuple):
     tip: tuple[float, ...]
 
 
-def read_csv(path: Path) -> list[Pose]:
+def read_csv(path: Path) -> list[SettledPose]:
     """Raises InputError naming the row that is not as expected."""
     try:
         with open(path, encoding="utf-8", newline="") as file:
@@ -57,11 +57,11 @@ def read_csv(path: Path) -> list[Pose]:
         except ValueError as error:
             raise InputError(f"{path}: row {number}: {error}, expected numbers") from error
         pattern = pattern.removeprefix("rep1_").removesuffix("_hold")
-        poses.append(Pose(time, pattern, tuple(values[: len(MOTORS)]), tuple(values[len(MOTORS) :])))
+        poses.append(SettledPose(time, pattern, tuple(values[: len(MOTORS)]), tuple(values[len(MOTORS) :])))
     return poses
 
 
-def write_log(path: Path, poses: list[Pose]) -> None:
+def write_log(path: Path, poses: list[SettledPose]) -> None:
     """Tip and motors as ROS 2 messages, at the times of the CSV."""
     with open(path, "wb") as file, Writer(file) as writer:
         markers = writer.register_msgdef("mocap4r2_msgs/msg/Markers", MARKERS)
@@ -78,7 +78,7 @@ def write_log(path: Path, poses: list[Pose]) -> None:
             writer.write_message("/motor_commands", joints, wound, stamp, stamp, number)
 
 
-def trials_of(file: str, poses: list[Pose], split: str) -> list[dict]:
+def trials_of(file: str, poses: list[SettledPose], split: str) -> list[dict]:
     """An entry of session.yaml for each pattern."""
     entries = []
     for number, (pattern, group) in enumerate(groupby(poses, key=lambda pose: pose.pattern)):

@@ -12,10 +12,10 @@ from demo.rig import ROOT as LAB
 from demo.rig import Config as Lab
 from rehearsal import settings
 from rehearsal.experiments.result import Result
-from rehearsal.operator.hands import Person, RayHand
+from rehearsal.operator.hands import HumanOperator, RayHand
 from rehearsal.operator.scripts import Ending, Operator, Script, offset_of
-from rehearsal.robot.scene import Scene, SceneObject
-from rehearsal.robot.stand_in import StandIn, StandInRobot, Truth
+from rehearsal.robot.scene import LabScene, SceneObject
+from rehearsal.robot.stand_in import StandIn, StandInRobot, TrueState
 from rehearsal.session import REFERENCE, Place, RehearsedSession, View
 from rehearsal.settings import Free
 from rehearsal.settings import previewing as read_previewing
@@ -49,7 +49,7 @@ class SharedRun:
     config: TeleoperationConfig
     arm: Stranger
     stand_in: StandIn
-    person: Person
+    person: HumanOperator
     settings: Free
     judged: bool = True
     world_model: RobotModel | None = None
@@ -86,7 +86,7 @@ class SharedRun:
         where = far if object_center is None else object_center.tolist()
         hook = None if object_center is None else [where[0], where[1], where[2] + s.diameter / 2 + s.string]
         hung = SceneObject("sphere", s.diameter, s.diameter, s.mass, where, hanging=object_center is not None)
-        robot = StandInRobot(self.arm, Scene(FLOOR, hung, {}, hook), self.stand_in, ready, seed)
+        robot = StandInRobot(self.arm, LabScene(FLOOR, hung, {}, hook), self.stand_in, ready, seed)
         world = World("floor", (FLOOR_OBSTACLE,))
         hands = operator.left, operator.right
         return RehearsedSession(self.package, self.config, robot, hands, world, place, self.foresight, self.judged)
@@ -117,7 +117,7 @@ class SessionFrame:
 
     now: float
     mode: str
-    truth: Truth
+    truth: TrueState
     object: np.ndarray
     joints: np.ndarray
     commands: np.ndarray

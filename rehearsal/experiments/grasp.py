@@ -13,7 +13,7 @@ from rehearsal import settings
 from rehearsal.experiments.bench import FLOOR, FLOOR_OBSTACLE, START, SessionFrame, SharedRun, Staged, executed
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending, Operator
-from rehearsal.robot.scene import Scene, SceneObject
+from rehearsal.robot.scene import LabScene, SceneObject
 from rehearsal.robot.stand_in import StandInRobot
 from rehearsal.session import RehearsedSession
 from trunkline.ar.hybrid.grasps import object_in_base
@@ -92,7 +92,7 @@ def session_of(
     ready, object = RigidIK(bench.config.mount_offset).solve(START, (x, y, z), DOWN, 0.0), placed.object
     hook = [object.position[0], object.position[1], object.position[2] + object.diameter / 2 + s.string]
     surfaces = {name: board for name, board in ((TABLE, table), (STAND, placed.stands)) if board is not None}
-    scene = Scene(FLOOR, object, surfaces, None if placed.stands else hook)
+    scene = LabScene(FLOOR, object, surfaces, None if placed.stands else hook)
     robot = StandInRobot(bench.arm, scene, bench.stand_in, ready, seed)
     obstacles = (FLOOR_OBSTACLE, *(obstacle_of(name, board) for name, board in surfaces.items()))
     readings = robot.readings()

@@ -7,7 +7,7 @@ from rehearsal.experiments.bench import SessionFrame, SharedRun, Staged, execute
 from rehearsal.experiments.grasp import NAME, TABLE, beside, failure, offered, session_of, tell
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending
-from rehearsal.robot.scene import Scene
+from rehearsal.robot.scene import LabScene
 from rehearsal.session import View
 from trunkline.ar.hybrid.worlds import SupportSurface
 from trunkline.ar.teleop.object_shapes import below_grip
@@ -44,7 +44,7 @@ def handle(bench: SharedRun, seed: int) -> Staged:
     return Staged("handle", seed, session, script, judge, placed.name)
 
 
-def why_not(ending: Ending, frames: list[SessionFrame], scene: Scene, s: settings.Grasped) -> str:
+def why_not(ending: Ending, frames: list[SessionFrame], scene: LabScene, s: settings.Grasped) -> str:
     """Why the object does not rest on the table, "" if it does. The first of these that is so:
 
     1. The operator gave up, the robot did not do what was confirmed, or no plan was run to its end: as of a grasp.

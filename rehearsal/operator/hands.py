@@ -19,7 +19,7 @@ Zero = Annotated[float, Field(ge=0, le=100)]
 
 
 @dataclass
-class Person:
+class HumanOperator:
     """What the operator's hands and eyes are like: see conf/rehearse/operator/typical.yaml."""
 
     tremor_g: Zero
@@ -47,7 +47,7 @@ class RayHand:
     """A hand at `origin` (3,), m, of the reference frame. What it aims at is in the base frame, m."""
 
     def __init__(
-        self, origin: np.ndarray, alignment: Pose, person: Person, dead_zone: float, rng: np.random.Generator
+        self, origin: np.ndarray, alignment: Pose, person: HumanOperator, dead_zone: float, rng: np.random.Generator
     ) -> None:
         self.origin, self.person, self.rng, self.dead_zone = origin, person, rng, dead_zone
         self.turn = rotation_from_wxyz(np.array(alignment.quaternion))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rehearsal.operator.hands import Person, RayHand
+from rehearsal.operator.hands import HumanOperator, RayHand
 from rehearsal.session import View
 from trunkline.ar.teleop.reach import MapReach
 from trunkline.ar.teleop.vectors import DOWN
@@ -65,7 +65,7 @@ class Operator:
 
     def __init__(
         self,
-        person: Person,
+        person: HumanOperator,
         hands: tuple[RayHand, RayHand],
         offset: np.ndarray,
         radius: float,

@@ -37,7 +37,7 @@ class SceneObject(ObjectShape):
 
 
 @dataclass
-class Scene:
+class LabScene:
     """floor: its height, m, or null. hook: its end, m, or null."""
 
     floor: Metres | None

@@ -16,7 +16,7 @@ from demo.plants.stranger_kernel import LinkState, come_to_rest, work_for
 from rehearsal.robot.flange import Mount, Servos, carry
 from rehearsal.robot.kernel import COLUMNS, OBJECT, TIP, TIP_AXES, look, run
 from rehearsal.robot.rigid_object import rotation
-from rehearsal.robot.scene import Scene, String, make_rigid_object
+from rehearsal.robot.scene import LabScene, String, make_rigid_object
 from rehearsal.robot.sensors import Instruments, Readings, Sensors
 from rehearsal.robot.shapes import nearest
 from rehearsal.robot.touch_settings import Touch, make_touch
@@ -59,13 +59,13 @@ class StandIn:
 
 
 @dataclass
-class Truth:
+class TrueState:
     """What is so at this moment, for scoring alone; Panda's base frame.
 
     tip (3,), object (3,), grip (3,): m; of the object, its centre of mass and the middle of what the arm wraps of it.
     tip_axes (3, 3), quaternion (4,): of the tip and of the object. speed (3,): m/s, its own.
     arm_object (U, 3), arm_world (U, W, 3), object_world (W, 3): forces on the first of the two, N; W in the order of
-    `Scene.names`. hanging: whether the object's string is on the hook.
+    `LabScene.names`. hanging: whether the object's string is on the hook.
     """
 
     time: float
@@ -92,7 +92,7 @@ class StandInRobot:
     """
 
     def __init__(
-        self, arm: Stranger, scene: Scene, settings: StandIn, ready: np.ndarray, seed: int,
+        self, arm: Stranger, scene: LabScene, settings: StandIn, ready: np.ndarray, seed: int,
         wound: np.ndarray | None = None, substeps: int = SUBSTEPS,
     ) -> None:  # fmt: skip
         rough, measuring = np.random.default_rng(seed).spawn(2)
@@ -163,12 +163,12 @@ class StandInRobot:
             self.rows[-1 - joints], self.rows[-1 - poses], self.time - joints * TICK, self.time - poses * TICK
         )
 
-    def truth(self) -> Truth:
+    def truth(self) -> TrueState:
         """What is so."""
         row, c = self.rows[-1], self.contacts
         object, quaternion = row[OBJECT][:3].copy(), row[OBJECT][3:].copy()
         grip = object + np.array(rotation(quaternion)) @ self.scene.object.grip
-        return Truth(
+        return TrueState(
             time=self.time, joints=self.joints[0].copy(), tip=row[TIP].copy(),
             tip_axes=row[TIP_AXES].reshape(3, 3).copy(), object=object, grip=grip, quaternion=quaternion,
             speed=self.motion.speed.copy(),

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from demo.plants.stranger_kernel import Links
 from rehearsal.robot.rigid_object import RigidObject
-from rehearsal.robot.scene import Friction, Scene
+from rehearsal.robot.scene import Friction, LabScene
 from rehearsal.robot.touching import Contacts, ContactWorld, Discs
 from trunkline.model.arm.geometry import ChainGeometry
 
@@ -47,7 +47,7 @@ class Touch:
 
 
 def make_touch(
-    chain: ChainGeometry, links: Links, scene: Scene, object: RigidObject, touch: Touch, rng: np.random.Generator
+    chain: ChainGeometry, links: Links, scene: LabScene, object: RigidObject, touch: Touch, rng: np.random.Generator
 ) -> tuple[Discs, ContactWorld, Contacts]:
     """Discs, world and empty contacts; `rng` draws the friction, always as many numbers of it for the same scene.
 

@@ -12,7 +12,7 @@ from rehearsal.experiments.handle import BORNE, STILL, why_not
 from rehearsal.experiments.result import Result
 from rehearsal.first_grasp import LIFT, SLIP, holds
 from rehearsal.operator.scripts import Ending
-from rehearsal.robot.scene import Scene, SceneObject
+from rehearsal.robot.scene import LabScene, SceneObject
 from tests.rehearsal.frames import FORCE, UNITS, frame
 from trunkline.ar.hybrid.worlds import SupportSurface
 from trunkline.frames import STANDARD_GRAVITY
@@ -145,7 +145,7 @@ def test_a_grasp_is_over_in_the_first_frame_after_the_first_execution(modes, fir
 
 
 MASS = 0.2
-SCENE = Scene(
+SCENE = LabScene(
     -0.75,
     SceneObject("cylinder", 0.05, 0.1, MASS, [0.5, 0.0, 0.5], hanging=True),
     {TABLE: SupportSurface([1.0, 0.0, -0.1], [0.5, 0.5, 0.03], "wood")},

@@ -6,7 +6,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from rehearsal.robot.rigid_object import Motion, RigidObject, move_object, pull_string, rotation, spin_of
-from rehearsal.robot.scene import Scene, SceneObject, String, make_rigid_object
+from rehearsal.robot.scene import LabScene, SceneObject, String, make_rigid_object
 from rehearsal.robot.shapes import distance
 from rehearsal.robot.touching import Contacts, ContactWorld, lie
 
@@ -22,7 +22,7 @@ def body(shape="box", diameter=0.05, height=0.12, mass=0.1, z=0.06, **more) -> t
 
 
 def floor(object: RigidObject, friction=0.35, loss=3.0) -> tuple[ContactWorld, Contacts]:
-    kind, half, edge, place = Scene(0.0, SceneObject("sphere", 0.1, 0.1, 1.0, [0.0, 0.0, 1.0])).shapes()
+    kind, half, edge, place = LabScene(0.0, SceneObject("sphere", 0.1, 0.1, 1.0, [0.0, 0.0, 1.0])).shapes()
     damping = 2 * 0.1 * np.sqrt(2e4 * object.mass)
     world = ContactWorld(kind, half, edge, place, 1e6, 2e4, damping, loss, np.array([friction]))
     bristles, near = np.zeros((1, len(object.kind), 3)), np.zeros((1, len(object.kind) + 1, 3))

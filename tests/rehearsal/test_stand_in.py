@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rehearsal.robot.scene import Scene, SceneObject
+from rehearsal.robot.scene import LabScene, SceneObject
 from rehearsal.robot.stand_in import TICK, StandInRobot
 from tests.rehearsal.arm import settings, stranger
 from trunkline.errors import InputError
 
 READY = np.array([0.0, -0.2, 0.0, -1.9, 0.0, 1.7, 0.785])
-SCENE = Scene(None, SceneObject("cylinder", 0.05, 0.12, 0.1, [0.62, 0.05, 0.3], hanging=True), {}, [0.62, 0.05, 0.5])
+SCENE = LabScene(None, SceneObject("cylinder", 0.05, 0.12, 0.1, [0.62, 0.05, 0.3], hanging=True), {}, [0.62, 0.05, 0.5])
 EXACT = {"joint_noise": 0.0, "wound_noise_mm": 0.0, "position_noise_mm": 0.0, "orientation_noise_deg": 0.0}
 
 
@@ -49,7 +49,7 @@ def test_time_does_not_go_back(still, dt):
 
 
 def test_what_touches_at_the_start_is_refused():
-    scene = Scene(0.15, SCENE.object, {}, SCENE.hook)
+    scene = LabScene(0.15, SCENE.object, {}, SCENE.hook)
     with pytest.raises(InputError, match="unit_.*inside floor"):
         StandInRobot(stranger(), scene, settings(), READY, 1)
 
