@@ -10,6 +10,7 @@ from trunkline.kinematics.dataset.samples import read_samples
 from trunkline.kinematics.ik.inputs import inputs_of
 from trunkline.kinematics.ik.learn import Learning, learn
 from trunkline.kinematics.ik.on_plant import Rig
+from trunkline.kinematics.ik.onnx import SurePulls
 from trunkline.kinematics.ik.report import histogram, summary
 from trunkline.model.statics.chain import read_chain
 from trunkline.model_files import read_model
@@ -45,7 +46,8 @@ def main(config: Config) -> None:
         rig = Rig(reach, conditions_of(read_trials(TRIALS, DECIDING)).pulls)
     inputs = inputs_of(table)
     lacking = read_lacking(LACKING, file_digest(Path(config.model)))
-    learned = learn(model, chain, table, config, rig, lacking and lacking.sure_pulls)
+    sure = lacking and SurePulls(chain.straight_lengths, lacking.sure_pulls, lacking.tilt_deg, lacking.pulled_tilt_deg)
+    learned = learn(model, chain, table, config, rig, sure)
 
     with output_folder(ARTIFACTS) as folder:
         onnx.save(learned.exported, str(folder / "ik.onnx"))

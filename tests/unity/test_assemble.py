@@ -33,7 +33,7 @@ from trunkline.unity import manifest as schema
 from trunkline.unity.assemble import CSHARP, Label, Sources, Trajectory, assemble, compare
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import JointLaw, Laws, TendonLaw, compile_with
-from trunkline.unity.manifest import Manifest, Model, Names
+from trunkline.unity.manifest import Manifest, Model, Names, SureBlock
 from trunkline.unity.plugin import VERSION
 from trunkline.unity.readers import refusals
 from trunkline.unity.roundtrip import curl, simulate
@@ -56,7 +56,8 @@ def network(inputs: int = 8, opset: int = 15, outputs: list[str] | None = None) 
     model = helper.make_model(graph, opset_imports=opsets, ir_version=8)
     names = {"inputs": TILT, "outputs": outputs or ["tendon_1", "tendon_2", "tendon_3"]}
     meaning = {name: f"{name} in m" for name in ("commands", "lengths", "tip")}
-    meaning |= {"doubt_beyond_m": "0.005", "sure_pulls_m": "0.02", "straight_lengths_m": "[0.4, 0.4, 0.4]"}
+    meaning |= {"doubt_beyond_m": "0.005", "sure_pulls_m": "0.02", "straight_lengths_m": "[0.4, 0.4, 0.4]",
+                "sure_tilts_deg": "[90, 30]"}  # fmt: skip
     helper.set_model_props(model, {key: json.dumps(value) for key, value in names.items()} | meaning)
     return model.SerializeToString()
 
@@ -181,7 +182,8 @@ def test_the_manifest_is_valid_and_true(files, sources):
     assert manifest.network.output_order == ["tendon_1", "tendon_2", "tendon_3"]
     assert (manifest.network.input, manifest.network.opset) == ("x", 15)
     assert list(manifest.network.outputs) == ["commands", "lengths", "tip"]
-    assert (manifest.network.doubt_beyond, manifest.network.sure_pulls) == (0.005, 0.02)
+    assert manifest.network.doubt_beyond == 0.005
+    assert manifest.network.sure == SureBlock(pulls=0.02, tilt=90, pulled_tilt=30)
     assert set(manifest.meshes) == {"rigid", "soft_030"}
     assert manifest.hybrid.robot == ROBOT
     with pytest.raises(ValueError, match="extra"):

@@ -136,6 +136,13 @@ class Hybrid(_Block):
     robot: Robot = Field(description="what holds the arm, as `trunkline/kinematics/panda/mounts.py` says")
 
 
+class SureBlock(_Block):
+    pulls: float = Field(ge=0, description="m, in all, up to which the certificate has the arm's tip within 1 % of its"
+                         " length from its twin's")  # fmt: skip
+    tilt: float = Field(ge=0, description="deg, of the mount, up to which trials without a pull went")
+    pulled_tilt: float = Field(ge=0, description="deg, likewise with a pull")
+
+
 class NetworkBlock(_Block):
     file: str
     opset: int
@@ -148,11 +155,7 @@ class NetworkBlock(_Block):
     outputs: dict[str, str] = Field(description="what each is; `commands` are the actuators' controls, m")
     output_order: list[str] = Field(description="the tendons, in the order of the columns of commands and lengths")
     doubt_beyond: float = Field(gt=0, description="m; the arm cannot take the pose if `tip` is further from it")
-    sure_pulls: float | None = Field(
-        ge=0,
-        description="m, sum of the pulls that `commands` are: up to there the certificate has the arm's tip within 1 %"
-        " of its length from its twin's; null where no trial at rest was held out",
-    )
+    sure: SureBlock | None = Field(description="null where no trial at rest was held out")
     operators: list[str]
 
 

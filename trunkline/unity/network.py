@@ -7,7 +7,7 @@ from google.protobuf.message import DecodeError
 from onnx.external_data_helper import uses_external_data
 
 from trunkline.errors import InputError
-from trunkline.unity.manifest import NetworkBlock, require_widths
+from trunkline.unity.manifest import NetworkBlock, SureBlock, require_widths
 from trunkline.unity.rules import Violation, lint_network
 
 
@@ -38,15 +38,19 @@ def describe_network(data: bytes, file: str, tendons: list[str], source: str) ->
         outputs={value.name: _text(model, value.name, source) for value in model.graph.output},
         output_order=outputs,
         doubt_beyond=float(_text(model, "doubt_beyond_m", source)),
-        sure_pulls=_sure_pulls(model),
+        sure=_sure(model),
         operators=sorted({node.op_type for node in model.graph.node}),
     )
     external = any(uses_external_data(tensor) for tensor in model.graph.initializer)
     return block, lint_network(opset, external)
 
 
-def _sure_pulls(model: onnx.ModelProto) -> float | None:
-    return next((float(entry.value) for entry in model.metadata_props if entry.key == "sure_pulls_m"), None)
+def _sure(model: onnx.ModelProto) -> SureBlock | None:
+    meaning = {entry.key: entry.value for entry in model.metadata_props}
+    if "sure_pulls_m" not in meaning:
+        return None
+    tilt, pulled_tilt = json.loads(meaning["sure_tilts_deg"])
+    return SureBlock(pulls=float(meaning["sure_pulls_m"]), tilt=tilt, pulled_tilt=pulled_tilt)
 
 
 def _names(model: onnx.ModelProto, key: str, source: str) -> list[str]:

@@ -6,7 +6,7 @@ import onnxruntime
 import pytest
 
 from trunkline.errors import InputError
-from trunkline.kinematics.ik.inference import ask
+from trunkline.kinematics.ik.inference import ask, tilts_of
 from trunkline.kinematics.ik.network import InverseKinematics
 from trunkline.kinematics.ik.onnx import SurePulls, to_onnx
 
@@ -90,11 +90,23 @@ def test_a_tip_foreseen_far_from_its_target_is_doubted(network):
     assert np.isfinite(tip).all()
 
 
-@pytest.mark.parametrize(("most", "unsure"), [(-1e-4, True), (1e-4, False), (None, True)])
-def test_beyond_the_pulls_that_a_certificate_vouches_for_it_is_unsure_and_without_one_everywhere(model, most, unsure):
-    """Two motors pull by 5 and 7 mm; the third lets out, which makes up for nothing."""
-    commands = ask(session(model), POSE)["commands"].astype(float)[0]
-    straight = commands + [0.005, 0.007, -0.03]
-    network = InverseKinematics(8, POSE, np.tile(commands, (2, 1)), np.tile(commands, (2, 1)) + 0.01)
-    sure = None if most is None else SurePulls(straight, 0.012 + most)
-    assert ask(session(to_onnx(network, ["a", "b", "c"], 0.05, sure)), POSE)["unsure"].tolist() == [unsure] * len(POSE)
+@pytest.mark.parametrize(
+    ("most", "tilts", "pulls", "unsure"),
+    [(11.9, (90, 90), (5, 7, -30), True), (12.1, (90, 90), (5, 7, -30), False), (12.1, (90, 10), (5, 7, 0), True),
+     (12.1, (10, 90), (5, 7, 0), False), (12.1, (90, 10), (0.9, 0.9, 0), False), (12.1, (10, 90), (0.9, 0, 0), True),
+     (None, (90, 90), (0, 0, 0), True)],
+)  # fmt: skip
+def test_beyond_what_a_certificate_vouches_for_it_is_unsure_and_without_one_everywhere(most, tilts, pulls, unsure):
+    """The mount is tilted by 17 and 11 deg. What a motor lets out makes up for nothing; pulls in mm."""
+    commands = np.tile([0.4, 0.5, 0.6], (2, 1))
+    network = InverseKinematics(8, POSE, commands, commands + 0.01)
+    sure = None if most is None else SurePulls(commands[0] + 1e-3 * np.array(pulls), 1e-3 * most, *tilts)
+    assert ask(session(to_onnx(network, ["a", "b", "c"], 0.05, sure)), POSE)["unsure"].tolist() == [unsure] * 2
+
+
+def test_tilts_of_every_form_of_gravity():
+    rest = np.tile([0.0, 0, -0.4, 1, 0, 0, 0], (3, 1))
+    down = [[0, 0, -1], [0.6, 0, -0.8], [0, -1, 0]]
+    np.testing.assert_allclose(tilts_of(np.column_stack([down, rest])), [0, np.degrees(np.arctan(0.75)), 90])
+    np.testing.assert_allclose(tilts_of(np.column_stack([np.radians([0, -30, 60]), rest])), [0, 30, 60])
+    np.testing.assert_array_equal(tilts_of(rest), 0)

@@ -7,7 +7,9 @@ import onnxruntime
 
 from trunkline.errors import InputError
 from trunkline.kinematics.ik.inputs import gravity_columns, position_of
+from trunkline.recordings.trials.conditions import PULLED
 
+SAME_TILT = 0.01  # deg, of rounding
 UNIT = 1e-3  # by which the length of a quaternion or direction may differ from 1: that of one written with three digits
 
 
@@ -16,8 +18,8 @@ def ask(runtime: onnxruntime.InferenceSession, poses: np.ndarray) -> dict[str, n
 
     "commands" and "lengths" (N, K) and "tip" (N, 3) as in `network.Answer`, m, and "doubtful" (N,): whether the tip is
     foreseen so far from its target that the arm cannot take the pose. "unsure" (N,): whether the motors pull by more in
-    all than up to where the certificate has the arm's tip within 1 % of its length from there; true where the file has
-    no such limit.
+    all than up to where the certificate has the arm's tip within 1 % of its length from there, or the mount is tilted
+    further than in the session's trials with a pull, or without; true where the file has no such limits.
 
     Args:
         poses: gravity (angle in rad, or a unit vector), tip position (m) and unit quaternion (w first, either sign) in
@@ -39,14 +41,25 @@ def ask(runtime: onnxruntime.InferenceSession, poses: np.ndarray) -> dict[str, n
         if len(bad):
             raise InputError(f"pose {bad[0]}: found {name} {values[bad[0]]}, expected finite numbers")
     missed = np.linalg.norm(answers["tip"] - position_of(inputs[taken.name]), axis=1)
-    return answers | {"doubtful": missed > float(meaning["doubt_beyond_m"]), "unsure": _unsure(answers, meaning)}
+    unsure = _unsure(answers, inputs[taken.name], meaning)
+    return answers | {"doubtful": missed > float(meaning["doubt_beyond_m"]), "unsure": unsure}
 
 
-def _unsure(answers: dict[str, np.ndarray], meaning: dict[str, str]) -> np.ndarray:
+def _unsure(answers: dict[str, np.ndarray], poses: np.ndarray, meaning: dict[str, str]) -> np.ndarray:
     if "sure_pulls_m" not in meaning:
-        return np.ones(len(answers["commands"]), bool)
-    pulls = np.array(json.loads(meaning["straight_lengths_m"])) - answers["commands"]
-    return np.maximum(pulls, 0).sum(axis=1) > float(meaning["sure_pulls_m"])
+        return np.ones(len(poses), bool)
+    pulls = np.maximum(np.array(json.loads(meaning["straight_lengths_m"])) - answers["commands"], 0)
+    loose, pulled = json.loads(meaning["sure_tilts_deg"])
+    most = np.where((pulls > PULLED).any(axis=1), pulled, loose)
+    return (pulls.sum(axis=1) > float(meaning["sure_pulls_m"])) | (tilts_of(poses) > most + SAME_TILT)
+
+
+def tilts_of(poses: np.ndarray) -> np.ndarray:
+    """Angles between the straight arm and gravity, deg; 0 where nothing pulls at it. (N, 7, 8 or 10) to (N,)."""
+    gravity = gravity_columns(poses).astype(float)
+    if gravity.shape[1] == 3:
+        return np.degrees(np.arctan2(np.linalg.norm(gravity[:, :2], axis=1), -gravity[:, 2]))
+    return np.degrees(np.abs(gravity).sum(axis=1))
 
 
 def checked(poses: np.ndarray, inputs: list[str]) -> np.ndarray:

@@ -102,13 +102,12 @@ class Learned:
 
 def learn(
     model: mujoco.MjModel, chain: Chain, table: pd.DataFrame, learning: Learning, rig: Rig | None = None,
-    sure_pulls: float | None = None,
+    sure: SurePulls | None = None,
 ) -> Learned:  # fmt: skip
     """Train on the samples of `table` that are not held out, and score on those that are and on others.
 
     Args:
-        model: whose `chain` it is. rig: what drives the arm itself. sure_pulls: as `Lacking` has it, m; None where no
-            certificate was made.
+        model: whose `chain` it is. rig: what drives the arm itself. sure: None where no certificate was made.
     """
     network, curve = fit(table, chain, learning)
     columns = inputs_of(table)
@@ -118,7 +117,6 @@ def learn(
     deepest = chain.straight_lengths - sent_before.min(axis=0)
     between = unseen_targets(chain, sampled, learning.unseen, learning.seed, deepest)
     doubtful = doubt_beyond(network, held_out[columns].to_numpy(), chain.length)
-    sure = None if sure_pulls is None else SurePulls(chain.straight_lengths, sure_pulls)
     exported = to_onnx(network, [model.tendon(t).name for t in range(chain.tendons)], doubtful, sure)
     runtime = onnxruntime.InferenceSession(exported.SerializeToString(), providers=["CPUExecutionProvider"])
     errors, difference, answers = {}, 0.0, {}

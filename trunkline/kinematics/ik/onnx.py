@@ -26,10 +26,13 @@ class SurePulls:
     """Up to which the certificate has the arm's tip near its twin's.
 
     straight_lengths: of each tendon, the arm straight, m. Shape (K,). most: sum of what all motors draw in, m.
+    tilt_deg, pulled_tilt_deg: of the mount, at most, without a pull and with one.
     """
 
     straight_lengths: np.ndarray
     most: float
+    tilt_deg: float
+    pulled_tilt_deg: float
 
 
 def to_onnx(
@@ -124,7 +127,8 @@ def _surety(sure: SurePulls | None) -> dict[str, str]:
     if sure is None:
         return {}
     straight = json.dumps([round(float(length), 9) for length in sure.straight_lengths])
-    return {"straight_lengths_m": straight, "sure_pulls_m": f"{sure.most:.6g}"}
+    return {"straight_lengths_m": straight, "sure_pulls_m": f"{sure.most:.6g}",
+            "sure_tilts_deg": json.dumps([round(sure.tilt_deg, 6), round(sure.pulled_tilt_deg, 6)])}  # fmt: skip
 
 
 def _meaning(network: InverseKinematics, tendons: list[str], doubt_beyond: float) -> dict[str, str]:

@@ -19,8 +19,7 @@ public interface INetwork {
 
 /// <summary>What the network answers of one pose: the motors' commands and the tendons' path lengths, m, in the order
 /// of network.output_order, where the tip will come to rest, m, base frame, whether that is so far from its target
-/// that the arm cannot take the pose, and whether the motors pull so far that the arm's tip may be further from there than 1 %
-/// of its length.</summary>
+/// that the arm cannot take the pose, and whether the arm's tip may be further from there than 1 % of its length.</summary>
 public sealed class Answer {
   /// <summary>m, one a tendon. They are no pulls: <see cref="ArmKinematics.PullsOf"/> makes these of them.</summary>
   public readonly double[] Commands;
@@ -30,7 +29,8 @@ public sealed class Answer {
   public readonly Vector Tip;
   /// <summary>The tip is further from its target than the manifest's network.doubt_beyond.</summary>
   public readonly bool Doubtful;
-  /// <summary>The motors pull by more in all than the manifest's network.sure_pulls.</summary>
+  /// <summary>The motors pull by more, or the mount is tilted further, than network.sure of the manifest has it; true where
+  /// it has nothing.</summary>
   public readonly bool Unsure;
 
   /// <summary>As the fields of the same names.</summary>
@@ -40,6 +40,36 @@ public sealed class Answer {
     Tip = tip;
     Doubtful = doubtful;
     Unsure = unsure;
+  }
+}
+
+/// <summary>Up to where the certificate has the arm's tip within 1 % of its length from its twin's: the manifest's
+/// network.sure.</summary>
+public sealed class Sure {
+  private const double _pulled = 1e-3;  // m, from which on a tendon counts as pulled
+  private const double _sameTilt = 0.01;  // deg, of rounding
+
+  private readonly double _pulls, _tilt, _pulledTilt;
+
+  /// <param name="pulls">m, of all motors together.</param>
+  /// <param name="tilt">deg, of the mount, where no motor pulls.</param>
+  /// <param name="pulledTilt">deg, of the mount, where one does.</param>
+  public Sure(double pulls, double tilt, double pulledTilt) {
+    _pulls = pulls;
+    _tilt = tilt;
+    _pulledTilt = pulledTilt;
+  }
+
+  /// <summary>Whether it vouches for <paramref name="commands"/>, m, of tendons that are <paramref name="straight"/> m long
+  /// in the straight arm, the mount tilted by <paramref name="tilt"/> deg.</summary>
+  public bool Holds(IReadOnlyList<double> commands, IReadOnlyList<double> straight, double tilt) {
+    double sum = 0, most = 0;
+    for (int tendon = 0; tendon < commands.Count; tendon++) {
+      double pull = Math.Max(straight[tendon] - commands[tendon], 0);
+      sum += pull;
+      most = Math.Max(most, pull);
+    }
+    return sum <= _pulls && tilt <= (most > _pulled ? _pulledTilt : _tilt) + _sameTilt;
   }
 }
 
@@ -55,7 +85,7 @@ public sealed class ArmKinematics {
   private readonly IReadOnlyList<double> _restLengths;
   private readonly int _tendons;
   private readonly double _doubtBeyond;
-  private readonly double _surePulls;
+  private readonly Sure _sure;
   private double[][] _poses;  // of Bend, filled anew at each
 
   /// <param name="network">Runs the package's file.</param>
@@ -63,10 +93,10 @@ public sealed class ArmKinematics {
   /// <param name="tendons">Names of the columns of commands and lengths: network.output_order.</param>
   /// <param name="restLengths">m, of each of them, the arm straight: model.rest_lengths.</param>
   /// <param name="doubtBeyond">m: network.doubt_beyond.</param>
-  /// <param name="surePulls">m: network.sure_pulls; NaN where the manifest has none.</param>
+  /// <param name="sure">network.sure; null where the manifest has none.</param>
   /// <exception cref="InputError">The network is of other inputs or outputs.</exception>
   public ArmKinematics(INetwork network, IReadOnlyList<string> inputs, IReadOnlyList<string> tendons,
-                       IReadOnlyList<double> restLengths, double doubtBeyond, double surePulls) {
+                       IReadOnlyList<double> restLengths, double doubtBeyond, Sure sure) {
     var outputs = network.Outputs;
     int count = tendons.Count;
     bool known = outputs.Count == 3 && outputs[0] == count && outputs[1] == count && outputs[2] == 3;
@@ -80,7 +110,7 @@ public sealed class ArmKinematics {
     _restLengths = restLengths;
     _tendons = count;
     _doubtBeyond = doubtBeyond;
-    _surePulls = surePulls;
+    _sure = sure;
   }
 
   /// <summary>What the network answers of one pose: gravity (angle in rad, or a unit vector), tip position (m) and unit
@@ -214,11 +244,20 @@ public sealed class ArmKinematics {
     int at = (row + 1) * _inputs.Count - 7;
     double missed = Distance(tip, new Vector(outputs.Asked[at], outputs.Asked[at + 1], outputs.Asked[at + 2]));
     var commands = Row(outputs.Commands, row);
-    double pulls = 0;
-    for (int tendon = 0; tendon < _tendons; tendon++) {
-      pulls += Math.Max(_restLengths[tendon] - commands[tendon], 0);
+    bool unsure = _sure == null || !_sure.Holds(commands, _restLengths, Tilt(outputs.Asked, row));
+    return new Answer(commands, Row(outputs.Lengths, row), tip, missed > _doubtBeyond, unsure);
+  }
+
+  private double Tilt(float[] asked, int row) {  // of the mount against gravity, deg
+    int first = row * _inputs.Count;
+    if (_inputs.Count < _tilt) {
+      return 0;
     }
-    return new Answer(commands, Row(outputs.Lengths, row), tip, missed > _doubtBeyond, !(pulls <= _surePulls));
+    double angle = _inputs.Count == _tilt
+        ? Math.Abs((double)asked[first])
+        : Math.Atan2(Math.Sqrt((double)asked[first] * asked[first] + (double)asked[first + 1] * asked[first + 1]),
+                     -(double)asked[first + 2]);
+    return angle * 180 / Math.PI;
   }
 
   private static double[] Rolled(double[] values, int turns) {

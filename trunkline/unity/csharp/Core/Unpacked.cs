@@ -97,7 +97,11 @@ public static class Unpacked {
     JsonBlock block = manifest.Block("network"), lengths = manifest.Block("model").Block("rest_lengths");
     var tendons = block.Texts("output_order");
     var rest = Array.ConvertAll(tendons, lengths.Number);
-    double sure = block.Has("sure_pulls") ? block.Number("sure_pulls") : double.NaN;
+    Sure sure = null;
+    if (block.Has("sure")) {
+      var limits = block.Block("sure");
+      sure = new Sure(limits.Number("pulls"), limits.Number("tilt"), limits.Number("pulled_tilt"));
+    }
     return new ArmKinematics(network, block.Texts("input_order"), tendons, rest, block.Number("doubt_beyond"), sure);
   }
 
