@@ -7,6 +7,8 @@ import subprocess
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -31,7 +33,8 @@ from trunkline.ar.teleop.tendons import Network, bend
 from trunkline.ar.teleop.vectors import add
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
-from trunkline.kinematics.ik.inputs import DIRECTION, TILT
+from trunkline.kinematics.ik.inference import ask
+from trunkline.kinematics.ik.inputs import DIRECTION, POSE, TILT
 from trunkline.twin.package import MANIFEST, package_digest, robot_of
 from trunkline.unity.assemble import CSHARP
 from trunkline.unity.frame import unity_position
@@ -73,7 +76,7 @@ def test_the_core_answers_the_shared_vectors_and_what_they_leave_out(program, fi
     done = run(program, files, tmp_path / "package", "--more", str(tmp_path / "more.json"))
     assert done.returncode == 0, done.stdout + done.stderr
     counts = {line.split()[0]: int(line.split()[1]) for line in done.stdout.splitlines()}
-    assert set(counts) == {*CASES, "steps", "frames", "fit", "bend", "things", "reach", "refusals"}
+    assert set(counts) == {*CASES, "steps", "frames", "fit", "bend", "sure", "things", "reach", "refusals"}
     for name in CASES:
         assert counts[name] == len(json.loads(files[f"Tests/Vectors/{name}.json"])["cases"])
     recorded = json.loads(files["Tests/Vectors/steps.json"])["sequences"]
@@ -191,6 +194,7 @@ def more(files: dict[str, bytes]) -> dict[str, list]:
         "frames": [a_frame(rng) for _ in range(20)],
         "fit": [a_fit(rng, count) for count in (3, 3, 4, 6, 12) for _ in range(4)],
         "bend": bends(files, rng),
+        "sure": surely(rng),
         "things": [of_objects(core, files, rng, in_arm) for in_arm in (False, True) for _ in range(8)],
         "reach": reaches(files, rng),
         "refusals": refusals(files),
@@ -253,6 +257,36 @@ def bends(files: dict[str, bytes], rng: np.random.Generator) -> list[dict]:
         answer = {name: values.tolist() for name, values in bent._asdict().items()}
         cases.append(case(question, answer | {"pulls": pulls}))
     return cases
+
+
+def surely(rng: np.random.Generator) -> list[dict]:
+    """What Python warns of, for every form of gravity, at either side of each limit."""
+    cases, said = [], []
+    for number in range(60):
+        tilt, azimuth = float(rng.uniform(0, 1)), float(rng.uniform(-3, 3))
+        down = [math.sin(tilt) * math.cos(azimuth), math.sin(tilt) * math.sin(azimuth), -math.cos(tilt)]
+        pose = np.array([*([], [-tilt], down)[number % 3], 0.0, 0.0, -0.4, 1.0, 0.0, 0.0, 0.0], np.float32)
+        straight, pulls = rng.uniform(0.4, 0.5, 3), rng.uniform(-0.01, 0.01, 3) * (0.15 if number % 2 else 1)
+        commands = (straight - pulls).astype(np.float32)
+        limits = [float(rng.uniform(0, 0.02)), *rng.uniform(0, 60, 2).tolist()]
+        meaning = {"inputs": (POSE, TILT, DIRECTION)[number % 3], "doubt_beyond_m": 1, "sure_pulls_m": limits[0],
+                   "straight_lengths_m": straight.tolist(), "sure_tilts_deg": limits[1:]}  # fmt: skip
+        meaning = {name: json.dumps(value) for name, value in meaning.items()}
+        said.append(bool(ask(answering(commands, meaning), pose[None])["unsure"][0]))
+        question = {"pose": pose.tolist(), "commands": commands.tolist(), "straight": straight.tolist(), "sure": limits}
+        cases.append(case(question, {"unsure": said[-1]}))
+    assert 15 < sum(said) < 45
+    return cases
+
+
+def answering(commands: np.ndarray, meaning: dict[str, str]):
+    """A runtime whose network answers `commands`, whatever it is asked."""
+    outputs = {"commands": commands[None], "lengths": commands[None], "tip": np.zeros((1, 3))}
+    return Mock(**{
+        "get_inputs.return_value": [SimpleNamespace(name="pose")], "run.return_value": list(outputs.values()),
+        "get_outputs.return_value": [SimpleNamespace(name=name) for name in outputs],
+        "get_modelmeta.return_value.custom_metadata_map": meaning,
+    })  # fmt: skip
 
 
 def reaches(files: dict[str, bytes], rng: np.random.Generator) -> list[dict]:

@@ -18,6 +18,7 @@ internal sealed class More {
     Say("frames", more["frames"], AnswerFrames);
     Say("fit", more["fit"], AnswerFit);
     Say("bend", more["bend"], AnswerBend);
+    Say("sure", more["sure"], AnswerSure);
     Say("things", more["things"], _shared.AnswerTargets);
     Say("reach", more["reach"], _shared.AnswerSoft);
     Say("refusals", more["refusals"], AnswerRefused);
@@ -69,6 +70,18 @@ internal sealed class More {
     told.Remove("unsure");
     told["pulls"] = Json(_shared.Kinematics.PullsOf(found));
     return told;
+  }
+
+  private static object AnswerSure(Dictionary<string, object> asked, Dictionary<string, object> expected) {
+    double[] pose = Numbers(asked["pose"]), limits = Numbers(asked["sure"]), straight = Numbers(asked["straight"]);
+    var commands = Array.ConvertAll(Numbers(asked["commands"]), number => (float)number);
+    var network = new Recorded {
+      Inputs = pose.Length, Outputs = new[] { straight.Length, straight.Length, 3 },
+      Answers = new Dictionary<string, float[]> { ["commands"] = commands, ["lengths"] = commands, ["tip"] = new float[3] },
+    };
+    var arm = new ArmKinematics(network, new string[pose.Length], new string[straight.Length], straight, 1,
+                                new Sure(limits[0], limits[1], limits[2]));
+    return new Dictionary<string, object> { ["unsure"] = arm.Ask(pose).Unsure };
   }
 
   private object AnswerRefused(Dictionary<string, object> asked, Dictionary<string, object> expected) {
