@@ -1,0 +1,115 @@
+"""What poses that a lab records are worth: `python -m studies.residual_map`
+
+The lab's arm is sent commands that are drawn as `train_ik` draws them, with another seed, and moves by itself until its
+cameras see it rest (`qualification/seen.py`). From some of these poses `trunkline/kinematics/residual` learns how far
+the tip rests beside the twin's; the others, which nothing has learnt from, say how near it then is, and how often it
+is within the radius of 90 %. Beside it: nothing learnt, and learnt from the static trials that the session has anyway.
+Takes some ten minutes.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from demo.plants.choice import plant_of
+from demo.plants.stranger import Stranger
+from demo.rig import ROOT, Config
+from qualification.seen import FIRST_RAMP, MODEL, SAMPLES, ArmAtWork, everyone
+from studies.stage_chain import require_demo
+from trunkline.errors import in_one_line
+from trunkline.kinematics.dataset.columns import command_columns
+from trunkline.kinematics.dataset.samples import read_samples
+from trunkline.kinematics.ik.as_controls import draw_targets
+from trunkline.kinematics.ik.inputs import gravity_of, position_of
+from trunkline.kinematics.ik.learn import sampled_gravities
+from trunkline.kinematics.residual.residual_map import ResidualMap, RestingPoses
+from trunkline.model.simulation.rest import base_frame
+from trunkline.model.statics.chain import read_chain
+from trunkline.model.statics.equilibria import actuated
+from trunkline.model_files import read_model
+from trunkline.pipeline.config import load_config
+from trunkline.recordings.trials.conditions import conditions_of
+from trunkline.recordings.trials.experiments import is_static
+from trunkline.recordings.trials.splits import DECIDING, IDENTIFY
+from trunkline.recordings.trials.trial import read_trials
+from trunkline.report.certificate.arms import arm_of
+from trunkline.report.certificate.poses import posed
+from upkeep.results import recorded
+
+TRIALS = Path("data/processed/filter")
+SEED, POSES, HELD_OUT = 49_001, 300, 100
+SIZES, SETS = (15, 30, 60, 100, 200), 5
+SHARE = 0.9
+
+
+def measure() -> None:
+    model = read_model(MODEL)
+    chain, (origin, turn) = read_chain(model).smooth, base_frame(model)
+    table = read_samples(SAMPLES, chain.tendons, "split")
+    deepest = chain.straight_lengths - table[command_columns(chain.tendons)].to_numpy().min(axis=0)
+    rng = np.random.default_rng(SEED)
+    drawn = draw_targets(model, chain, sampled_gravities(table), deepest, 2 * POSES, rng)
+    targets, commands = drawn.targets[:POSES], drawn.commands[:POSES]
+    plant = plant_of(load_config(Config, "record", ROOT))
+    assert isinstance(plant, Stranger)
+
+    def rest(index: int, noise: np.random.Generator) -> np.ndarray:
+        arm = ArmAtWork(plant, gravity_of(targets[[index]])[0] @ turn.T)
+        return arm.bring(chain.straight_lengths - commands[index], FIRST_RAMP, noise)[1]
+
+    seen = (np.array(everyone("poses", rest, len(targets))) - origin) @ turn
+    residuals = seen - position_of(targets)
+    rested = np.isfinite(residuals).all(axis=1)
+    poses = RestingPoses((chain.straight_lengths - commands)[rested], gravity_of(targets)[rested])
+    residuals = residuals[rested]
+    trials = read_trials(TRIALS, DECIDING)
+    within = np.maximum(poses.pulls, 0).sum(axis=1) <= conditions_of(trials).pulls
+    learnt, others = np.arange(len(poses) - HELD_OUT), slice(len(poses) - HELD_OUT, None)
+
+    print("| learnt from | tip, mm: median / 95 % | within the session's pulls | in the 90 % radius | its length |")
+    print("|---|---:|---:|---:|---:|")
+    print(row("nothing", residuals[others], within[others]))
+    own = [t for t in trials if t.split == IDENTIFY and is_static(t.experiment) and not t.load and t.measured[-1, -1]]
+    session = posed(own, model)
+    rests = actuated(chain, session.commands, session.gravity @ arm_of(model).turn)
+    tips = np.array([trial.positions[-1, -1] for trial in own])
+    off, known = (tips - origin) @ turn - rests.position, rests.converged
+    there = RestingPoses(chain.straight_lengths - session.commands[known], (session.gravity @ turn)[known])
+    print(learned([ResidualMap.fit(there, off[known], chain.length)], f"the session's {known.sum()} static trials",
+                  poses[others], residuals[others], within[others]))  # fmt: skip
+    for size in SIZES:
+        chosen = [rng.permutation(learnt)[:size] for _ in range(SETS if 2 * size < len(learnt) else 1)]
+        maps = [ResidualMap.fit(poses[rows], residuals[rows], chain.length) for rows in chosen]
+        name = f"{size} poses" + (f", {len(maps)} sets" if len(maps) > 1 else "")
+        print(learned(maps, name, poses[others], residuals[others], within[others]))
+    print(f"\n{HELD_OUT} other poses; in {within[others].sum()} motors pull by no more than in the session.")
+
+
+def learned(maps: list[ResidualMap], name: str, poses: RestingPoses, residuals: np.ndarray, within: np.ndarray) -> str:
+    """A row of the table, of several maps together."""
+    left = np.concatenate([residuals - one.mean(poses) for one in maps])
+    radius = np.concatenate([one.radius(poses, SHARE) for one in maps])
+    share, worth = np.mean(np.linalg.norm(left, axis=1) <= radius), sum(one.is_worth_it for one in maps)
+    name += "" if worth == len(maps) else f" (worth it by its own poses: {worth} of {len(maps)})"
+    return row(name, left, np.tile(within, len(maps)), f"{100 * share:.0f} %", f"{1e3 * np.median(radius):.1f}")
+
+
+def row(name: str, left: np.ndarray, within: np.ndarray, share: str = "–", radius: str = "–") -> str:
+    lengths = 1e3 * np.linalg.norm(left, axis=1)
+    both = [" / ".join(f"{np.quantile(part, q):.1f}" for q in (0.5, 0.95)) for part in (lengths, lengths[within])]
+    return f"| {name} | {' | '.join(both)} | {share} | {radius} |"
+
+
+@in_one_line
+def main() -> int:
+    argparse.ArgumentParser(prog="studies.residual_map", description=__doc__).parse_args()
+    require_demo(MODEL)
+    with recorded("residual_map"):
+        measure()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""What recorded poses say of a twin's tip at rest."""
