@@ -103,7 +103,7 @@ RESULTS = {
             as_sent("as_controls.friction", "as_controls.friction.targets"),
         ),
         (
-            "… to the simulated lab's arm; beside the network's warnings that the pulls go beyond the session's",
+            "… to the simulated lab's arm; warned of as above, and where pulls or tilts are beyond the certificate's",
             as_sent("on_plant", "on_plant.targets"),
         ),
         (
@@ -476,13 +476,14 @@ def _command_row(root: Path) -> str:
 
     def sent(at: str, targets: str) -> str:
         *errors, silent = as_sent(at, targets)
-        counts = f"{_number(lookup(metrics, silent.key))} of {_number(lookup(metrics, targets))}"
+        counts = f"{_number(lookup(metrics, silent.key))} of {_number(lookup(metrics, targets))}; "
+        counts += _percent(lookup(metrics, f"{at}.doubted"))
         return f"{_numbers(metrics, (figure.key for figure in errors))} mm ({counts})"
 
     twin = sent("as_controls.frictionless", "as_controls.targets")
     rubbing = sent("as_controls.friction", "as_controls.friction.targets")
     what = "Tip error of the network's commands, median / 95th percentile "
-    what += "(targets missed by more than 1 % of length without a warning)"
+    what += "(targets missed by more than 1 % of length without a warning; share of all with one)"
     return (
         f"| {what} | **on the simulated lab's arm: {sent('on_plant', 'on_plant.targets')}** "
         f"| on the twin without friction: {twin}; with friction: {rubbing} |"
