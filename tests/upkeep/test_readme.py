@@ -62,9 +62,12 @@ def test_the_headline_shows_what_misses_its_goal_beside_what_meets_it(tmp_path):
     """Bold, with the goal; and by which code and package. Without any results it has dashes."""
     rehearsed = {"reach": {"rate": 0.9, "clean": {"rate": 0.8}}}
     rehearsed |= {"follow": {"rate": 1.0}, "grasp": {"rate": 0.95}, "handle": {"rate": 0.5}}
-    sent = {"position_error_mm": {"median": 0.5, "p95": 1.5}, "beyond_1pct_unsaid": 0, "targets": 50, "doubted": 0.04}
-    bad = {"position_error_mm": {"median": 13.0, "p95": 29.0}, "beyond_1pct_unsaid": 170, "targets": 200, "doubted": 1.0}
-    rubbing = {"position_error_mm": {"median": 2.0, "p95": 6.0}, "beyond_1pct_unsaid": 7, "targets": 40, "doubted": 0.126}
+    sent, bad, rubbing = (
+        {"position_error_mm": {"median": median, "p95": p95}, "beyond_1pct_unsaid": unsaid, "targets": targets,
+         "doubted": doubted}
+        for median, p95, unsaid, targets, doubted in
+        ((0.5, 1.5, 0, 50, 0.04), (13.0, 29.0, 170, 200, 1.0), (2.0, 6.0, 7, 40, 0.126))
+    )  # fmt: skip
     network = {"as_controls": {"frictionless": sent, "friction": rubbing, "targets": 50}, "on_plant": bad}
     goals = "rehearse:\n  reach.rate: {better: higher, goal: 0.98}\n  follow.rate: {min: 0.95}\n"
     (tmp_path / "tests").mkdir()
@@ -76,7 +79,8 @@ def test_the_headline_shows_what_misses_its_goal_beside_what_meets_it(tmp_path):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("upkeep.readme.source_words", lambda root, metrics: "**STALE**: of code abc")
         text = headline(tmp_path)
-    assert "| on the twin without friction: 0.5 / 1.5 mm (0 of 50; 4 %); with friction: 2 / 6 mm (7 of 40; 12.6 %) |" in text
+    twin = "on the twin without friction: 0.5 / 1.5 mm (0 of 50; 4 %); with friction: 2 / 6 mm (7 of 40; 12.6 %)"
+    assert f"| {twin} |" in text
     assert "| **on the simulated lab's arm: 13 / 29 mm (170 of 200; 100 %)** |" in text
     reached = "| **reach 90 %** (within 20 mm, and no other part touched anything: 80 %), follow 100 %, grasp 95 %, "
     assert f"{reached}hand-over 50 % | goal: reach ≥ 98 %, follow ≥ 95 % |" in text
