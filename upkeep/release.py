@@ -135,7 +135,7 @@ def arm_metrics(table: pd.DataFrame, code: str) -> dict:
     """Of the rows of this code, first attempts: `test.mean` and `test.worst` over arms of every column of errors (% of
     the arm's length), `test.sealed_arms`, `test.refused_arms`, and `test.intervals_held`, the share of intervals that
     hold the truth."""
-    arms = table[(table["code"] == code) & (table["attempt"] == 1)]
+    arms = table[table["code"] == code].drop_duplicates("arm")  # `attempt` also counts those of other code
     errors = arms.filter(regex=r"_(position|tip)$")  # none of a session that was refused
     return {
         "test": {

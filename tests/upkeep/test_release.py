@@ -151,16 +151,17 @@ def test_metrics_that_are_missing_end_in_one_line(project, capsys):
     assert "artifacts/score/metrics.json is missing" in capsys.readouterr().err
 
 
-def arms(**cells):
-    row = {"code": "abc", "attempt": 1, "sealed": "yes", "refused": "no", "held": 9, "intervals": 10}
+def arms(name, **cells):
+    row = {"arm": name, "code": "abc", "attempt": 2, "sealed": "yes", "refused": "no", "held": 9, "intervals": 10}
     return pd.DataFrame(row | cells, index=[0])
 
 
 def test_arms_are_those_of_this_code_at_their_first_attempt():
-    """Not those of other code, and not a second try at an arm."""
+    """Not those of other code, which may have the same names, and not a second try at an arm."""
     table = pd.concat([
-        arms(curl_tip=1.0), arms(curl_tip=4.0, sealed="no", held=5), arms(curl_tip=90.0, code="old", held=0),
-        arms(curl_tip=80.0, attempt=2, held=0), arms(refused="filter", sealed="no", held=0, intervals=0),
+        arms("a", curl_tip=90.0, code="old", held=0, attempt=1), arms("a", curl_tip=1.0),
+        arms("b", curl_tip=4.0, sealed="no", held=5), arms("a", curl_tip=80.0, held=0),
+        arms("c", refused="filter", sealed="no", held=0, intervals=0),
     ])  # fmt: skip
     metrics = arm_metrics(table, "abc")["test"]
     assert (metrics["mean"], metrics["worst"]) == ({"curl_tip": 2.5}, {"curl_tip": 4.0})
