@@ -140,27 +140,42 @@ def everyone(label: str, task: Callable[[int, np.random.Generator], Any], count:
     return done
 
 
+class DrawnPoses:
+    """Poses of the demo session's twin, drawn as `train_ik` draws them, and the lab's arm to be brought there.
+
+    frame: of the twin's mount, as `base_frame`. targets: inputs of the network. Shape (count, 8 or 10). commands: by
+    which the twin rests there, m. Shape (count, K).
+    """
+
+    def __init__(self, count: int, rng: np.random.Generator) -> None:
+        model = read_model(MODEL)
+        self.chain, self.frame = read_chain(model).smooth, base_frame(model)
+        table = read_samples(SAMPLES, self.chain.tendons, "split")
+        deepest = self.chain.straight_lengths - table[command_columns(self.chain.tendons)].to_numpy().min(axis=0)
+        drawn = draw_targets(model, self.chain, sampled_gravities(table), deepest, 2 * count, rng)
+        self.targets, self.commands = drawn.targets[:count], drawn.commands[:count]
+        assert len(self.targets) == count, "too few of the poses that were drawn are far from the motors' limit"
+        plant = plant_of(load_config(Config, "record", ROOT))
+        assert isinstance(plant, Stranger)
+        self._plant = plant
+
+    def hanging(self, index: int) -> ArmAtWork:
+        """The lab's arm with loose cables, its mount as in that pose."""
+        return ArmAtWork(self._plant, gravity_of(self.targets[[index]])[0] @ self.frame[1].T)
+
+    def brought(self, index: int, noise: np.random.Generator) -> tuple[np.ndarray, np.ndarray, float]:
+        """As `ArmAtWork.bring`, by that pose's commands."""
+        return self.hanging(index).bring(self.chain.straight_lengths - self.commands[index], FIRST_RAMP, noise)
+
+
 def measure(targets: int) -> None:
-    model = read_model(MODEL)
-    chain, (origin, turn) = read_chain(model).smooth, base_frame(model)
-    table = read_samples(SAMPLES, chain.tendons, "split")
-    deepest = chain.straight_lengths - table[command_columns(chain.tendons)].to_numpy().min(axis=0)
-    rng = np.random.default_rng(SEED)
-    drawn = draw_targets(model, chain, sampled_gravities(table), deepest, 2 * targets, rng)
-    twin, commands = drawn.targets[:targets], drawn.commands[:targets]
-    assert len(twin) == targets, "too few of the poses that were drawn are far from the motors' limit"
-    plant = plant_of(load_config(Config, "record", ROOT))
-    assert isinstance(plant, Stranger)
+    drawn = DrawnPoses(targets, np.random.default_rng(SEED))
+    chain, (origin, turn), twin, commands = drawn.chain, drawn.frame, drawn.targets, drawn.commands
     network = partial(ask, onnxruntime.InferenceSession(NETWORK, providers=["CPUExecutionProvider"]))
 
-    def hanging(index: int) -> ArmAtWork:
-        return ArmAtWork(plant, gravity_of(twin[[index]])[0] @ turn.T)
-
-    def rest(index: int, noise: np.random.Generator) -> np.ndarray:
-        return hanging(index).bring(chain.straight_lengths - commands[index], FIRST_RAMP, noise)[0]
-
     reached = twin.copy()
-    position_of(reached)[:] = (np.array(everyone("own tips", rest, targets)) - origin) @ turn
+    tips = everyone("own tips", lambda *pose: drawn.brought(*pose)[0], targets)
+    position_of(reached)[:] = (np.array(tips) - origin) @ turn
     rested = np.isfinite(reached).all(axis=1)
     across = across_surface(chain, commands[rested], gravity_of(twin)[rested], position_of(reached - twin)[rested])
     print(f"| targets | error, mm | after {' | '.join(map(str, SHOWN))} corrections | where it stays |")
@@ -171,7 +186,7 @@ def measure(targets: int) -> None:
         answers = network(of)["commands"]
 
         def corrected(row: int, noise: np.random.Generator, of=of, indices=indices, answers=answers) -> Corrected:
-            return correct(hanging(indices[row]), chain, of[row], answers[row], (origin, turn), noise)
+            return correct(drawn.hanging(indices[row]), chain, of[row], answers[row], (origin, turn), noise)
 
         results = everyone(name, corrected, len(of))
         print("\n".join(rows(name, results)))

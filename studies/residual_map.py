@@ -13,23 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
-from demo.plants.choice import plant_of
-from demo.plants.stranger import Stranger
-from demo.rig import ROOT, Config
-from qualification.seen import FIRST_RAMP, MODEL, SAMPLES, ArmAtWork, everyone
+from qualification.seen import MODEL, DrawnPoses, everyone
 from studies.stage_chain import require_demo
 from trunkline.errors import in_one_line
-from trunkline.kinematics.dataset.columns import command_columns
-from trunkline.kinematics.dataset.samples import read_samples
-from trunkline.kinematics.ik.as_controls import draw_targets
 from trunkline.kinematics.ik.inputs import gravity_of, position_of
-from trunkline.kinematics.ik.learn import sampled_gravities
 from trunkline.kinematics.residual.residual_map import ResidualMap, RestingPoses
-from trunkline.model.simulation.rest import base_frame
-from trunkline.model.statics.chain import read_chain
 from trunkline.model.statics.equilibria import actuated
 from trunkline.model_files import read_model
-from trunkline.pipeline.config import load_config
 from trunkline.recordings.trials.conditions import conditions_of
 from trunkline.recordings.trials.experiments import is_static
 from trunkline.recordings.trials.splits import DECIDING, IDENTIFY
@@ -45,24 +35,13 @@ SHARE = 0.9
 
 
 def measure() -> None:
-    model = read_model(MODEL)
-    chain, (origin, turn) = read_chain(model).smooth, base_frame(model)
-    table = read_samples(SAMPLES, chain.tendons, "split")
-    deepest = chain.straight_lengths - table[command_columns(chain.tendons)].to_numpy().min(axis=0)
     rng = np.random.default_rng(SEED)
-    drawn = draw_targets(model, chain, sampled_gravities(table), deepest, 2 * POSES, rng)
-    targets, commands = drawn.targets[:POSES], drawn.commands[:POSES]
-    plant = plant_of(load_config(Config, "record", ROOT))
-    assert isinstance(plant, Stranger)
-
-    def rest(index: int, noise: np.random.Generator) -> np.ndarray:
-        arm = ArmAtWork(plant, gravity_of(targets[[index]])[0] @ turn.T)
-        return arm.bring(chain.straight_lengths - commands[index], FIRST_RAMP, noise)[1]
-
-    seen = (np.array(everyone("poses", rest, len(targets))) - origin) @ turn
+    drawn = DrawnPoses(POSES, rng)
+    model, chain, (origin, turn), targets = read_model(MODEL), drawn.chain, drawn.frame, drawn.targets
+    seen = (np.array(everyone("poses", lambda *pose: drawn.brought(*pose)[1], POSES)) - origin) @ turn
     residuals = seen - position_of(targets)
     rested = np.isfinite(residuals).all(axis=1)
-    poses = RestingPoses((chain.straight_lengths - commands)[rested], gravity_of(targets)[rested])
+    poses = RestingPoses((chain.straight_lengths - drawn.commands)[rested], gravity_of(targets)[rested])
     residuals = residuals[rested]
     trials = read_trials(TRIALS, DECIDING)
     within = np.maximum(poses.pulls, 0).sum(axis=1) <= conditions_of(trials).pulls
