@@ -38,8 +38,8 @@ def measure() -> None:
     rng = np.random.default_rng(SEED)
     drawn = DrawnPoses(POSES, rng)
     model, chain, (origin, turn), targets = read_model(MODEL), drawn.chain, drawn.frame, drawn.targets
-    seen = (np.array(everyone("poses", lambda *pose: drawn.brought(*pose)[1], POSES)) - origin) @ turn
-    residuals = seen - position_of(targets)
+    tips = (np.array(everyone("poses", lambda *pose: drawn.brought(*pose)[1], POSES)) - origin) @ turn
+    residuals = tips - position_of(targets)
     rested = np.isfinite(residuals).all(axis=1)
     poses = RestingPoses((chain.straight_lengths - drawn.commands)[rested], gravity_of(targets)[rested])
     residuals = residuals[rested]
@@ -50,14 +50,14 @@ def measure() -> None:
     print("| learnt from | tip, mm: median / 95 % | within the session's pulls | in the 90 % radius | its length |")
     print("|---|---:|---:|---:|---:|")
     print(row("nothing", residuals[others], within[others]))
-    own = [t for t in trials if t.split == IDENTIFY and is_static(t.experiment) and not t.load and t.measured[-1, -1]]
-    session = posed(own, model)
+    resting = [t for t in trials if t.split == IDENTIFY and is_static(t.experiment) and not t.load]
+    session = posed(resting, model)
     rests = actuated(chain, session.commands, session.gravity @ arm_of(model).turn)
-    tips = np.array([trial.positions[-1, -1] for trial in own])
-    off, known = (tips - origin) @ turn - rests.position, rests.converged
-    there = RestingPoses(chain.straight_lengths - session.commands[known], (session.gravity @ turn)[known])
-    print(learned([ResidualMap.fit(there, off[known], chain.length)], f"the session's {known.sum()} static trials",
-                  poses[others], residuals[others], within[others]))  # fmt: skip
+    off = (np.array([trial.positions[-1, -1] for trial in resting]) - origin) @ turn - rests.position
+    usable = rests.converged & np.array([trial.measured[-1, -1] for trial in resting])
+    there = RestingPoses(chain.straight_lengths - session.commands, session.gravity @ turn)[usable]
+    fitted, name = ResidualMap.fit(there, off[usable], chain.length), f"the session's {usable.sum()} static trials"
+    print(learned([fitted], name, poses[others], residuals[others], within[others]))
     for size in SIZES:
         chosen = [rng.permutation(learnt)[:size] for _ in range(SETS if 2 * size < len(learnt) else 1)]
         maps = [ResidualMap.fit(poses[rows], residuals[rows], chain.length) for rows in chosen]
@@ -68,10 +68,10 @@ def measure() -> None:
 
 def learned(maps: list[ResidualMap], name: str, poses: RestingPoses, residuals: np.ndarray, within: np.ndarray) -> str:
     """A row of the table, of several maps together."""
-    left = np.concatenate([residuals - one.mean(poses) for one in maps])
-    radius = np.concatenate([one.radius(poses, SHARE) for one in maps])
-    share, worth = np.mean(np.linalg.norm(left, axis=1) <= radius), sum(one.is_worth_it for one in maps)
-    name += "" if worth == len(maps) else f" (worth it by its own poses: {worth} of {len(maps)})"
+    left = np.concatenate([residuals - fitted.mean(poses) for fitted in maps])
+    radius = np.concatenate([fitted.radius(poses, SHARE) for fitted in maps])
+    share, worth = np.mean(np.linalg.norm(left, axis=1) <= radius), sum(fitted.is_worth_it for fitted in maps)
+    name += "" if worth == len(maps) else f" (worth it by the poses it learnt from: {worth} of {len(maps)})"
     return row(name, left, np.tile(within, len(maps)), f"{100 * share:.0f} %", f"{1e3 * np.median(radius):.1f}")
 
 

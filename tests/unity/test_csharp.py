@@ -261,7 +261,7 @@ def bends(files: dict[str, bytes], rng: np.random.Generator) -> list[dict]:
 
 def surely(rng: np.random.Generator) -> list[dict]:
     """What Python warns of, for every form of gravity, at either side of each limit."""
-    cases, said = [], []
+    cases, warnings = [], []
     for number in range(60):
         tilt, azimuth = float(rng.uniform(0, 1)), float(rng.uniform(-3, 3))
         down = [math.sin(tilt) * math.cos(azimuth), math.sin(tilt) * math.sin(azimuth), -math.cos(tilt)]
@@ -272,10 +272,10 @@ def surely(rng: np.random.Generator) -> list[dict]:
         meaning = {"inputs": (POSE, TILT, DIRECTION)[number % 3], "doubt_beyond_m": 1, "sure_pulls_m": limits[0],
                    "straight_lengths_m": straight.tolist(), "sure_tilts_deg": limits[1:]}  # fmt: skip
         meaning = {name: json.dumps(value) for name, value in meaning.items()}
-        said.append(bool(ask(answering(commands, meaning), pose[None])["unsure"][0]))
+        warnings.append(bool(ask(answering(commands, meaning), pose[None])["unsure"][0]))
         question = {"pose": pose.tolist(), "commands": commands.tolist(), "straight": straight.tolist(), "sure": limits}
-        cases.append(case(question, {"unsure": said[-1]}))
-    assert 15 < sum(said) < 45
+        cases.append(case(question, {"unsure": warnings[-1]}))
+    assert 15 < sum(warnings) < 45
     return cases
 
 
