@@ -18,7 +18,6 @@ from studies.stage_chain import require_demo
 from trunkline.errors import in_one_line
 from trunkline.kinematics.ik.inputs import gravity_of, position_of
 from trunkline.kinematics.residual.residual_map import ResidualMap, RestingPoses
-from trunkline.model.statics.equilibria import actuated
 from trunkline.model_files import read_model
 from trunkline.recordings.trials.conditions import conditions_of
 from trunkline.recordings.trials.experiments import is_static
@@ -52,9 +51,8 @@ def measure() -> None:
     print(row("nothing", residuals[others], within[others]))
     resting = [t for t in trials if t.split == IDENTIFY and is_static(t.experiment) and not t.load]
     session = posed(resting, model)
-    rests = actuated(chain, session.commands, session.gravity @ arm_of(model).turn)
-    off = (np.array([trial.positions[-1, -1] for trial in resting]) - origin) @ turn - rests.position
-    usable = rests.converged & np.array([trial.measured[-1, -1] for trial in resting])
+    off = (np.array([trial.positions[-1, -1] for trial in resting]) - arm_of(model).tips(session)) @ turn
+    usable = np.isfinite(off).all(axis=1) & np.array([trial.measured[-1, -1] for trial in resting])
     there = RestingPoses(chain.straight_lengths - session.commands, session.gravity @ turn)[usable]
     fitted, name = ResidualMap.fit(there, off[usable], chain.length), f"the session's {usable.sum()} static trials"
     print(learned([fitted], name, poses[others], residuals[others], within[others]))
