@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from trunkline.compute.progress import progress
+from trunkline.files import file_digest
 from trunkline.kinematics.panda.mjcf import panda_spec
 from trunkline.kinematics.reachability.report import heldout_table, summary
 from trunkline.kinematics.reachability.sampled import read_tips
@@ -16,9 +17,10 @@ from trunkline.pipeline.stage import output_folder, run_stage, write_metrics
 from trunkline.report.figures.maps import heldout_figure, maps_figure, slices_figure
 from trunkline.report.figures.style import save_figure
 from trunkline.settings import settings
+from trunkline.twin.discrepancy import FILE, read_lacking
 
 SAMPLES = Path("data/processed/fk_dataset/samples.parquet")
-ARTIFACTS = Path("artifacts/reachability")
+ARTIFACTS, LACKING = Path("artifacts/reachability"), Path("artifacts") / FILE
 
 
 @settings
@@ -30,7 +32,8 @@ class Config(SurveySettings):
 
 def main(config: Config) -> None:
     chain = read_chain(read_model(Path(config.model))).smooth
-    tips_at = read_tips(SAMPLES, chain, config.soft, config.seed)
+    lacking = read_lacking(LACKING, file_digest(Path(config.model)))
+    tips_at = read_tips(SAMPLES, chain, config.soft, config.seed, lacking and lacking.residual_map)
     with progress(config.parts(tips_at), "reachability", "parts") as bar:
         maps, check = survey(tips_at, config, lambda part: bar.update(1, done=part))
 

@@ -10,7 +10,7 @@ from trunkline.kinematics.dataset.samples import read_samples
 from trunkline.kinematics.ik.inputs import inputs_of
 from trunkline.kinematics.ik.learn import Learning, learn
 from trunkline.kinematics.ik.on_plant import Rig
-from trunkline.kinematics.ik.onnx import SurePulls
+from trunkline.kinematics.ik.onnx import TrialsAtRest
 from trunkline.kinematics.ik.report import histogram, summary
 from trunkline.model.statics.chain import read_chain
 from trunkline.model_files import read_model
@@ -46,8 +46,10 @@ def main(config: Config) -> None:
         rig = Rig(reach, conditions_of(read_trials(TRIALS, DECIDING)).pulls)
     inputs = inputs_of(table)
     lacking = read_lacking(LACKING, file_digest(Path(config.model)))
-    sure = lacking and SurePulls(chain.straight_lengths, lacking.sure_pulls, lacking.tilt_deg, lacking.pulled_tilt_deg)
-    learned = learn(model, chain, table, config, rig, sure)
+    at_rest = lacking and TrialsAtRest(
+        chain.straight_lengths, lacking.sure_pulls, lacking.tilt_deg, lacking.pulled_tilt_deg, lacking.residual_map
+    )
+    learned = learn(model, chain, table, config, rig, at_rest)
 
     with output_folder(ARTIFACTS) as folder:
         onnx.save(learned.exported, str(folder / "ik.onnx"))

@@ -1,9 +1,9 @@
 """What poses that a lab records are worth: `python -m studies.residual_map`
 
 The lab's arm is sent commands that are drawn as `train_ik` draws them, with another seed, and moves by itself until its
-cameras see it rest (`qualification/seen.py`). From some of these poses `trunkline/kinematics/residual` learns how far
-the tip rests beside the twin's; the others, which nothing has learnt from, say how near it then is, and how often it
-is within the radius of 90 %. Beside it: nothing learnt, and learnt from the static trials that the session has anyway.
+cameras see it rest (`qualification/seen.py`). From some of these poses a certificate learns how far the tip rests beside
+the twin's; the others, which nothing has learnt from, say how near it then is, and how often it is within the radius
+that the certificate states. Beside it: nothing learnt, and learnt from the static trials that the session has anyway.
 Takes some ten minutes.
 """
 
@@ -13,70 +13,91 @@ from pathlib import Path
 
 import numpy as np
 
-from qualification.seen import MODEL, DrawnPoses, everyone
+from qualification.seen import MODEL, NOISE, DrawnPoses, everyone
 from studies.stage_chain import require_demo
 from trunkline.errors import in_one_line
-from trunkline.kinematics.ik.inputs import gravity_of, position_of
-from trunkline.kinematics.residual.residual_map import ResidualMap, RestingPoses
-from trunkline.model_files import read_model
+from trunkline.identification.evaluation.evaluation import replay
+from trunkline.kinematics.ik.inputs import gravity_of
 from trunkline.recordings.trials.conditions import conditions_of
 from trunkline.recordings.trials.experiments import is_static
 from trunkline.recordings.trials.splits import DECIDING, IDENTIFY
 from trunkline.recordings.trials.trial import read_trials
 from trunkline.report.certificate.arms import arm_of
-from trunkline.report.certificate.poses import posed
+from trunkline.report.certificate.budget import Budget, Inputs, budget, held_out
+from trunkline.report.certificate.coverage import is_inside
+from trunkline.report.certificate.held_out import learnt_from, tip_residuals
+from trunkline.report.certificate.poses import StaticPoses, posed
+from trunkline.twin.twin import Twin
 from upkeep.results import recorded
 
 TRIALS = Path("data/processed/filter")
 SEED, POSES, HELD_OUT = 49_001, 300, 100
+OTHERS = slice(-HELD_OUT, None)
+ARMS, EACH = 60, 40  # draws of the parameters, and of everything else with each
 SIZES, SETS = (15, 30, 60, 100, 200), 5
-SHARE = 0.9
+
+
+class Recorded:
+    """Poses of the lab's arm: in the frame of the twin's mount, and by how far the tip rests beside the twin's, m (N,
+    3). within: whether their pulls add up to no more than in the session. Shape (N,)."""
+
+    def __init__(self, count: int, rng: np.random.Generator) -> None:
+        self.twin = Twin.load(MODEL)
+        drawn, arm = DrawnPoses(count, rng), arm_of(self.twin.arm.model)
+        tips = np.array(everyone("poses", lambda *pose: drawn.brought(*pose)[1], count))
+        poses = StaticPoses(gravity_of(drawn.targets) @ arm.turn.T, drawn.commands)
+        self.residuals = (tips - arm.tips(poses)) @ arm.turn
+        rested = np.isfinite(self.residuals).all(axis=1)
+        self.poses, self.residuals = poses[rested], self.residuals[rested]
+        self.trials = read_trials(TRIALS, DECIDING)
+        pulls = np.maximum(arm.chain.straight_lengths - self.poses.commands, 0).sum(axis=1)
+        self.within = pulls <= conditions_of(self.trials).pulls
+
+    def session(self) -> tuple[StaticPoses, np.ndarray]:
+        """Poses and residuals of the static trials that the stages fitted."""
+        model = self.twin.arm.model
+        trials = [t for t in self.trials if t.split == IDENTIFY and is_static(t.experiment) and not t.load]
+        residuals = tip_residuals(model, trials, replay(model, [], trials[0].markers).tip)
+        usable = np.isfinite(residuals).all(axis=1)
+        return posed(trials, model)[usable], residuals[usable]
+
+    def stated(self, poses: StaticPoses, residuals: np.ndarray, learn: bool = True) -> Budget:
+        """Tips and radii that a certificate states of the others, had these poses been held out."""
+        model, rng = self.twin.arm.model, np.random.default_rng(SEED)
+        learnt, missed = learnt_from(model, poses, residuals) if learn else (None, residuals)
+        lengths = np.linalg.norm(missed, axis=1)
+        lacking = held_out(model, self.twin.posterior, NOISE, poses, lengths, ARMS, rng)
+        return budget(Inputs(model, self.twin.posterior, lacking, NOISE, learnt), self.poses[OTHERS], ARMS, EACH, rng)
 
 
 def measure() -> None:
     rng = np.random.default_rng(SEED)
-    drawn = DrawnPoses(POSES, rng)
-    model, chain, (origin, turn), targets = read_model(MODEL), drawn.chain, drawn.frame, drawn.targets
-    tips = (np.array(everyone("poses", lambda *pose: drawn.brought(*pose)[1], POSES)) - origin) @ turn
-    residuals = tips - position_of(targets)
-    rested = np.isfinite(residuals).all(axis=1)
-    poses = RestingPoses((chain.straight_lengths - drawn.commands)[rested], gravity_of(targets)[rested])
-    residuals = residuals[rested]
-    trials = read_trials(TRIALS, DECIDING)
-    within = np.maximum(poses.pulls, 0).sum(axis=1) <= conditions_of(trials).pulls
-    learnt, others = np.arange(len(poses) - HELD_OUT), slice(len(poses) - HELD_OUT, None)
+    recorded_poses = Recorded(POSES, rng)
+    others = recorded_poses.poses[OTHERS]
+    arm = arm_of(recorded_poses.twin.arm.model)
+    tips = arm.tips(others) + recorded_poses.residuals[OTHERS] @ arm.turn.T
+    learnt, within = np.arange(len(recorded_poses.poses) - HELD_OUT), recorded_poses.within[OTHERS]
 
-    print("| learnt from | tip, mm: median / 95 % | within the session's pulls | in the 90 % radius | its length |")
+    print("| learnt from | tip, mm: median / 95 % | within the session's pulls | in the 95 % radius | its length |")
     print("|---|---:|---:|---:|---:|")
-    print(row("nothing", residuals[others], within[others]))
-    resting = [t for t in trials if t.split == IDENTIFY and is_static(t.experiment) and not t.load]
-    session = posed(resting, model)
-    off = (np.array([trial.positions[-1, -1] for trial in resting]) - arm_of(model).tips(session)) @ turn
-    usable = np.isfinite(off).all(axis=1) & np.array([trial.measured[-1, -1] for trial in resting])
-    there = RestingPoses(chain.straight_lengths - session.commands, session.gravity @ turn)[usable]
-    fitted, name = ResidualMap.fit(there, off[usable], chain.length), f"the session's {usable.sum()} static trials"
-    print(learned([fitted], name, poses[others], residuals[others], within[others]))
+    poses, residuals = recorded_poses.session()
+    print(row(f"nothing; radius by the session's {len(poses)} trials", tips, [recorded_poses.stated(poses, residuals, False)], within))
+    print(row("the session's trials", tips, [recorded_poses.stated(poses, residuals)], within))
     for size in SIZES:
-        chosen = [rng.permutation(learnt)[:size] for _ in range(SETS if 2 * size < len(learnt) else 1)]
-        maps = [ResidualMap.fit(poses[rows], residuals[rows], chain.length) for rows in chosen]
-        name = f"{size} poses" + (f", {len(maps)} sets" if len(maps) > 1 else "")
-        print(learned(maps, name, poses[others], residuals[others], within[others]))
-    print(f"\n{HELD_OUT} other poses; in {within[others].sum()} motors pull by no more than in the session.")
+        sets = [rng.permutation(learnt)[:size] for _ in range(SETS if 2 * size < len(learnt) else 1)]
+        stated = [recorded_poses.stated(recorded_poses.poses[rows], recorded_poses.residuals[rows]) for rows in sets]
+        print(row(f"{size} poses" + (f", {len(sets)} sets" if len(sets) > 1 else ""), tips, stated, within))
+    print(f"\n{len(others)} other poses; in {within.sum()} motors pull by no more than in the session.")
 
 
-def learned(maps: list[ResidualMap], name: str, poses: RestingPoses, residuals: np.ndarray, within: np.ndarray) -> str:
-    """A row of the table, of several maps together."""
-    left = np.concatenate([residuals - fitted.mean(poses) for fitted in maps])
-    radius = np.concatenate([fitted.radius(poses, SHARE) for fitted in maps])
-    share, worth = np.mean(np.linalg.norm(left, axis=1) <= radius), sum(fitted.is_worth_it for fitted in maps)
-    name += "" if worth == len(maps) else f" (worth it by the poses it learnt from: {worth} of {len(maps)})"
-    return row(name, left, np.tile(within, len(maps)), f"{100 * share:.0f} %", f"{1e3 * np.median(radius):.1f}")
-
-
-def row(name: str, left: np.ndarray, within: np.ndarray, share: str = "–", radius: str = "–") -> str:
-    lengths = 1e3 * np.linalg.norm(left, axis=1)
-    both = [" / ".join(f"{np.quantile(part, q):.1f}" for q in (0.5, 0.95)) for part in (lengths, lengths[within])]
-    return f"| {name} | {' | '.join(both)} | {share} | {radius} |"
+def row(name: str, tips: np.ndarray, stated: list[Budget], within: np.ndarray) -> str:
+    """Of the table: tips (N, 3), m, beside what each of some certificates states of them."""
+    left = 1e3 * np.concatenate([np.linalg.norm(tips - each.tips, axis=1) for each in stated])
+    both = [" / ".join(f"{np.nanquantile(part, q):.1f}" for q in (0.5, 0.95))
+            for part in (left, left[np.tile(within, len(stated))])]  # fmt: skip
+    share = np.mean([is_inside(tips, each).mean() for each in stated])
+    radius = np.median([np.median(each.radius) for each in stated])
+    return f"| {name} | {' | '.join(both)} | {100 * share:.0f} % | {1e3 * radius:.1f} |"
 
 
 @in_one_line

@@ -1,11 +1,13 @@
 """What the model lacks goes with the twin: from the artifacts, and from a package made of them."""
 
+import hashlib
 import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from tests.support.residual import everywhere
 from tests.unity.test_assemble import LABEL, ROBOT, TRAJECTORY, sources  # noqa: F401
 from trunkline.errors import InputError
 from trunkline.files import file_digest
@@ -36,6 +38,19 @@ def test_the_package_has_it_as_the_artifacts_have(sources, tmp_path):  # noqa: F
     there = read_lacking(tmp_path / FILE, model)
     assert there is not None
     assert there.table() == packed.table()
+
+
+def test_a_residual_map_goes_with_it(sources):  # noqa: F811
+    model = hashlib.sha256(sources.mjcf.encode()).hexdigest()
+    learnt = replace(lacking(model), residual_map=everywhere([0.001, 0.002, -0.003]))
+    table = json.loads(json.dumps(learnt.table()))
+    files, _ = assemble(LABEL, replace(sources, lacking=table), TRAJECTORY, ROBOT)
+    packed = Twin.of_package(files).lacking
+    assert packed is not None
+    assert packed.residual_map is not None
+    assert packed.residual_map.table() == everywhere([0.001, 0.002, -0.003]).table()
+    with pytest.raises(InputError, match=r"^file: .*residual map.*expected what the stage report writes"):
+        Lacking.from_table(table | {"residual_map": table["residual_map"] | {"numbers": [1.0]}}, model, "file")
 
 
 def test_a_package_and_artifacts_without_it_load_and_know_nothing_of_it(sources, tmp_path):  # noqa: F811

@@ -17,11 +17,13 @@ from pathlib import Path
 import numpy as np
 
 from trunkline.errors import InputError
+from trunkline.kinematics.residual.residual_map import ResidualMap
 from trunkline.recordings.trials.conditions import PULLED
 
 FILE = Path("report/discrepancy.json")  # in a folder of artifacts
 UNITS = {"scales": ["m", "1", "1"], "tilt_deg": "deg", "pulled_tilt_deg": "deg", "pull": "m", "pulls": "m",
-         "sure_pulls": "m", "load": "kg"}  # fmt: skip
+         "sure_pulls": "m", "load": "kg",
+         "residual_map": {"pulls": "m", "gravity": "m/s^2", "residuals": "m"}}  # fmt: skip
 SAME_TILT = 1e-6  # deg, of rounding
 SURE = 0.01  # of the arm's length: a tip that may be further off is worth a warning
 DIGITS = 6  # of a scale; trials leave each open by far more
@@ -66,7 +68,8 @@ class Lacking:
 
     model: SHA-256 of its file. tilt_deg: of the mount. pulled_tilt_deg: of the mount while a motor pulled. pull: of one
     motor, m. pulls: of all motors together, m. sure_pulls: likewise, up to which the certificate has the tip within
-    `SURE` of the arm's length; 0 where none says so. load: at the tip, kg.
+    `SURE` of the arm's length; 0 where none says so. load: at the tip, kg. residual_map: the part of it that recorded
+    poses tell, None where there are too few; the discrepancy is then of the rest.
     """
 
     model: str
@@ -77,6 +80,7 @@ class Lacking:
     pulls: float
     sure_pulls: float = 0.0
     load: float = 0.0  # held-out trials with a load tell nothing of the model alone
+    residual_map: ResidualMap | None = None
 
     def beyond(self, pulls: np.ndarray, tilt_deg: float) -> str:
         """What of a pose at rest without a load no trial went up to, "" where trials did: what each motor draws in, m
@@ -96,8 +100,9 @@ class Lacking:
         names = ("tilt_deg", "pulled_tilt_deg", "pull", "pulls", "sure_pulls", "load")
         bounds = {name: getattr(self, name) for name in names}
         scales = [[float(f"{scale:.{DIGITS}g}") for scale in triple] for triple in self.discrepancy.scales.tolist()]
+        learnt = {} if self.residual_map is None else {"residual_map": self.residual_map.table()}
         return {"model": self.model, "trials": self.discrepancy.trials, "units": UNITS, "conditions": bounds,
-                "scales": scales}  # fmt: skip
+                "scales": scales} | learnt  # fmt: skip
 
     @classmethod
     def from_table(cls, table: dict | None, model: str, source: str) -> "Lacking | None":
@@ -113,7 +118,8 @@ class Lacking:
                 return None
             scales = np.array(table["scales"], dtype=float).reshape(-1, len(UNITS["scales"]))
             bounds = {name: float(bound) for name, bound in table["conditions"].items()}
-            return cls(model, Discrepancy(scales, int(table["trials"])), **bounds)
+            learnt = ResidualMap.from_table(table["residual_map"]) if "residual_map" in table else None
+            return cls(model, Discrepancy(scales, int(table["trials"])), **bounds, residual_map=learnt)
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise InputError(f"{source}: {error!r}, expected what the stage report writes") from error
 

@@ -106,8 +106,15 @@ class Twin:
         spec, tables = arm_of(files), tables_of(files)
         model = Path(manifest["hybrid"]["arm"])
         provenance = Provenance(model, manifest["sha256"], tables, digest, manifest["versions"])
-        lacking = Lacking.from_table(lacking_of(files), provenance.digest, manifest["hybrid"]["parameters"])
-        return cls(spec, ArmModel(spec.compile()), Posterior.from_tables(tables), provenance, lacking)
+        return cls(spec, ArmModel(spec.compile()), Posterior.from_tables(tables), provenance, package_lacking(files))
+
+
+def package_lacking(files: dict[str, bytes]) -> Lacking | None:
+    """What the arm of a package lacks; None where nobody knows."""
+    manifest = manifest_of(files)
+    hybrid = manifest.block("hybrid")
+    model = manifest.block("sha256").text(hybrid.text("arm"))
+    return Lacking.from_table(lacking_of(files), model, hybrid["parameters"])
 
 
 def _check_chain(model: mujoco.MjModel, path: Path) -> None:

@@ -8,14 +8,16 @@ import pytest
 
 from tests.ar.hybrid.conftest import hybrid_settings
 from tests.support.operator import READY_JOINTS
+from tests.support.residual import everywhere
 from tests.support.small_arm import small_spec
 from trunkline.ar.hybrid.rollout_batch import preview
 from trunkline.ar.hybrid.rollouts import CommandTrajectory
-from trunkline.ar.hybrid.tip_uncertainty import BaseAlignment, TipUncertainty
+from trunkline.ar.hybrid.tip_uncertainty import BaseAlignment, TipShift, TipUncertainty
 from trunkline.ar.hybrid.uncertainty import GraspUncertainty
 from trunkline.ar.preview.preview_twin import RobotModel, compose_twin
 from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.teleop.messages import World
+from trunkline.kinematics.panda.kinematics import mount_pose
 from trunkline.kinematics.panda.mounts import PandaRobot
 from trunkline.model.arm.guide_holes import GuideHoles, add_holes
 from trunkline.model.arm_model import ArmModel
@@ -57,3 +59,29 @@ def test_the_friction_band_is_left_out_where_the_model_that_is_stepped_rubs(hole
     assert half == 0 or half > 1e-3
     radius = preview(twin, trajectory, made.uncertainty, None, 2, tip=tip).stated.radii[-1]
     assert radius == pytest.approx(0.9 * half, rel=0.1, abs=1e-6)
+
+
+def test_poses_of_the_arm_move_the_tip_that_is_stated_and_not_its_radius():
+    """By a map in the arm's base frame, whose y and z are opposite to the flange's."""
+    made = robot_model(CASES["no friction on the holes"])
+    trajectory = pull(made.arm.copy().compile())
+    twin = compose_twin(made, World("w"), None, trajectory.joints[0], trajectory.commands[0], SETTINGS)
+    shift = np.array([0.004, 0.002, -0.001])
+    knows = replace(made, lacking=replace(LACKING, residual_map=everywhere(list(shift))))
+    stated = []
+    for robot in (made, knows):
+        tip = robot.tip_uncertainty(trajectory, None)
+        assert isinstance(tip, TipUncertainty)
+        foreseen = preview(twin, trajectory, made.uncertainty, None, 2, tip=tip)
+        stated.append(foreseen.stated)
+        np.testing.assert_allclose(foreseen.shown[-1] - foreseen.nominal.tip[0, -1],
+                                   tip.shift.shifts[-1] if tip.shift else np.zeros(3))  # fmt: skip
+    flange = mount_pose(np.array([READY_JOINTS]), made.robot.mount_offset)[1][0]
+    expected = flange @ (shift * [1, -1, -1])
+    np.testing.assert_allclose(stated[1].tips - stated[0].tips, np.tile(expected, (len(stated[0].tips), 1)), atol=1e-6)
+    np.testing.assert_array_equal(stated[1].radii, stated[0].radii)
+
+
+def test_a_shift_is_taken_where_the_plan_is():
+    shift = TipShift(np.array([0.0, 1.0]), np.array([[0.0, 0.0, 0.0], [0.002, 0.0, -0.004]]))
+    np.testing.assert_allclose(shift.at(np.array([0.5, 2.0])), [[0.001, 0, -0.002], [0.002, 0, -0.004]])

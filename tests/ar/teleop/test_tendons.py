@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.support.bent_chain import hardening_stump
+from tests.support.residual import everywhere
 from trunkline.ar.teleop.correction import Bent, corrected
 from trunkline.ar.teleop.tendons import Network, bend
 from trunkline.errors import InputError
@@ -48,6 +49,17 @@ def test_statics_bring_the_tip_where_a_poor_network_leaves_it_short(chain, azimu
     np.testing.assert_allclose(bent.tip, target, atol=1e-4)
     rest = settle(hardening_stump(), bent.commands[None], STANDARD_GRAVITY * down)
     np.testing.assert_allclose(rest.position[0], bent.tip, atol=5e-4)
+
+
+@pytest.mark.parametrize("shift", [[0.0, 0.0, 0.004], [0.003, -0.002, 0.0]])
+def test_with_a_residual_map_the_arm_s_tip_comes_to_the_target_and_the_twin_s_beside_it(chain, shift):
+    down = downwards(0.6, 1.0)
+    network, on_twin, _ = poor(chain, down)
+    target = tuple(np.array(on_twin) + shift)
+    bent = bend(network, target, tuple(map(float, down)), 0.02, chain, everywhere(shift, chain.tendons))
+    np.testing.assert_allclose(bent.tip, target, atol=1e-4)
+    rest = actuated(chain, bent.commands[None], STANDARD_GRAVITY * down)
+    np.testing.assert_allclose(rest.position[0], on_twin, atol=1e-4)
 
 
 @pytest.mark.parametrize("beyond", [0.0, 0.01, 0.02])

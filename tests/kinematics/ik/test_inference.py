@@ -6,9 +6,12 @@ import onnxruntime
 import pytest
 
 from trunkline.errors import InputError
+from trunkline.frames import STANDARD_GRAVITY
 from trunkline.kinematics.ik.inference import ask, tilts_of
+from trunkline.kinematics.ik.inputs import gravity_of, position_of
 from trunkline.kinematics.ik.network import InverseKinematics
-from trunkline.kinematics.ik.onnx import SurePulls, to_onnx
+from trunkline.kinematics.ik.onnx import TrialsAtRest, to_onnx
+from trunkline.kinematics.residual.residual_map import ResidualMap, RestingPoses
 
 POSE = np.array([[0.3, 0.1, 0.0, -0.4, 1.0, 0.0, 0.0, 0.0], [0.2, 0.1, 0.1, -0.3, 0.6, 0.0, -0.8, 0.0]])
 QUATERNION = slice(4, 8)
@@ -100,8 +103,35 @@ def test_beyond_what_a_certificate_vouches_for_it_is_unsure_and_without_one_ever
     """The mount is tilted by 17 and 11 deg. What a motor lets out makes up for nothing; pulls in mm."""
     commands = np.tile([0.4, 0.5, 0.6], (2, 1))
     network = InverseKinematics(8, POSE, commands, commands + 0.01)
-    sure = None if most is None else SurePulls(commands[0] + 1e-3 * np.array(pulls), 1e-3 * most, *tilts)
+    sure = None if most is None else TrialsAtRest(commands[0] + 1e-3 * np.array(pulls), 1e-3 * most, *tilts)
     assert ask(session(to_onnx(network, ["a", "b", "c"], 0.05, sure)), POSE)["unsure"].tolist() == [unsure] * 2
+
+
+GRAVITIES = {7: np.zeros((2, 0)), 8: np.array([[0.3], [-0.4]]), 10: np.array([[0.6, 0.0, -0.8], [0.0, 0.6, -0.8]])}
+
+
+@pytest.mark.parametrize("gravity", GRAVITIES.values(), ids=GRAVITIES)
+def test_with_a_residual_map_commands_are_for_the_twin_s_tip_less_the_map_and_the_tip_is_the_arm_s(gravity):
+    """The map is one that pulls and gravity change by tenths of a millimetre from pose to pose, at 2 cm in the middle;
+    a last step changes hardly anything."""
+    poses = np.column_stack([gravity, POSE[:, 1:]])
+    commands, rng = np.array([[0.4, 0.5, 0.6], [0.41, 0.52, 0.58]]), np.random.default_rng(0)
+    network, straight = InverseKinematics(8, poses, commands, commands + 0.01), np.array([0.42, 0.53, 0.6])
+    down = np.tile([0.0, 0.0, -STANDARD_GRAVITY], (6, 1)) + rng.normal(size=(6, 3)) * (gravity.shape[1] > 0)
+    learnt = ResidualMap(RestingPoses(rng.uniform(0, 0.03, (6, 3)), down * (gravity.shape[1] > 0)),
+                         np.array([0.01, -0.015, 0.008]) + 1e-3 * rng.normal(size=(6, 3)),
+                         np.array([0.01, 1e-4, 2.0, 3.0, 1.5]))  # fmt: skip
+    alone, at_rest = to_onnx(network, ["a", "b", "c"], 0.05), TrialsAtRest(straight, 0.0, 0.0, 0.0, learnt)
+    both = ask(session(to_onnx(network, ["a", "b", "c"], 0.05, at_rest)), poses)
+    shift = learnt.mean(RestingPoses(straight - both["commands"], gravity_of(poses)))
+    assert np.linalg.norm(shift, axis=1).min() > 5e-3
+    aimed = poses.copy()
+    position_of(aimed)[:] -= shift
+    again = ask(session(alone), aimed)
+    for name in ("commands", "lengths"):
+        np.testing.assert_allclose(both[name], again[name], atol=2e-5)
+        assert np.abs(both[name] - ask(session(alone), poses)[name]).max() > 2e-4
+    np.testing.assert_allclose(both["tip"], again["tip"] + shift, atol=2e-5)
 
 
 def test_tilts_of_every_form_of_gravity():

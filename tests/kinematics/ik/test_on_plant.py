@@ -6,7 +6,7 @@ import pytest
 from tests.kinematics.ik.test_as_controls import ANGLES, exact
 from trunkline.kinematics.ik.as_controls import draw_targets
 from trunkline.kinematics.ik.inputs import gravity_of, position_of
-from trunkline.kinematics.ik.on_plant import Rig, across_surface, score_on_plant
+from trunkline.kinematics.ik.on_plant import Rig, across_surface, record, score_on_plant
 from trunkline.model.simulation.rest import settle
 from trunkline.model.statics.equilibria import actuated
 
@@ -129,3 +129,44 @@ def test_either_warning_of_the_network_s_counts(model, chain, drawn, warning):
 
     far = score(model, chain, drawn, Shifted(model, chain, 0.02 * chain.length), ask, pulls=np.inf)
     assert (far["beyond_1pct"], far["beyond_1pct_unsaid"]) == (12, 8)
+
+
+def test_the_trusted_are_within_and_not_doubted_and_the_sure_are_those_of_them_that_are_not_unsure(model, chain, drawn):
+    def ask(poses):
+        rows = np.arange(len(poses))
+        return exact(chain)(poses) | {"doubtful": rows < 3, "unsure": (rows < 1) | (rows > 9)}
+
+    result = score(model, chain, drawn, Shifted(model, chain, 0.02 * chain.length), ask, pulls=np.inf)
+    assert [result[name]["targets"] for name in ("within", "trusted", "sure")] == [12, 9, 7]
+    assert [result[name]["beyond_1pct"] for name in ("within", "trusted", "sure")] == [12, 9, 7]
+    nothing = score(model, chain, drawn, Shifted(model, chain), ask, pulls=0.0)
+    assert nothing["sure"] == nothing["trusted"] == {"targets": 0}
+
+
+def test_poses_of_the_arm_tell_how_far_it_is_aside(model, chain):
+    many = draw_targets(model, chain, ANGLES, np.full(3, 0.01), 24, np.random.default_rng(1))
+    shift, rig = 2 * MM, Shifted(model, chain, 2 * MM, never=[0])
+    learnt = record(model, chain, many.targets, many.commands, Rig(rig.reach, 1.0))
+    assert learnt is not None
+    assert len(learnt.poses) == len(many.targets) - 1
+    np.testing.assert_allclose(learnt.residuals, np.tile([shift, 0, 0], (len(learnt.poses), 1)), atol=0.05 * MM)
+    few = Shifted(model, chain, never=range(len(many.targets) - 14))
+    assert record(model, chain, many.targets, many.commands, Rig(few.reach, 1.0)) is None
+
+
+def test_other_networks_are_scored_beside_on_the_same_tips(model, chain, drawn):
+    """One that knows of the arm misses nothing, and the arm's own tips are sought once."""
+    rig, knows = Shifted(model, chain, MM), exact(chain)
+
+    def informed(poses):
+        aimed = poses.copy()
+        position_of(aimed)[:, 0] -= MM
+        return knows(aimed)
+
+    result = score_on_plant(
+        model, chain, exact(chain), drawn.targets, drawn.commands, Rig(rig.reach, 1.0), {"with_poses": informed}
+    )
+    assert len(rig.sent) == 5
+    own = [part["own_surface"]["position_error_mm"]["median"] for part in (result["with_poses"], result)]
+    assert own[0] < 0.05 < own[1]
+    assert set(result["with_poses"]) == set(result) - {"with_poses"}

@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from tests.support.bent_chain import hardening_stump
+from tests.support.residual import everywhere
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY, downwards
 from trunkline.kinematics.dataset.gravities import spread
@@ -169,3 +170,25 @@ def test_samples_say_whether_maps_are_of_one_tilt_or_of_gravity_from_any_side(ch
         assert tips_at.largest is None
         np.testing.assert_allclose(np.degrees(tips_at.angles), [0, 70])
         assert len(tips_at(0.0).positions) == len(samples) // 2
+
+
+@pytest.mark.parametrize("azimuth", [0.0, 1.0])
+def test_maps_are_of_the_arm_s_tips_where_poses_tell_of_them(chain, tmp_path, azimuth):
+    shift, rng = [0.003, -0.001, 0.002], np.random.default_rng(0)
+    samples = pd.concat([
+        sample_table(chain, downwards(angle, azimuth), 30, 8, 8, rng)[0] for angle in (0.0, np.radians(70))
+    ])
+    samples.assign(split="train").to_parquet(tmp_path / "samples.parquet")
+    plain, arm = (read_tips(tmp_path / "samples.parquet", chain, SOFT, 0, learnt)
+                  for learnt in (None, everywhere(shift, chain.tendons)))  # fmt: skip
+    for angle in (0.0, np.radians(30)):
+        apart = arm(angle).positions - plain(angle).positions
+        np.testing.assert_allclose(apart, np.tile(shift, (len(apart), 1)), atol=1e-6)
+        np.testing.assert_array_equal(arm(angle).lengths, plain(angle).lengths)
+
+
+def test_a_surface_of_the_arm_s_tips_is_the_twin_s_moved(chain):
+    shift, down = [0.003, -0.001, 0.002], np.array([[0.0, 0.0, -1.0]])
+    learnt = everywhere(shift, chain.tendons)
+    plain, arm = (build_surfaces(chain, down, 8, 6, 0.02, lambda: None, each) for each in (None, learnt))
+    np.testing.assert_allclose(arm.points[0] - plain.points[0], np.broadcast_to(shift, (8, 6, 3)), atol=3e-4)

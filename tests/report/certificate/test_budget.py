@@ -1,6 +1,6 @@
 """The budget is the textbook's where the arm is linear, and its draws are of what it says."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -8,6 +8,7 @@ from scipy.stats import chi
 from scipy.stats import t as student
 
 from tests.support.matched_plant import small_model
+from tests.support.residual import everywhere
 from trunkline.identification.parameters.parameters import PARAMETERS
 from trunkline.identification.simulate.experiment import SLACK
 from trunkline.recordings.trials.conditions import Conditions
@@ -223,3 +224,12 @@ def test_poses_lie_within_the_conditions(model):
     tilt = np.degrees(np.arccos(-poses.gravity[:, 2] / np.linalg.norm(poses.gravity, axis=1)))
     assert tilt[pulled].max() <= 10.0
     assert 10.0 < tilt[~pulled].max() <= 60.0
+
+
+def test_the_tip_that_it_is_about_is_moved_by_the_residual_map(model):
+    poses, inputs = straight(model, 2), Inputs(model, nothing_known(), None, 1e-4)
+    turn, shift = arm_of(model).turn, np.array([0.002, -0.001, 0.003])
+    maps = None, everywhere(list(shift))
+    tips = [budget(replace(inputs, residual_map=m), poses, 2, 5, np.random.default_rng(0)) for m in maps]
+    np.testing.assert_allclose(tips[1].tips - tips[0].tips, [turn @ shift] * 2, atol=1e-7)
+    np.testing.assert_array_equal(tips[1].radius, tips[0].radius)

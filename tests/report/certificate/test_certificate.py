@@ -10,14 +10,15 @@ import pytest
 
 from stages.report import CHECKOUT, code
 from tests.report.certificate.sample import ASKED, INGESTED, sample, sample_trials, table, write
-from tests.support.matched_plant import small_model
+from tests.support.matched_plant import small_model, static_pull
 from tests.support.twins import twin_of
 from trunkline.errors import InputError
 from trunkline.recordings.trials.conditions import Conditions
-from trunkline.recordings.trials.splits import DECIDING, TEST
+from trunkline.recordings.trials.splits import DECIDING, TEST, VALIDATE
 from trunkline.report.certificate.budget import FRICTION, LACKING, NOISE
 from trunkline.report.certificate.certificate import COMMAND, check_fitted, digest_of_code, inputs_of
 from trunkline.report.certificate.facts import error_rows, parameter_facts
+from trunkline.report.certificate.page import page
 from trunkline.report.certificate.replays import LOST, UNIT
 from trunkline.report.certificate.words import NOTHING, limits_of, next_step, open_lines, strong_pairs, verdict
 
@@ -204,3 +205,25 @@ def test_the_page_stands_by_itself(html):
                   "Good for", "Not for", "What to do next:", "given the model"):  # fmt: skip
         assert words in html, words
     assert len(html) < 15e6
+
+
+def test_recorded_poses_move_the_tip_that_it_is_about_and_the_page_says_so():
+    """Sixteen pulls in which the tip is seen 5 mm beside the twin's."""
+    model, rng = small_model(4), np.random.default_rng(0)
+    trials = sample_trials(model)
+    for number in range(16):
+        trial = static_pull(model, np.where(np.arange(3) == number % 3, 20 * rng.random(), 0).tolist(), split=VALIDATE)
+        positions = trial.positions.copy()
+        positions[:, -1] += [0.005, 0.0, 0.0]
+        trials.append(replace(trial, name=f"pose_{number:02}", positions=positions))
+    plain, certificate = sample(), sample(model, trials)
+    learnt = certificate.facts["uncertainty"]["residual_map"]
+    assert learnt["poses"] == 19
+    assert learnt["twin"] > 4 > 2 > learnt["left_out"]
+    assert certificate.metrics["residual_map"] == learnt
+    assert "residual_map" not in plain.facts["uncertainty"]
+    assert plain.lacking.residual_map is None
+    assert certificate.lacking.residual_map is not None
+    facts = certificate.facts | {"files": {}, "code": ""}
+    html = page(facts, certificate.replays, {"uncertainty": b"", "poses": b""})
+    assert "A residual map from 19 of them moves the twin's tip" in html

@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tests.report.certificate.test_budget import mounts, nothing_known, straight
 from tests.support.matched_plant import small_model, static_pull
 from trunkline.recordings.trials.splits import VALIDATE
+from trunkline.recordings.trials.trial import Trial
 from trunkline.report.certificate import held_out
 from trunkline.report.certificate.arms import arm_of
 from trunkline.report.certificate.budget import parameter_shifts
@@ -22,9 +24,9 @@ def test_each_trial_is_held_against_the_arm_of_its_own_session(monkeypatch):
         replace(static_pull(model, pulls, split=VALIDATE), session=session)
         for session, model, pulls in (("a", first, [0, 15, 0]), ("b", second, [0, 15, 0]), ("a", first, [15, 0, 0]))
     ]
-    assert held_out.tip_residuals(first, trials, 3) == pytest.approx([0, 0, 0], abs=1e-3)
+    np.testing.assert_allclose(held_out.tip_residuals(first, trials, 3), np.zeros((3, 3)), atol=1e-3)
     others = [replace(trial, session="b" if trial.session == "a" else "a") for trial in trials]
-    assert held_out.tip_residuals(first, others, 3).min() > 3e-3
+    assert np.linalg.norm(held_out.tip_residuals(first, others, 3), axis=1).min() > 3e-3
 
 
 def test_without_parameters_no_draw_moves_the_tip_and_little_doubt_moves_it_little():
@@ -35,3 +37,60 @@ def test_without_parameters_no_draw_moves_the_tip_and_little_doubt_moves_it_litt
     some = parameter_shifts(model, mounts(0.0), arm, poses, 5, rng)
     assert some.shape == (5, len(poses), 3)
     assert 0 < np.abs(some).max() < 0.1 * np.linalg.norm(arm.placed(arm.rest(poses)))
+
+
+SHIFT = np.array([0.004, -0.003, 0.002])  # m, in the frame of the mount
+
+
+def aside(trial: Trial, turn: np.ndarray, rng: np.random.Generator) -> Trial:
+    """The same with its last marker seen elsewhere by SHIFT, and a little noise of the arm."""
+    positions = trial.positions.copy()
+    positions[:, -1] += turn @ (SHIFT + 2e-4 * rng.standard_normal(3))
+    return replace(trial, positions=positions)
+
+
+def posed_trials(model, count: int, rng: np.random.Generator) -> list[Trial]:
+    pulls = [[float(20 * rng.random()) if motor == i % 3 else 0.0 for motor in range(3)] for i in range(count)]
+    return [replace(static_pull(model, pull, split=VALIDATE), name=f"pose_{i}") for i, pull in enumerate(pulls)]
+
+
+@pytest.fixture(scope="module")
+def turned():
+    """A small arm whose mount is turned in the tracked base."""
+    model = small_model(4)
+    quaternion = Rotation.from_euler("x", 5, degrees=True).as_quat(scalar_first=True)
+    model.body_quat[model.body("base").id] = quaternion
+    return model
+
+
+def test_poses_that_are_held_out_tell_where_the_tip_is_and_how_far_it_is_missed_then(turned):
+    rng, arm = np.random.default_rng(0), arm_of(turned)
+    trials = [aside(trial, arm.turn, rng) for trial in posed_trials(turned, 20, rng)]
+    residuals = held_out.tip_residuals(turned, trials, 3)
+    np.testing.assert_allclose(residuals, np.tile(SHIFT, (20, 1)), atol=2e-3)
+    poses = held_out.posed(trials, turned)
+    learnt, missed = held_out.learnt_from(turned, poses, residuals)
+    assert learnt is not None
+    assert np.median(np.linalg.norm(missed, axis=1)) < 0.3 * np.linalg.norm(SHIFT)
+    np.testing.assert_array_equal(missed, learnt.left_out())
+    np.testing.assert_allclose(arm.shift(learnt, poses), residuals @ arm.turn.T, atol=1e-3)
+    none, same = held_out.learnt_from(turned, poses[:14], residuals[:14])
+    assert none is None
+    np.testing.assert_array_equal(same, residuals[:14])
+    noise = 1e-3 * rng.standard_normal((20, 3))
+    none, same = held_out.learnt_from(turned, poses, noise)
+    assert none is None
+    np.testing.assert_array_equal(same, noise)
+
+
+def test_of_many_poses_the_others_are_missed_by_what_the_map_leaves(turned, monkeypatch):
+    monkeypatch.setattr(held_out, "MOST", 16)
+    rng = np.random.default_rng(1)
+    poses = held_out.posed(posed_trials(turned, 31, rng), turned)
+    residuals = SHIFT + 2e-4 * rng.standard_normal((31, 3))
+    learnt, missed = held_out.learnt_from(turned, poses, residuals)
+    assert learnt is not None
+    assert len(learnt.poses) == 16
+    np.testing.assert_allclose(missed[::2], learnt.left_out())
+    resting = arm_of(turned).resting(poses[1::2])
+    np.testing.assert_allclose(missed[1::2], residuals[1::2] - learnt.mean(resting))

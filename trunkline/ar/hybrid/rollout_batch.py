@@ -44,6 +44,7 @@ class PlanPreview:
         success: which of them hold the object, or do what else was asked; None if nobody asked. Shape (B,).
         offsets: of the tip beside the futures', draws for each; None where they are unknown. Shape (B, D, 3).
         unknown: why they are unknown; "" where they are known.
+        shift: by how far the arm's tip is beside the nominal twin's, where poses of the arm tell. Shape (F, 3).
     """
 
     nominal: Piece
@@ -52,6 +53,12 @@ class PlanPreview:
     success: np.ndarray | None
     offsets: np.ndarray | None = None
     unknown: str = CONTACT
+    shift: np.ndarray | None = None
+
+    @property
+    def shown(self) -> np.ndarray:
+        """The nominal path of the arm's tip. Shape (F, 3)."""
+        return self.nominal.tip[0] if self.shift is None else self.nominal.tip[0] + self.shift
 
     @property
     def median(self) -> np.ndarray:
@@ -74,13 +81,12 @@ class PlanPreview:
     def stated(self) -> Stated:
         """Every EVERY s, as a page shows it; the last is of where the tip ends."""
         every = max(round(EVERY / FRAME), 1)
-        shown = self.nominal.tip[0]
         radii = np.empty(0)
         if self.offsets is not None:
-            futures = self.motion.tip[self.motion.sound] - shown
+            futures = self.motion.tip[self.motion.sound] - self.nominal.tip[0]
             moved = futures[:, None, ::every] + self.offsets[self.motion.sound][:, :, None]
             radii = np.quantile(np.linalg.norm(moved, axis=3), WITHIN, axis=(0, 1))
-        return Stated(self.motion.time[::every], shown[::every], radii)
+        return Stated(self.motion.time[::every], self.shown[::every], radii)
 
     @property
     def probability(self) -> float | None:
@@ -125,7 +131,8 @@ def preview(
     success, believed = holding.holds(motion) if holding is not None else None, joined(begun)
     if isinstance(tip, str):
         return PlanPreview(believed, motion, samples, success, None, tip)
-    return PlanPreview(believed, motion, samples, success, offsets_of(tip, believed, count, seed), "")
+    shift = None if tip.shift is None else tip.shift.at(believed.time)
+    return PlanPreview(believed, motion, samples, success, offsets_of(tip, believed, count, seed), "", shift)
 
 
 def offsets_of(tip: TipUncertainty, believed: Piece, count: int, seed: int) -> np.ndarray:

@@ -40,6 +40,18 @@ class Hanging:
 
 
 @dataclass(frozen=True)
+class TipShift:
+    """By how far the tip of the arm rests beside the twin's at `times` (n,), s: `shifts` (n, 3), world, m."""
+
+    times: np.ndarray
+    shifts: np.ndarray
+
+    def at(self, time: np.ndarray) -> np.ndarray:
+        """At `time` (F,), s, linear in between, the ends held, m. Shape (F, 3)."""
+        return np.stack([np.interp(time, self.times, axis) for axis in self.shifts.T], axis=1)
+
+
+@dataclass(frozen=True)
 class TipUncertainty:
     """Of a tip at rest, where futures alone do not say it.
 
@@ -50,6 +62,7 @@ class TipUncertainty:
         alignment: of the frame in which it is shown.
         rotation: of the arm's base frame in the world. Shape (3, 3).
         hanging: None where nobody has seen that.
+        shift: by how far the tip rests beside the twin's along the plan, None where no poses of the arm tell.
     """
 
     discrepancy: Discrepancy
@@ -58,6 +71,7 @@ class TipUncertainty:
     alignment: BaseAlignment
     rotation: np.ndarray
     hanging: Hanging | None = None
+    shift: TipShift | None = None
 
     def offsets(self, mount: np.ndarray, tip: np.ndarray, draws: int, rng: np.random.Generator) -> np.ndarray:
         """Of a tip at `tip` (3,) from a mount at `mount` (3,), world, m. Shape (draws, 3), m."""

@@ -22,11 +22,14 @@ from trunkline.ar.teleop.vectors import DOWN, Vector, conjugate, rotate
 from trunkline.ar.teleop.vibration import shaper_for, slowest, vibration_modes
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
+from trunkline.kinematics.residual.residual_map import ResidualMap, RestingPoses
 from trunkline.model.arm.contact_geometry import read_geometry
 from trunkline.model.arm.geometry import ChainGeometry
 from trunkline.model.simulation.rest import settle
 from trunkline.model.statics.chain import Chain, read_chain
+from trunkline.model.statics.equilibria import actuated
 from trunkline.twin import package
+from trunkline.twin.twin import package_lacking
 from trunkline.unity import unpacked
 from trunkline.unity.upm_package import MODEL
 
@@ -36,7 +39,8 @@ PACKAGES = Path("artifacts/package_unity")
 @dataclass(frozen=True)
 class Package:
     """`straight`: the motors' commands (K,), m, that leave the arm straight; a command is a path length, so a pull is
-    `straight` less the command. `rate_limit`: m/s, of the winches, 0 for none. `files`: contents by path."""
+    `straight` less the command. `rate_limit`: m/s, of the winches, 0 for none. `residual_map`: by how far
+    the arm's tip rests beside its twin's, None where too few poses tell. `files`: contents by path."""
 
     digest: str
     reach: MapReach
@@ -46,6 +50,7 @@ class Package:
     geometry: ChainGeometry
     straight: np.ndarray
     rate_limit: float
+    residual_map: ResidualMap | None
     files: dict[str, bytes] = field(repr=False)
 
     def planner(self, config: TeleoperationConfig) -> Planner:
@@ -56,6 +61,7 @@ class Package:
         return Planner(
             rigid, self.network, self.straight, limits, config.mount_offset, shaper=shaper, chain=self.chain,
             grasping=grasping, advance=config.advance, advance_speed=config.advance_speed,
+            residual_map=self.residual_map,
         )  # fmt: skip
 
     def grips(self, config: TeleoperationConfig) -> dict[str, Grip]:
@@ -69,11 +75,15 @@ class Package:
         return float(max(slowest(vibration_modes(self.model, self.straight, None, gravity), 1).periods, default=0.0))
 
     def tip(self, mount: Vector, targets: Targets, commands: np.ndarray) -> np.ndarray:
-        """Where the twin's tip comes to rest, base frame, m (3,): the arm at `mount` as `targets` turn it, its motors
-        at `commands` (K,)."""
+        """Where the tip comes to rest, base frame, m (3,): the arm at `mount` as `targets` turn it, its motors at
+        `commands` (K,). That is the twin's tip, moved by the residual map."""
         turn = base_quaternion(targets.pointing, targets.heading)
         gravity = STANDARD_GRAVITY * np.array(rotate(conjugate(turn), DOWN))
-        x, y, z = (float(value) for value in settle(self.model, commands[None], gravity).position[0])
+        tip = settle(self.model, commands[None], gravity).position[0]
+        if self.residual_map is not None:
+            rest = actuated(self.chain, commands[None], gravity)
+            tip = tip + self.residual_map.mean(RestingPoses.of(self.chain, rest, gravity[None]))[0]
+        x, y, z = (float(value) for value in tip)
         return np.array(mount) + np.array(rotate(turn, (x, y, z)))
 
 
@@ -99,7 +109,7 @@ def read_package(path: Path) -> Package:
     digest = package.package_digest(files)
     manifest = package.manifest_of(files)
     network, model = manifest["network"], manifest["model"]
-    compiled = unpacked.model_of(files)
+    compiled, lacking = unpacked.model_of(files), package_lacking(files)
     return Package(
         digest,
         MapReach.from_arrays(unpacked.maps_of(files)),
@@ -109,5 +119,6 @@ def read_package(path: Path) -> Package:
         read_geometry(package.spec_of(files, MODEL)),
         np.array([compiled.tendon_length0[compiled.tendon(name).id] for name in network["output_order"]]),
         float(model["rate_limit"]),
+        lacking and lacking.residual_map,
         files,
     )

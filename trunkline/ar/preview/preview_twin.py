@@ -11,7 +11,7 @@ from trunkline.ar.hybrid.compose import Placed, compose, panda_joints
 from trunkline.ar.hybrid.objects import GraspObject
 from trunkline.ar.hybrid.rollouts import CommandTrajectory, ComposedTwin
 from trunkline.ar.hybrid.string import hang
-from trunkline.ar.hybrid.tip_uncertainty import BaseAlignment, Hanging, TipUncertainty
+from trunkline.ar.hybrid.tip_uncertainty import BaseAlignment, Hanging, TipShift, TipUncertainty
 from trunkline.ar.hybrid.uncertainty import Contact, GraspUncertainty
 from trunkline.ar.hybrid.worlds import SupportSurface
 from trunkline.ar.hybrid.worlds import WorldGeometry as Room
@@ -24,7 +24,7 @@ from trunkline.kinematics.panda.kinematics import mount_pose
 from trunkline.kinematics.panda.mounts import PandaRobot
 from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.rest import settle
-from trunkline.report.certificate.arms import arm_of
+from trunkline.report.certificate.arms import StaticArm, arm_of
 from trunkline.report.certificate.poses import StaticPoses
 from trunkline.twin import package
 from trunkline.twin.discrepancy import Lacking
@@ -33,6 +33,7 @@ from trunkline.twin.twin import Twin
 GRAVITY = np.array([[0.0, 0.0, -STANDARD_GRAVITY]])  # m/s², where the arm hangs straight down
 
 LEANS = 4  # times that it is corrected: each leaves a tenth or less
+SHIFTED = 0.2  # s between the places along a plan at which the residual map is asked
 CREEP = 0.01  # share of the way to rest that may be left
 
 
@@ -76,7 +77,19 @@ class RobotModel:
         if not np.isfinite(ways).all():
             return "the twin does not come to rest there"
         hanging = None if hangs is None else Hanging(hangs, places[0], bases[0])
-        return TipUncertainty(self.lacking.discrepancy, ways, friction, self.alignment, base, hanging)
+        shift = self._shift(trajectory, arm, order)
+        return TipUncertainty(self.lacking.discrepancy, ways, friction, self.alignment, base, hanging, shift)
+
+    def _shift(self, trajectory: CommandTrajectory, arm: StaticArm, order: np.ndarray) -> TipShift | None:
+        """By how far the tip rests beside that of `arm` along a trajectory, its cables in that `order` (K,)."""
+        if self.lacking is None or self.lacking.residual_map is None:
+            return None
+        times = np.linspace(0, trajectory.duration, max(round(trajectory.duration / SHIFTED), 1) + 1)
+        rows = trajectory.at(times)
+        joints, commands = np.split(rows, [trajectory.joints.shape[1]], axis=1)
+        bases = _base_frames(joints, self.robot.mount_offset)[1]
+        poses = StaticPoses(np.einsum("nji,j->ni", bases, GRAVITY[0]), commands[:, order])
+        return TipShift(times, np.einsum("nij,nj->ni", bases, arm.shift(self.lacking.residual_map, poses)))
 
     def lean(self, hangs: np.ndarray | None) -> Rotation | None:
         """How the arm is turned on its mount, by the least turns, so that its tip, straight down, comes to rest in the

@@ -274,7 +274,7 @@ def prediction_message(
     return messages.PredictionMessage(
         digest, preview.probability, *low_high, tuple(map(float, prediction.begins + stated.times)), tips,
         tuple(map(float, stated.radii)), WITHIN, len(preview.samples),
-        None if target is None else float(np.linalg.norm(preview.nominal.tip[0, -1] - target)), preview.unknown,
+        None if target is None else float(np.linalg.norm(preview.shown[-1] - target)), preview.unknown,
         prediction.offer,
     )  # fmt: skip
 

@@ -14,10 +14,12 @@ from trunkline.ar.teleop.vectors import IDENTITY, Vector
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.kinematics.dataset.sampling import sections
 from trunkline.kinematics.ik.refine import refine
+from trunkline.kinematics.residual.residual_map import ResidualMap, RestingPoses
 from trunkline.model.statics.chain import Chain
 from trunkline.model.statics.equilibria import actuated
 
 LEVER = 1e-6  # m that a turn of the tip by 1 rad counts: nothing
+ROUNDS = 2  # with a residual map: the network's answer knows of it, so that commands hardly change in the second
 SURPRISE = 5e-3  # m by which the tip may be further from its target than foreseen before another start is tried
 
 
@@ -30,12 +32,30 @@ class Bent(NamedTuple):
     tip: np.ndarray
 
 
-def corrected(chain: Chain, first: Bent, tip: Vector, gravity: Vector) -> Bent | None:
+def corrected(
+    chain: Chain, first: Bent, tip: Vector, gravity: Vector, learnt: ResidualMap | None = None
+) -> Bent | None:
     """An answer by which the tip rests nearer to `tip` (m) than by the `first`, where it can; None where the arm finds
     no rest. `gravity` is a unit vector; all in the soft arm's base frame.
 
-    Tendons slide without friction: real ones stay within what it holds on either side.
+    Tendons slide without friction: real ones stay within what it holds on either side. With a residual map, what is
+    said of tips is of the arm, whose twin is then to come to the target less the map.
     """
+    if learnt is None:
+        return _corrected(chain, first, np.array(tip), gravity)
+    bent, pull = first, STANDARD_GRAVITY * np.array([gravity])
+    for _ in range(ROUNDS):
+        shift = learnt.mean(RestingPoses(chain.straight_lengths - bent.commands[None], pull))[0]
+        nearer = _corrected(chain, first._replace(tip=first.tip - shift), np.array(tip) - shift, gravity)
+        if nearer is None:
+            return None
+        bent = nearer
+    shift = learnt.mean(RestingPoses(chain.straight_lengths - bent.commands[None], pull))[0]
+    return bent._replace(tip=bent.tip + shift)
+
+
+def _corrected(chain: Chain, first: Bent, tip: np.ndarray, gravity: Vector) -> Bent | None:
+    """Of the twin's tip."""
     chain, pull, target = chain.smooth, STANDARD_GRAVITY * np.array(gravity), np.array([[*gravity, *tip, *IDENTITY]])
 
     def sent(lengths: np.ndarray) -> Bent | None:

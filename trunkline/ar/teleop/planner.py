@@ -20,6 +20,7 @@ from trunkline.ar.teleop.vectors import DOWN, Vector, add, conjugate, rotate, su
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY, rotation_from_wxyz
 from trunkline.kinematics.panda.kinematics import mount_pose
+from trunkline.kinematics.residual.residual_map import ResidualMap
 from trunkline.model.statics.chain import Chain
 from trunkline.model.statics.equilibria import actuated
 
@@ -36,7 +37,7 @@ class Planner:
     from its target the tip may be foreseen. `step`: s, between a plan's rows. `chain`: the arm's statics, by which the
     network's answers are corrected, and no obstacle may be in the arm's way. `grasping`: how objects are grasped.
     `advance`: m, the last part of a reach, along the tip's axis, of an arm with a `chain`; `advance_speed`: m/s, of the
-    mount there, at most."""
+    mount there, at most. `residual_map`: by how far the arm's tip rests beside the twin's, where poses tell."""
 
     rigid: RigidIK
     network: Network
@@ -50,6 +51,7 @@ class Planner:
     grasping: Grasping | None = None
     advance: float = 0.0
     advance_speed: float = 0.1
+    residual_map: ResidualMap | None = None
 
     def plan(
         self, request: Request, world: World, joints: np.ndarray, commands: np.ndarray, beside: float = 0.0
@@ -157,6 +159,6 @@ class Planner:
         turn = base_quaternion(targets.pointing, targets.heading)
         back = conjugate(turn)
         tip = rotate(back, subtract(targets.tip.position, targets.rigid.position))
-        bent = bend(self.network, tip, rotate(back, DOWN), self.tolerance, self.chain)
+        bent = bend(self.network, tip, rotate(back, DOWN), self.tolerance, self.chain, self.residual_map)
         missed = rotate(turn, subtract(tip, (float(bent.tip[0]), float(bent.tip[1]), float(bent.tip[2]))))
         return add(targets.rigid.position, missed), bent.commands

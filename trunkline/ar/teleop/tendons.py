@@ -21,6 +21,7 @@ from trunkline.ar.teleop.vectors import Vector
 from trunkline.errors import InputError
 from trunkline.kinematics.ik.inference import ask
 from trunkline.kinematics.ik.inputs import TILT
+from trunkline.kinematics.residual.residual_map import ResidualMap
 from trunkline.model.statics.chain import Chain
 
 NO_NETWORK = Fail, InvalidGraph, InvalidProtobuf  # what a file that is none ends with
@@ -45,16 +46,20 @@ def network_of(session: onnxruntime.InferenceSession) -> Network:
     return Network(partial(ask, session), session.get_inputs()[0].shape[1])
 
 
-def bend(network: Network, tip: Vector, gravity: Vector, tolerance: float, chain: Chain | None = None) -> Bent:
+def bend(
+    network: Network, tip: Vector, gravity: Vector, tolerance: float, chain: Chain | None = None,
+    learnt: ResidualMap | None = None,
+) -> Bent:  # fmt: skip
     """Commands that bring the tip to `tip`, m, within `tolerance` m, under `gravity` (unit vector), all in the base
-    frame. With `chain`, the arm's statics correct the network's answer, and the tip foreseen is theirs.
+    frame. With `chain`, the arm's statics correct the network's answer, and the tip foreseen is theirs, moved by
+    what is `learnt` of the arm if the network knows of that.
 
     Raises:
         InputError: no bend comes so near, or a network of one tilt is asked about gravity out of its plane.
     """
     bent = _at_tilt(network, tip, gravity) if network.inputs == len(TILT) else _best_bend(network, tip, gravity)
     if chain is not None:
-        better = corrected(chain, bent, tip, gravity)
+        better = corrected(chain, bent, tip, gravity, learnt)
         if better is None:
             raise InputError("out of reach: the soft arm finds no rest under the commands for its target")
         bent = better

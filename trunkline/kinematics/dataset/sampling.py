@@ -16,6 +16,7 @@ import numpy as np
 
 from trunkline.compute.scheduler import spread_rows
 from trunkline.errors import InputError
+from trunkline.kinematics.residual.residual_map import ResidualMap, moved
 from trunkline.model.statics.chain import Chain
 from trunkline.model.statics.equilibria import Equilibrium, equilibrium, equilibrium_paths
 
@@ -53,6 +54,7 @@ def sample_at(
     rng: np.random.Generator,
     look_every: int = 1,
     deepest: np.ndarray | None = None,
+    learnt: ResidualMap | None = None,
 ) -> Candidates:
     """Follow the arm along rays of growing tension, samples evenly spaced along the tip's way on each.
 
@@ -65,10 +67,12 @@ def sample_at(
         look_every: the first look goes along one ray in so many; between them, the tip's way is interpolated.
         deepest: of each tendon of an arm of several sections, how far its motor draws it in at most, m; None for as
             far as its force goes. Shape (K,).
+        learnt: by how far the arm's tip rests beside the twin's; None: tips are the twin's.
     """
     if len(sections(chain)) > 1:
         whole, within = in_sections(chain, gravity, directions * steps, deepest, rng)
-        return _candidates(gravity, whole[within], np.full(int(within.sum()), "general"))
+        whole = moved(whole[within], chain, gravity, learnt)
+        return _candidates(gravity, whole, np.full(len(whole.position), "general"))
     rays = pull_directions(chain, (np.arange(directions) + rng.random()) / directions * 2 * np.pi)
     planar, kinds = planar_directions(chain)
     parts = [_follow(chain, gravity, rays, steps, rng, look_every), _follow(chain, gravity, planar, 4 * steps, rng)]
@@ -76,7 +80,7 @@ def sample_at(
     whole = Equilibrium(
         **{name: np.concatenate([values, vars(parts[1])[name]]) for name, values in vars(parts[0]).items()}
     )
-    return _candidates(gravity, whole, kind)
+    return _candidates(gravity, moved(whole, chain, gravity, learnt), kind)
 
 
 def _candidates(gravity: np.ndarray, whole: Equilibrium, kind: np.ndarray) -> Candidates:
@@ -85,13 +89,16 @@ def _candidates(gravity: np.ndarray, whole: Equilibrium, kind: np.ndarray) -> Ca
     return Candidates(gravity, whole[good], kind[good], failed, int(np.sum(~good)) - failed)
 
 
-def workspace_surface_at(chain: Chain, gravity: np.ndarray, around: int, along: int) -> np.ndarray:
+def workspace_surface_at(
+    chain: Chain, gravity: np.ndarray, around: int, along: int, learnt: ResidualMap | None = None
+) -> np.ndarray:
     """The surface of tips as a lattice: even ways to pull around the arm, even places along the tip's way on each.
 
     The first place of every way is where the arm hangs, the last where its motors pull with all their force.
 
     Args:
         gravity: in the base frame, m/s². Shape (3,).
+        learnt: as for `sample_at`.
 
     Returns:
         m. Shape (around, along, 3).
@@ -107,7 +114,7 @@ def workspace_surface_at(chain: Chain, gravity: np.ndarray, around: int, along: 
         raise InputError(
             f"gravity {np.round(gravity, 3)}: found {bad} of {around * along} tips by no steady way, expected a surface"
         )
-    return equilibria.position.reshape(around, along, 3)
+    return moved(equilibria, chain, gravity, learnt).position.reshape(around, along, 3)
 
 
 def sections(chain: Chain) -> list[np.ndarray]:

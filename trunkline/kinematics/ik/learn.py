@@ -1,6 +1,6 @@
 """From samples to a network that is trained, exported and scored by forward kinematics."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Annotated
 
@@ -19,10 +19,10 @@ from trunkline.kinematics.dataset.sampling import sections
 from trunkline.kinematics.dataset.table import command_by_tension, sample_table, tip_by_tension, turn_by_tension
 from trunkline.kinematics.ik.as_controls import DOUBT, AsControls, score
 from trunkline.kinematics.ik.inference import ask
-from trunkline.kinematics.ik.inputs import draw_gravity, gravity_columns, inputs_of, position_of
+from trunkline.kinematics.ik.inputs import draw_gravity, gravity_columns, gravity_of, inputs_of, position_of
 from trunkline.kinematics.ik.network import OUTPUTS, InverseKinematics
-from trunkline.kinematics.ik.on_plant import Rig, score_on_plant
-from trunkline.kinematics.ik.onnx import SurePulls, to_onnx
+from trunkline.kinematics.ik.on_plant import Rig, record, score_on_plant
+from trunkline.kinematics.ik.onnx import TrialsAtRest, to_onnx
 from trunkline.kinematics.ik.refine import refine
 from trunkline.kinematics.ik.score import (
     TipErrors,
@@ -34,8 +34,10 @@ from trunkline.kinematics.ik.score import (
 )
 from trunkline.kinematics.ik.tip_loss import tip_loss
 from trunkline.kinematics.ik.training import Training, train
+from trunkline.kinematics.residual.residual_map import ResidualMap, RestingPoses
 from trunkline.model.statics.chain import Chain
 
+RECORDED = 30  # poses that a lab may record, by which the network is scored on its arm beside itself
 FALSE_ALARMS = 0.05  # of reachable targets, that may be doubted
 
 
@@ -81,7 +83,7 @@ class Learned:
     held_out: the samples that no training saw. errors: of the exported network's commands, for them ("held out") and
     for targets under "unseen angles". as_lengths: of its lengths, for the latter, held by cables. as_controls: what
     comes of its commands in MuJoCo, on_plant: on the arm itself. refined: of some held-out targets after Gauss-Newton
-    steps.
+    steps. All of that but on_plant is of the network alone; moved: with the residual map, of the tip that it moves.
     outside: how many targets far off there are, beyond_range: how far (m) any answer to them leaves the tendons' range.
     difference: between the network and what was exported, m, at most.
     """
@@ -95,6 +97,7 @@ class Learned:
     as_controls: dict
     on_plant: dict | None
     refined: TipErrors
+    moved: TipErrors | None
     outside: int
     beyond_range: float
     difference: float
@@ -102,12 +105,12 @@ class Learned:
 
 def learn(
     model: mujoco.MjModel, chain: Chain, table: pd.DataFrame, learning: Learning, rig: Rig | None = None,
-    sure: SurePulls | None = None,
+    at_rest: TrialsAtRest | None = None,
 ) -> Learned:  # fmt: skip
     """Train on the samples of `table` that are not held out, and score on those that are and on others.
 
     Args:
-        model: whose `chain` it is. rig: what drives the arm itself. sure: None where no certificate was made.
+        model: whose `chain` it is. rig: what drives the arm itself. at_rest: None where no certificate was made.
     """
     network, curve = fit(table, chain, learning)
     columns = inputs_of(table)
@@ -117,8 +120,12 @@ def learn(
     deepest = chain.straight_lengths - sent_before.min(axis=0)
     between = unseen_targets(chain, sampled, learning.unseen, learning.seed, deepest)
     doubtful = doubt_beyond(network, held_out[columns].to_numpy(), chain.length)
-    exported = to_onnx(network, [model.tendon(t).name for t in range(chain.tendons)], doubtful, sure)
-    runtime = onnxruntime.InferenceSession(exported.SerializeToString(), providers=["CPUExecutionProvider"])
+    export = partial(to_onnx, network, [model.tendon(t).name for t in range(chain.tendons)], doubtful)
+    exported = of_twin = export(at_rest and replace(at_rest, residual_map=None))
+    runtime, moved = _session(of_twin), None
+    if at_rest and at_rest.residual_map is not None:
+        exported = export(at_rest)
+        moved = moved_errors(chain, at_rest.residual_map, between, _session(exported))
     errors, difference, answers = {}, 0.0, {}
     for name, targets in (("held out", held_out), ("unseen angles", between)):
         inputs = targets[columns].to_numpy()
@@ -139,7 +146,13 @@ def learn(
     if rig is not None:
         few = slice(learning.as_controls.on_rig)
         twin = np.quantile(sent.missed(chain.length)[few], (0.5, 0.95)) * 1e3
-        on_plant = score_on_plant(model, chain, network_answer, drawn.targets[few], drawn.commands[few], rig)
+        others, poses = {}, slice(learning.as_controls.on_rig, learning.as_controls.on_rig + RECORDED)
+        if exported is of_twin and (learnt := record(model, chain, drawn.targets[poses], drawn.commands[poses], rig)):
+            nothing = TrialsAtRest(chain.straight_lengths, 0.0, 0.0, 0.0)
+            with_poses = _session(export(replace(at_rest or nothing, residual_map=learnt)))
+            others = {"with_poses": partial(ask, with_poses)}
+        shipped = partial(ask, _session(exported))
+        on_plant = score_on_plant(model, chain, shipped, drawn.targets[few], drawn.commands[few], rig, others)
         on_plant["twin_mm"] = {"median": twin[0], "p95": twin[1]}
     return Learned(
         network=network,
@@ -151,6 +164,7 @@ def learn(
         as_controls=as_controls,
         on_plant=on_plant,
         refined=refined,
+        moved=moved,
         outside=len(far),
         beyond_range=beyond_range(far, sent_before),
         difference=difference,
@@ -192,6 +206,20 @@ def doubt_beyond(network: InverseKinematics, reachable: np.ndarray, length: floa
         tips = network(torch.tensor(reachable, dtype=torch.float32)).tip.numpy()
     missed = np.linalg.norm(tips - position_of(reachable), axis=1)
     return max(DOUBT * length, float(np.quantile(missed, 1 - FALSE_ALARMS)))
+
+
+def moved_errors(
+    chain: Chain, learnt: ResidualMap, targets: pd.DataFrame, runtime: onnxruntime.InferenceSession
+) -> TipErrors:
+    """Errors of a network with the residual map `learnt`, as the twin's tip moves by it, for samples moved by it."""
+    inputs = targets[inputs_of(targets)].to_numpy()
+    sent, gravity = targets[command_columns(chain.tendons)].to_numpy(), gravity_of(inputs)
+    position_of(inputs)[:] += learnt.mean(RestingPoses(chain.straight_lengths - sent, gravity))
+    return tip_errors(chain, inputs, ask(runtime, inputs)["commands"].astype(float), learnt)
+
+
+def _session(exported: onnx.ModelProto) -> onnxruntime.InferenceSession:
+    return onnxruntime.InferenceSession(exported.SerializeToString(), providers=["CPUExecutionProvider"])
 
 
 def refined_errors(chain: Chain, held_out: pd.DataFrame, runtime, settings: AnswerRefinement, seed: int) -> TipErrors:

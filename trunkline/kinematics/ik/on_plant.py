@@ -14,6 +14,7 @@ import numpy as np
 from trunkline.kinematics.dataset.sampling import sections
 from trunkline.kinematics.ik.as_controls import Ask, Reached, reached
 from trunkline.kinematics.ik.inputs import gravity_of, position_of
+from trunkline.kinematics.residual.residual_map import FEWEST, ResidualMap, RestingPoses
 from trunkline.model.simulation.rest import base_frame
 from trunkline.model.statics.chain import Chain
 from trunkline.model.statics.equilibria import actuated
@@ -37,7 +38,13 @@ class Rig:
 
 
 def score_on_plant(
-    model: mujoco.MjModel, chain: Chain, ask: Ask, targets: np.ndarray, commands: np.ndarray, rig: Rig
+    model: mujoco.MjModel,
+    chain: Chain,
+    ask: Ask,
+    targets: np.ndarray,
+    commands: np.ndarray,
+    rig: Rig,
+    others: dict[str, Ask] | None = None,
 ) -> dict:
     """The network's commands on the arm itself, for `targets`, and for tips at which the arm itself rests under the
     `commands` of these ("own_surface"; turned as the twin's).
@@ -46,7 +53,7 @@ def score_on_plant(
     the tip is counts as doubted: a package has what its session went up to, and previews say so.
 
     Args:
-        ask: the network, targets to its answer.
+        ask: the network, targets to its answer. others: further networks by name, scored likewise.
         targets, commands: as `as_controls.Drawn` has them.
     """
     reach = _in_base_frame(model, rig)
@@ -54,9 +61,27 @@ def score_on_plant(
     rested = np.isfinite(tips).all(axis=1)
     own_targets = targets[rested].copy()
     position_of(own_targets)[:] = tips[rested]
-    summary = _score(chain, ask, targets, reach, rig.pulls)
-    own_surface = _score(chain, ask, own_targets, reach, rig.pulls) if rested.any() else {"targets": 0}
-    return summary | {"own_surface": own_surface | {"left_out": {"unrested": int((~rested).sum())}}}
+
+    def scored(ask: Ask) -> dict:
+        own_surface = _score(chain, ask, own_targets, reach, rig.pulls) if rested.any() else {"targets": 0}
+        left_out = {"left_out": {"unrested": int((~rested).sum())}}
+        return _score(chain, ask, targets, reach, rig.pulls) | {"own_surface": own_surface | left_out}
+
+    return scored(ask) | {name: scored(other) for name, other in (others or {}).items()}
+
+
+def record(
+    model: mujoco.MjModel, chain: Chain, targets: np.ndarray, commands: np.ndarray, rig: Rig
+) -> ResidualMap | None:
+    """What poses at rest of the arm itself tell of by how far its tip rests beside the twin's, under `commands` and the
+    gravity of `targets`; None where too few of them rest."""
+    gravity = gravity_of(targets)
+    rest = actuated(chain, commands, gravity)
+    off = _in_base_frame(model, rig)(chain.straight_lengths - commands, gravity) - rest.position
+    usable = np.isfinite(off).all(axis=1) & rest.converged
+    if usable.sum() < FEWEST:
+        return None
+    return ResidualMap.fit(RestingPoses.of(chain, rest, gravity)[usable], off[usable], chain.length)
 
 
 def _in_base_frame(model: mujoco.MjModel, rig: Rig) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
@@ -67,7 +92,8 @@ def _in_base_frame(model: mujoco.MjModel, rig: Rig) -> Callable[[np.ndarray, np.
 
 
 def _score(chain: Chain, ask: Ask, targets: np.ndarray, reach, most: float) -> dict:
-    """Of all `targets`, and of those within `most` m of pulls in all."""
+    """Of all `targets`, of those within `most` m of pulls in all, of those of them that the network does not doubt
+    ("trusted"), and of those of them of which it is sure."""
     answer = ask(targets)
     pulls = chain.straight_lengths - answer["commands"]
     tips = reach(pulls, gravity_of(targets))
@@ -75,9 +101,13 @@ def _score(chain: Chain, ask: Ask, targets: np.ndarray, reach, most: float) -> d
     end.rested = np.isfinite(tips).all(axis=1)
     across = across_surface(chain, answer["commands"], gravity_of(targets), tips - position_of(targets))
     within = np.maximum(pulls, 0).sum(axis=1) <= most
-    end.doubtful = end.doubtful | answer["unsure"] | ~within
+    trusted = ~end.doubtful & within
+    sure = trusted & ~answer["unsure"]
+    end.doubtful = ~sure
     summary = _summary(end, across, chain.length)
-    return summary | {"within": _summary(end[within], across[within], chain.length) if within.any() else {"targets": 0}}
+    for name, part in (("within", within), ("trusted", trusted), ("sure", sure)):
+        summary[name] = _summary(end[part], across[part], chain.length) if part.any() else {"targets": 0}
+    return summary
 
 
 def _summary(end: Reached, across: np.ndarray, length: float) -> dict:

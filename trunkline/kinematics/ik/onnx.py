@@ -11,8 +11,10 @@ from torch import nn
 from trunkline.kinematics.dataset.columns import POSE
 from trunkline.kinematics.ik.inputs import DIRECTION, TILT, UNITS
 from trunkline.kinematics.ik.network import FIRST, OUTPUTS, SECOND, InverseKinematics
+from trunkline.kinematics.residual.residual_map import ResidualMap
 
 OPSET = 15
+CORRECTIONS = 3  # by the residual map: each leaves a tenth or less, as that changes so much less than the tip
 IR_VERSION = 8  # of the ONNX release that brought opset 15
 GRAVITY = {
     len(POSE): "none: nothing pulls but the tendons",
@@ -22,113 +24,185 @@ GRAVITY = {
 
 
 @dataclass(frozen=True)
-class SurePulls:
-    """Up to which the certificate has the arm's tip near its twin's.
+class TrialsAtRest:
+    """What trials at rest say of the arm beside its twin.
 
-    straight_lengths: of each tendon, the arm straight, m. Shape (K,). most: sum of what all motors draw in, m.
-    tilt_deg, pulled_tilt_deg: of the mount, at most, without a pull and with one.
+    straight_lengths: of each tendon, the arm straight, m. Shape (K,). sure_pulls: sum of what all motors draw in, m, up
+    to which the certificate has the tip near its twin's. tilt_deg, pulled_tilt_deg: of the mount, at most, without a
+    pull and with one. residual_map: by how far the tip rests beside the twin's, None where too few poses tell.
     """
 
     straight_lengths: np.ndarray
-    most: float
+    sure_pulls: float
     tilt_deg: float
     pulled_tilt_deg: float
+    residual_map: ResidualMap | None = None
+
+
+class _Graph:
+    """Nodes and constants of a network, as they are added. Each returns the name of what it adds."""
+
+    def __init__(self) -> None:
+        self.nodes: list[onnx.NodeProto] = []
+        self.constants: dict[str, onnx.TensorProto] = {}
+
+    def constant(self, name: str, values) -> str:
+        """Once, however often it is asked for."""
+        self.constants.setdefault(name, numpy_helper.from_array(np.asarray(values), name))
+        return name
+
+    def number(self, name: str, values) -> str:
+        return self.constant(name, np.asarray(values, np.float32))
+
+    def node(self, kind: str, inputs: list[str], output: str, **attributes) -> str:
+        self.nodes.append(helper.make_node(kind, inputs, [output], name=output, **attributes))
+        return output
+
+    def gather(self, source: str, columns: list[int] | np.ndarray, name: str, step: str = "") -> str:
+        """Columns, counted from 0: not every engine counts from the end."""
+        return self.node("Gather", [source, self.constant(f"{name}_columns", np.array(columns, np.int64))],
+                         name + step, axis=1)  # fmt: skip
+
+    def clip(self, x: str, lowest: float, name: str, step: str) -> str:
+        """From `lowest` to 1."""
+        bounds = [self.number(f"{name}_lowest", lowest), self.number(f"{name}_highest", 1)]
+        return self.node("Clip", [x, *bounds], name + step)
+
+    def perceptron(self, x: str, layers: nn.Sequential, name: str, step: str) -> str:
+        linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
+        for index, layer in enumerate(linear, start=1):
+            weight = self.constant(f"{name}_weight_{index}", layer.weight.detach().numpy().T.copy())
+            bias = self.constant(f"{name}_bias_{index}", layer.bias.detach().numpy())
+            x = self.node("Gemm", [x, weight, bias], f"{name}_layer_{index}{step}")
+            if index < len(linear):
+                x = self.node("Relu", [x], f"{name}_relu_{index}{step}")
+        return x
 
 
 def to_onnx(
-    network: InverseKinematics, tendons: list[str], doubt_beyond: float, sure: SurePulls | None = None
+    network: InverseKinematics, tendons: list[str], doubt_beyond: float, at_rest: TrialsAtRest | None = None
 ) -> onnx.ModelProto:
     """A model from `pose` (N, 7, 8 or 10) to `commands` (N, K), `lengths` (N, K) and `tip` (N, 3), float32.
+
+    With a residual map r, commands c are those that bring the twin's tip to the target less r(c), in `CORRECTIONS`
+    steps from those for the target itself, and "tip" is the twin's tip moved by r(c).
 
     Args:
         tendons: names, in the order of the columns of commands and lengths.
         doubt_beyond: m; a foreseen tip further than this from its target is a reason to doubt. Only written down.
-        sure: also only written down; None where no certificate says it.
+        at_rest: None where no certificate says it. Only written down, but for the residual map.
     """
-    nodes, constants = [], []
-
-    def constant(name: str, values) -> str:
-        constants.append(numpy_helper.from_array(np.asarray(values), name))
-        return name
-
-    def node(kind: str, inputs: list[str], output: str, **attributes) -> str:
-        nodes.append(helper.make_node(kind, inputs, [output], name=output, **attributes))
-        return output
-
-    def gather(columns: list[int] | np.ndarray, output: str) -> str:
-        places = np.array(columns, np.int64) % len(inputs)  # not from the end: not every engine counts so
-        return node("Gather", ["pose", constant(f"{output}_columns", places)], output, axis=1)
-
-    inputs = _inputs(network)
-    position = gather([-7, -6, -5], "position")
-    products = node("Mul", [gather(FIRST, "first"), gather(SECOND, "second")], "quaternion_products")
+    graph, inputs = _Graph(), _inputs(network)
+    first = len(inputs) - len(POSE)
+    position = graph.gather("pose", [first, first + 1, first + 2], "position")
+    quaternion = [graph.gather("pose", np.array(part) % len(inputs), name)
+                  for part, name in ((FIRST, "first"), (SECOND, "second"))]  # fmt: skip
+    products = graph.node("Mul", quaternion, "quaternion_products")
     pulling = []
     if inputs == TILT:
-        angle = gather([0], "theta_g")
-        pulling = [node("Sin", [angle], "sin_theta_g"), node("Cos", [angle], "cos_theta_g")]
+        angle = graph.gather("pose", [0], "theta_g")
+        pulling = [graph.node("Sin", [angle], "sin_theta_g"), graph.node("Cos", [angle], "cos_theta_g")]
     elif inputs == DIRECTION:
-        pulling = [gather([0, 1, 2], "gravity")]
-    features = [*pulling, position, products]
-    if inputs == DIRECTION:
-        pose, size = node("Concat", [position, products], "pose_features", axis=1), 3 + len(FIRST)
-        columns = constant("mixed_columns", np.tile(np.arange(size), 3))
-        tiled = node("Gather", [pose, columns], "mixed_pose", axis=1)
-        features.append(node("Mul", [gather(np.repeat([0, 1, 2], size), "mixed_gravity"), tiled], "mixed"))
-    x = node("Concat", features, "features", axis=1)
-    x = node("Sub", [x, constant("mean", network.mean.numpy())], "centred")
-    x = node("Mul", [x, constant("scale", network.scale.numpy())], "normalised")
+        pulling = [graph.gather("pose", [0, 1, 2], "gravity")]
 
-    def perceptron(x: str, layers: nn.Sequential, name: str) -> str:
-        linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
-        for index, layer in enumerate(linear, start=1):
-            weight = constant(f"{name}_weight_{index}", layer.weight.detach().numpy().T.copy())
-            bias = constant(f"{name}_bias_{index}", layer.bias.detach().numpy())
-            x = node("Gemm", [x, weight, bias], f"{name}_layer_{index}")
-            if index < len(linear):
-                x = node("Relu", [x], f"{name}_relu_{index}")
-        return x
-
-    def columns_of(x: str, first: int, output: str) -> str:
-        columns = constant(f"{output}_columns", np.arange(first, first + len(tendons), dtype=np.int64))
-        return node("Gather", [x, columns], output, axis=1)
-
-    def clip(x: str, lowest: float, output: str) -> str:
-        bounds = [constant(f"{output}_lowest", np.float32(lowest)), constant(f"{output}_highest", np.float32(1))]
-        return node("Clip", [x, *bounds], output)
-
-    both = perceptron(x, network.layers, "inverse")
-    pulls = clip(columns_of(both, 0, "raw_pulls"), -1, "pulls")
-    x = node("Mul", [pulls, constant("half_range", network.half_range.numpy())], "offset")
-    commands = node("Add", [x, constant("middle", network.middle.numpy())], "commands")
-    stretches = clip(columns_of(both, len(tendons), "raw_stretches"), 0, "stretch_shares")
-    x = node("Mul", [stretches, constant("most_stretch", network.most_stretch.numpy())], "stretches")
-    node("Add", [commands, x], "lengths")
-    x = perceptron(node("Concat", [*pulling, pulls], "seen", axis=1), network.tip_layers, "tip")
-    x = node("Mul", [x, constant("tip_half_range", network.tip_half_range.numpy())], "tip_offset")
-    node("Add", [x, constant("tip_middle", network.tip_middle.numpy())], "tip")
+    aimed, learnt = position, at_rest and at_rest.residual_map
+    if at_rest and learnt:
+        for number in range(CORRECTIONS):
+            step = f"_{number + 1}"
+            _, commands = _inverse(graph, network, [*pulling, aimed, products], len(tendons), step)
+            shift = _shift(graph, learnt, at_rest.straight_lengths, pulling, commands, step)
+            aimed = graph.node("Sub", [position, shift], f"aimed{step}")
+    pulls, commands = _inverse(graph, network, [*pulling, aimed, products], len(tendons), "")
+    x = graph.perceptron(graph.node("Concat", [*pulling, pulls], "seen", axis=1), network.tip_layers, "tip", "")
+    x = graph.node("Mul", [x, graph.constant("tip_half_range", network.tip_half_range.numpy())], "tip_offset")
+    twin = "twin_tip" if at_rest and learnt else "tip"
+    graph.node("Add", [x, graph.constant("tip_middle", network.tip_middle.numpy())], twin)
+    if at_rest and learnt:
+        shift = _shift(graph, learnt, at_rest.straight_lengths, pulling, commands, "")
+        graph.node("Add", [twin, shift], "tip")
 
     pose = helper.make_tensor_value_info("pose", TensorProto.FLOAT, ["batch", len(inputs)])
     widths = dict(zip(OUTPUTS, (len(tendons), len(tendons), 3), strict=True))
     outputs = [helper.make_tensor_value_info(k, TensorProto.FLOAT, ["batch", n]) for k, n in widths.items()]
-    graph = helper.make_graph(nodes, "inverse_kinematics", [pose], outputs, constants)
-    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
+    whole = helper.make_graph(graph.nodes, "inverse_kinematics", [pose], outputs, list(graph.constants.values()))
+    model = helper.make_model(whole, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
     model.producer_name = "trunkline"
-    helper.set_model_props(model, _meaning(network, tendons, doubt_beyond) | _surety(sure))
+    helper.set_model_props(model, _meaning(network, tendons, doubt_beyond) | _of_trials(at_rest))
     onnx.checker.check_model(model, full_check=True)
     return model
+
+
+def _inverse(
+    graph: _Graph, network: InverseKinematics, parts: list[str], tendons: int, step: str
+) -> tuple[str, str]:
+    """Commands for the pose whose features begin with `parts`: as shares of their range, and in m. Of the last `step`,
+    "", "lengths" too."""
+    features, last = list(parts), not step
+    if network.inputs == len(DIRECTION):
+        pose, size = graph.node("Concat", parts[-2:], f"pose_features{step}", axis=1), 3 + len(FIRST)
+        tiled = graph.gather(pose, np.tile(np.arange(size), 3), "mixed_pose", step)
+        mixed = graph.gather("pose", np.repeat([0, 1, 2], size), "mixed_gravity", step)
+        features.append(graph.node("Mul", [mixed, tiled], f"mixed{step}"))
+    x = graph.node("Concat", features, f"features{step}", axis=1)
+    x = graph.node("Sub", [x, graph.constant("mean", network.mean.numpy())], f"centred{step}")
+    x = graph.node("Mul", [x, graph.constant("scale", network.scale.numpy())], f"normalised{step}")
+    both = graph.perceptron(x, network.layers, "inverse", step)
+    pulls = graph.clip(graph.gather(both, np.arange(tendons), "raw_pulls", step), -1, "pulls", step)
+    x = graph.node("Mul", [pulls, graph.constant("half_range", network.half_range.numpy())], f"offset{step}")
+    commands = graph.node("Add", [x, graph.constant("middle", network.middle.numpy())], f"commands{step}")
+    if last:
+        raw = graph.gather(both, np.arange(tendons, 2 * tendons), "raw_stretches")
+        shares = graph.clip(raw, 0, "stretch_shares", step)
+        most = graph.constant("most_stretch", network.most_stretch.numpy())
+        graph.node("Add", [commands, graph.node("Mul", [shares, most], "stretches")], "lengths")
+    return pulls, commands
+
+
+def _shift(
+    graph: _Graph, learnt: ResidualMap, straight: np.ndarray, pulling: list[str], commands: str, step: str
+) -> str:
+    """By how far the tip rests beside the twin's under `commands`, m."""
+    _, _, pull_length, gravity_length, least = learnt.numbers
+    recorded, tendons = learnt.features(learnt.poses), len(straight)
+    pulls = graph.node("Sub", [graph.number("straight", straight), commands], f"drawn_in{step}")
+    shares = graph.node("Mul", [graph.node("Relu", [pulls], f"pulled{step}"),
+                                graph.number("by_largest", 1 / learnt.largest)], f"pull_shares{step}")  # fmt: skip
+    # what gravity adds to the exponents, and to the square of what is asked; nothing of an arm without it
+    turn = np.array([[1, 0, 0], [0, 0, -1]]) if len(pulling) == 2 else np.eye(3)[: 3 * len(pulling)]
+    asked = graph.node("Concat", [*pulling, shares], f"asked{step}", axis=1)
+    scaled = np.zeros((len(turn) + tendons, tendons + 3))
+    scaled[: len(turn), tendons:], scaled[len(turn) :, :tendons] = turn / gravity_length, np.eye(tendons) / pull_length
+    nothing = np.zeros(tendons + 3)
+    x = graph.node("Gemm", [asked, graph.number("to_features", scaled), graph.number("no_features", nothing)],
+                   f"rest_features{step}")  # fmt: skip
+    recorded_squares = -(recorded**2).sum(axis=1) / 2
+    across = graph.node("Gemm", [x, graph.number("recorded", recorded.T), graph.number("squares", recorded_squares)],
+                        f"across{step}")  # fmt: skip
+    halves = graph.number("halves", np.full((tendons + 3, 1), -0.5))
+    squared = graph.node("Gemm", [graph.node("Mul", [x, x], f"squared{step}"), halves, graph.number("zero", [0.0])],
+                         f"asked_squares{step}")  # fmt: skip
+    alike = graph.node("Exp", [graph.node("Add", [across, squared], f"exponents{step}")], f"alike{step}")
+    heights = [alike, graph.number("heights", learnt.heights), graph.number("no_shift", np.zeros(3))]
+    flat = graph.node("Gemm", heights, f"unweighted{step}")
+    ones = [graph.node("Mul", [shares, shares], f"share_squares{step}"), graph.number("ones", np.ones((tendons, 1)))]
+    weight = graph.node("Gemm", [*ones, graph.number("least_weight", [least**2])], f"squared_weight{step}")
+    return graph.node("Mul", [flat, graph.node("Sqrt", [weight], f"weight{step}")], f"shift{step}")
 
 
 def _inputs(network: InverseKinematics) -> list[str]:
     return next(inputs for inputs in (POSE, TILT, DIRECTION) if len(inputs) == network.inputs)
 
 
-def _surety(sure: SurePulls | None) -> dict[str, str]:
+def _of_trials(at_rest: TrialsAtRest | None) -> dict[str, str]:
     """Metadata."""
-    if sure is None:
+    if at_rest is None:
         return {}
-    straight = json.dumps([round(float(length), 9) for length in sure.straight_lengths])
-    return {"straight_lengths_m": straight, "sure_pulls_m": f"{sure.most:.6g}",
-            "sure_tilts_deg": json.dumps([round(sure.tilt_deg, 6), round(sure.pulled_tilt_deg, 6)])}  # fmt: skip
+    straight = json.dumps([round(float(length), 9) for length in at_rest.straight_lengths])
+    learnt = at_rest.residual_map
+    moved = {} if learnt is None else {"residual_map": f"of {len(learnt.poses)} poses of the arm at rest: commands are "
+                                       "for it, no longer for its twin alone"}  # fmt: skip
+    return moved | {"straight_lengths_m": straight, "sure_pulls_m": f"{at_rest.sure_pulls:.6g}",
+            "sure_tilts_deg": json.dumps([round(at_rest.tilt_deg, 6), round(at_rest.pulled_tilt_deg, 6)])}  # fmt: skip
 
 
 def _meaning(network: InverseKinematics, tendons: list[str], doubt_beyond: float) -> dict[str, str]:

@@ -7,6 +7,7 @@ import numpy as np
 from trunkline.errors import InputError
 from trunkline.frames import downwards
 from trunkline.kinematics.ik.inputs import gravity_of, position_of, quaternion_of
+from trunkline.kinematics.residual.residual_map import ResidualMap, moved
 from trunkline.model.statics.chain import FORCE_ROUNDING, Chain
 from trunkline.model.statics.equilibria import Equilibrium, actuated, forward
 
@@ -52,9 +53,13 @@ class TipErrors:
         }
 
 
-def tip_errors(chain: Chain, inputs: np.ndarray, commands: np.ndarray) -> TipErrors:
-    """Errors of predicted commands (N, K), m, for targets `inputs` (N, 7, 8 or 10)."""
-    return _errors(actuated(chain, commands, gravity_of(inputs)), inputs)
+def tip_errors(
+    chain: Chain, inputs: np.ndarray, commands: np.ndarray, learnt: ResidualMap | None = None
+) -> TipErrors:
+    """Errors of predicted commands (N, K), m, for targets `inputs` (N, 7, 8 or 10), of the twin's tip, moved by a
+    residual map if there is one."""
+    gravity = gravity_of(inputs)
+    return _errors(moved(actuated(chain, commands, gravity), chain, gravity, learnt), inputs)
 
 
 def length_errors(chain: Chain, inputs: np.ndarray, lengths: np.ndarray) -> TipErrors:

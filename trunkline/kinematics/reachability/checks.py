@@ -88,7 +88,7 @@ def check_maps(
     done("labels")
     if maps.surfaces:
         how = {"beyond": spot_check.outside, "count": 10 * spot_check.count, "seed": seed}
-        heldout = check_surfaces(maps.surfaces, tips_at.chain, soft, **how, done=done)
+        heldout = check_surfaces(maps.surfaces, tips_at.chain, soft, **how, done=done, learnt=tips_at.learnt)
     else:
         heldout = check_soft(maps, tips_at, spot_check, seed, done)
     verified_shares = check_hybrid(maps, tips_at.chain, tips_at, spot_check, seed)
@@ -124,9 +124,8 @@ def check_hybrid(
 
     def shares(space_map: Map, tips: Tips, find: Callable[[np.ndarray], ReachingPoses]) -> tuple[float, float]:
         sets = draw_inside_and_outside(space_map.field, space_map.lattice, spot_check.outside, spot_check.count, seed)
-        inside, outside = (
-            float(verified(p, find(p), tips.lengths, chain, maps.mount_offset, weight).mean()) for p in sets
-        )
+        arm = tips.lengths, chain, maps.mount_offset, weight, tips_at.learnt
+        inside, outside = (float(verified(p, find(p), *arm).mean()) for p in sets)
         return inside, outside
 
     down, rigid = tips_at(0.0), maps.rigid

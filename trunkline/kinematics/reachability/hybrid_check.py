@@ -13,6 +13,7 @@ from trunkline.frames import STANDARD_GRAVITY
 from trunkline.kinematics.panda.inverse import solve
 from trunkline.kinematics.panda.kinematics import mount_pose
 from trunkline.kinematics.panda.labels import beyond_links
+from trunkline.kinematics.residual.residual_map import ResidualMap, moved
 from trunkline.kinematics.sdf.grid import Lattice
 from trunkline.model.statics.chain import FORCE_ROUNDING, Chain
 from trunkline.model.statics.equilibria import forward
@@ -88,6 +89,7 @@ def verified(
     chain: Chain,
     mount_offset: float,
     weight: bool = True,
+    learnt: ResidualMap | None = None,
 ) -> np.ndarray:
     """Whether joint angles and tendon lengths alone bring the tip to each of `points` (N, 3). Shape (N,).
 
@@ -95,7 +97,8 @@ def verified(
     tip then rests under the lengths.
 
     Args:
-        lengths: of the soft samples, (M, K) in m. weight: whether the soft arm has any.
+        lengths: of the soft samples, (M, K) in m. weight: whether the soft arm has any. learnt: as for
+            `dataset.sampling.sample_at`.
     """
     good = np.zeros(len(points), bool)
     rows = np.flatnonzero(poses.reached)
@@ -104,7 +107,7 @@ def verified(
     mount, rotation = mount_pose(poses.q[rows], mount_offset)
     base = rotation * np.array([1.0, -1.0, -1.0])  # axes of the soft arm's base frame, in columns
     gravity = -STANDARD_GRAVITY * weight * base[:, 2]
-    rest = forward(chain, lengths[poses.tip[rows]], gravity)
+    rest = moved(forward(chain, lengths[poses.tip[rows]], gravity), chain, gravity, learnt)
     tip = mount + np.einsum("nij,nj->ni", base, rest.position)
     pulled = (rest.tensions <= (1 + FORCE_ROUNDING) * chain.max_tension).all(axis=1)
     good[rows] = rest.converged & pulled & (np.linalg.norm(tip - points[rows], axis=1) <= CLOSE)

@@ -10,6 +10,7 @@ from trunkline.kinematics.reachability.reach_signal import THRESHOLD, HeldOut, p
 from trunkline.kinematics.reachability.soft import SoftSettings, soft_field, soft_lattice
 from trunkline.kinematics.reachability.tips import LOOK_EVERY
 from trunkline.kinematics.reachability.workspace_surface import WorkspaceSurfaces, finer
+from trunkline.kinematics.residual.residual_map import ResidualMap
 from trunkline.kinematics.sdf.grid import overlap
 from trunkline.model.statics.chain import Chain
 
@@ -25,6 +26,7 @@ def check_surfaces(
     count: int,
     seed: int,
     done: Callable[[str], None],
+    learnt: ResidualMap | None = None,
 ) -> list[HeldOut]:
     """Surfaces at `soft.sheets.heldout` directions of gravity, at random, that no surface was made for.
 
@@ -33,7 +35,7 @@ def check_surfaces(
 
     Args:
         beyond: m, how far from the surface found there are the points that shall be out of reach.
-        count: how many of them, and of tips, to draw at each. seed: of the draws.
+        count: how many of them, and of tips, to draw at each. seed: of the draws. learnt: as for `sample_at`.
     """
     rng = np.random.default_rng(seed)
     largest = np.arccos(np.clip(-surfaces.downs[:, 2].max(), -1, 1))
@@ -43,11 +45,11 @@ def check_surfaces(
     for angle, azimuth in zip(angles, azimuths, strict=True):
         down = downwards(angle, azimuth)
         gravity, surface = STANDARD_GRAVITY * down, surfaces.at(down)
-        solved = workspace_surface_at(chain, gravity, around, along)
+        solved = workspace_surface_at(chain, gravity, around, along, learnt)
         between, sampled = (finer(each, DENSER) for each in (surface, solved))
         lattice = soft_lattice([between, sampled], soft, soft.voxel)
         iou = overlap(*(soft_field(points, lattice, soft) for points in (between, sampled)))
-        tips = sample_at(chain, gravity, around, along, rng, LOOK_EVERY).equilibrium.position
+        tips = sample_at(chain, gravity, around, along, rng, LOOK_EVERY, learnt=learnt).equilibrium.position
         targets = tips[rng.permutation(len(tips))[:count]], points_beyond(sampled, beyond, count, rng)
         reachable, called = ((surfaces.signal(surface, points) <= THRESHOLD).mean() for points in targets)
         results.append(HeldOut(angle, iou, float(reachable), float(called), azimuth))

@@ -62,6 +62,7 @@ def survey(tips_at: ArmTips, settings: SurveySettings, done: Callable[[str], Non
         surfaces = soft.sheets
         downs = spread(surfaces.directions, tips_at.largest, crowd=True)
         maps.surfaces = build_surfaces(
-            tips_at.chain, downs, surfaces.around, surfaces.along, soft.tolerance, lambda: done("sheet")
+            tips_at.chain, downs, surfaces.around, surfaces.along, soft.tolerance, lambda: done("sheet"),
+            tips_at.learnt,
         )
     return maps, check_maps(maps, tips_at, soft, settings.labels, settings.spot_check, seed=seed, done=done)

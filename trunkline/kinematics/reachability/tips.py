@@ -8,6 +8,7 @@ import numpy as np
 
 from trunkline.frames import gravity_in_base
 from trunkline.kinematics.dataset.sampling import sample_at, sections
+from trunkline.kinematics.residual.residual_map import ResidualMap
 from trunkline.model.statics.chain import Chain
 
 LOOK_EVERY = 4  # rays: along those between, a sample is at most a twentieth of the way from where it would else be
@@ -30,7 +31,8 @@ class ArmTips:
     `angles` (A,) in rad, ascending, and `samples` at each; `directions` and `steps` as in
     `dataset.sampling.sample_at`; `seed` of the fresh ones, the same for an angle whatever others are asked. `largest`:
     rad, of gravity from any side, if the samples have that; then `angles` are those that are shown. `unseen`: of an arm
-    without gravity, whose one angle stands for all: samples that no map is made of. `deepest` as for `sample_at`.
+    without gravity, whose one angle stands for all: samples that no map is made of. `deepest` and
+    `learnt` as for `sample_at`.
     """
 
     chain: Chain
@@ -42,6 +44,7 @@ class ArmTips:
     largest: float | None = None
     unseen: Tips | None = None
     deepest: np.ndarray | None = None
+    learnt: ResidualMap | None = None
 
     def __call__(self, angle: float) -> Tips:
         if self.unseen is not None:
@@ -55,7 +58,8 @@ class ArmTips:
         """Equilibria under gravity at `angle` (rad), the mount tilting about base +y."""
         rng = np.random.default_rng([self.seed, round(1e6 * angle)])
         gravity = gravity_in_base(angle)
-        rest = sample_at(self.chain, gravity, self.directions, self.steps, rng, LOOK_EVERY, self.deepest).equilibrium
+        how = self.directions, self.steps, rng, LOOK_EVERY, self.deepest, self.learnt
+        rest = sample_at(self.chain, gravity, *how).equilibrium
         return Tips(rest.position, held_by(self.chain, rest.lengths, rest.tensions))
 
 

@@ -17,6 +17,7 @@ from trunkline.frames import STANDARD_GRAVITY
 from trunkline.kinematics.dataset.sampling import workspace_surface_at
 from trunkline.kinematics.reachability.triangles import nearest_on_triangles
 from trunkline.kinematics.reachability.weights import spline_matrix, spline_weights
+from trunkline.kinematics.residual.residual_map import ResidualMap
 from trunkline.model.statics.chain import Chain
 
 NEAREST = 6  # points of a surface beside a target whose triangles are looked at
@@ -94,11 +95,13 @@ def finer(surface: np.ndarray, times: int) -> np.ndarray:
 
 
 def build_surfaces(
-    chain: Chain, downs: np.ndarray, around: int, along: int, tolerance: float, done: Callable[[], None]
-) -> WorkspaceSurfaces:
-    """Surfaces of `around` by `along` points under gravities `downs` (D, 3); `done` is called after each."""
+    chain: Chain, downs: np.ndarray, around: int, along: int, tolerance: float, done: Callable[[], None],
+    learnt: ResidualMap | None = None,
+) -> WorkspaceSurfaces:  # fmt: skip
+    """Surfaces of `around` by `along` points under gravities `downs` (D, 3); `done` is called after each. `learnt`: as
+    for `sample_at`."""
     points = np.empty((len(downs), around, along, 3), np.float16)
     for index, down in enumerate(downs):
-        points[index] = workspace_surface_at(chain, STANDARD_GRAVITY * down, around, along)
+        points[index] = workspace_surface_at(chain, STANDARD_GRAVITY * down, around, along, learnt)
         done()
     return WorkspaceSurfaces(downs, points, tolerance)

@@ -5,16 +5,15 @@ and Williams 2006, chapters 2 and 5), its three coordinates alike and apart:
 
     k(x, x') = s² w(u) w(u') exp(-|u - u'|² / 2 a² - |g - g'|² / 2 b²),    w(u) = √(d² + |u|²),
 
-u being pulls over the largest that was recorded, letting out counting as none, and g gravity over the standard one. So
-the residual grows with the pulls, as models that were fitted to an arm at rest leave it. Cameras add noise.
-The five numbers are those of the largest posterior density, under log-normal priors of wide spread.
+u being pulls over the largest that was recorded, longer tendons counting as none, and g gravity over the standard one.
+So the residual grows with the pulls, as models that were fitted to an arm at rest leave it. Cameras add noise. The five
+numbers are those of the largest posterior density, under log-normal priors of wide spread.
 
-A radius that holds the tip with a probability is the process's own deviation, stretched by how far poses were off that
-were left out one by one: the least factor that is large enough for that share of them, one of them more counted as
-missed (split conformal prediction, Vovk et al. 2005). It holds for poses that are drawn as those were.
+How far off it still is, poses say that are left out one by one: `trunkline/report/certificate` makes a radius of that.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -22,11 +21,14 @@ from scipy.optimize import minimize
 
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
+from trunkline.model.statics.chain import Chain
+from trunkline.model.statics.equilibria import Equilibrium
 
 # s and the noise as shares of the arm's length, a, b, d: where their priors have the middle, and how far these spread
 MIDDLE = np.array([0.008, 0.001, 0.5, 1.0, 0.3])
 SPREAD = np.array([1.0, 0.7, 0.7, 0.7, 0.7])
 FEWEST = 15  # poses, below which there is no map
+TABLE = ("pulls", "gravity", "residuals", "numbers")
 WORTH = 0.9  # of the errors without the map: poses that are left out have to be so much nearer with it
 
 
@@ -34,11 +36,17 @@ WORTH = 0.9  # of the errors without the map: poses that are left out have to be
 class RestingPoses:
     """Of an arm at rest.
 
-    pulls: of every motor from the straight arm, m. Shape (N, K). gravity: in the base frame, m/s². Shape (N, 3).
+    pulls: straight arm's path length less the command of every motor, or less the tendon's path where that is slack, m.
+    Shape (N, K). gravity: in the base frame, m/s². Shape (N, 3).
     """
 
     pulls: np.ndarray
     gravity: np.ndarray
+
+    @classmethod
+    def of(cls, chain: Chain, rest: Equilibrium, gravity: np.ndarray) -> "RestingPoses":
+        """Those of the twin's `rest`, so that it is the same pose however far slack tendons are let out."""
+        return cls(chain.straight_lengths - rest.commands, gravity)
 
     def __len__(self) -> int:
         return len(self.pulls)
@@ -80,61 +88,90 @@ class ResidualMap:
 
     def mean(self, poses: RestingPoses) -> np.ndarray:
         """By how far the tip rests beside the twin's, m. Shape (M, 3)."""
-        return self._covariance(poses) @ np.linalg.solve(self._noisy(), self.residuals)
+        return self._weight(poses)[:, None] * (self._alike(poses) @ self.heights)
 
-    def radius(self, poses: RestingPoses, share: float) -> np.ndarray:
-        """Within which of the twin's tip, moved by `mean`, the tip rests with the probability `share`, m. Shape (M,).
-
-        Raises:
-            InputError: so few poses state no such probability.
-        """
-        errors, deviations = self.left_out()
-        rank = int(np.ceil((len(errors) + 1) * share))
-        if rank > len(errors):
-            least = int(np.ceil(share / (1 - share)))
-            raise InputError(f"poses: found {len(errors)}, expected {least} or more to state {100 * share:g} %")
-        factor = np.sort(np.linalg.norm(errors, axis=1) / deviations)[rank - 1]
-        return factor * self._deviation(poses)
-
-    def left_out(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of each pose, from all others alone: how far `mean` is off, m (N, 3), and the deviation of a coordinate, m
-        (N,) (Rasmussen and Williams 2006, 5.12)."""
+    def left_out(self) -> np.ndarray:
+        """Of each pose, how far `mean` is off where all others alone are learnt from, m (Rasmussen and Williams 2006,
+        5.12). Shape (N, 3)."""
         inverse = np.linalg.inv(self._noisy())
-        precision = np.diag(inverse)
-        return inverse @ self.residuals / precision[:, None], 1 / np.sqrt(precision)
+        return inverse @ self.residuals / np.diag(inverse)[:, None]
 
     @property
     def is_worth_it(self) -> bool:
         """Whether poses that are left out are nearer with the map than without, in the root mean square."""
-        errors, _ = self.left_out()
-        return float(np.sqrt(np.mean(errors**2))) <= WORTH * float(np.sqrt(np.mean(self.residuals**2)))
+        rms = [float(np.sqrt(np.mean(errors**2))) for errors in (self.left_out(), self.residuals)]
+        return rms[0] <= WORTH * rms[1]
 
-    def _deviation(self, poses: RestingPoses) -> np.ndarray:
-        """Of a coordinate of a measured residual, m. Shape (M,)."""
-        across = self._covariance(poses)
-        weight = self._weight(poses)
-        scale, noise = self.numbers[:2]
-        explained = np.einsum("mn,nm->m", across, np.linalg.solve(self._noisy(), across.T))
-        return np.sqrt(np.maximum(scale**2 * weight**2 - explained, 0) + noise**2)
+    def errors_mm(self) -> dict:
+        """How many poses there are, and the median of how far the tip is from the twin's, mm, as it is ("twin") and
+        where all others alone are learnt from ("left_out")."""
+        parts = {"twin": self.residuals, "left_out": self.left_out()}
+        medians = {name: 1e3 * float(np.median(np.linalg.norm(part, axis=1))) for name, part in parts.items()}
+        return {"poses": len(self.poses)} | medians
+
+    @property
+    def largest(self) -> float:
+        """m, of the pulls that were recorded, which the process takes as one."""
+        return max(float(self.poses.pulls.max(initial=0)), 1e-6)
+
+    @cached_property
+    def heights(self) -> np.ndarray:
+        """What the exponential of each recorded pose is multiplied with, m. Shape (N, 3)."""
+        explained = np.linalg.solve(self._noisy(), self.residuals)
+        return self.numbers[0] ** 2 * self._weight(self.poses)[:, None] * explained
+
+    def shares(self, poses: RestingPoses) -> np.ndarray:
+        """Pulls over the largest that was recorded, longer tendons counting as none. Shape (M, K)."""
+        return np.maximum(poses.pulls, 0) / self.largest
+
+    def features(self, poses: RestingPoses) -> np.ndarray:
+        """u / a and g / b. Shape (M, K + 3)."""
+        _, _, pull_length, gravity_length, _ = self.numbers
+        return np.concatenate(
+            [self.shares(poses) / pull_length, poses.gravity / (STANDARD_GRAVITY * gravity_length)], axis=1
+        )
+
+    def table(self) -> dict:
+        """As JSON has it."""
+        return {
+            "pulls": np.round(self.poses.pulls, 7).tolist(),
+            "gravity": np.round(self.poses.gravity, 6).tolist(),
+            "residuals": np.round(self.residuals, 7).tolist(),
+            "numbers": [float(f"{number:.6g}") for number in self.numbers],
+        }
+
+    @classmethod
+    def from_table(cls, table: dict) -> "ResidualMap":
+        """Raises: KeyError, TypeError, ValueError: it is no such table."""
+        pulls, gravity, residuals, numbers = (np.array(table[name], float) for name in TABLE)
+        if pulls.ndim != 2 or gravity.shape != (len(pulls), 3) or residuals.shape != gravity.shape:
+            raise ValueError(f"residual map of shapes {pulls.shape}, {gravity.shape}, {residuals.shape}")
+        if numbers.shape != MIDDLE.shape or not (numbers > 0).all() or not np.isfinite(numbers).all():
+            raise ValueError(f"residual map with the numbers {numbers.tolist()}")
+        if not all(np.isfinite(part).all() for part in (pulls, gravity, residuals)):
+            raise ValueError("residual map with numbers that are not finite")
+        return cls(RestingPoses(pulls, gravity), residuals, numbers)
 
     def _noisy(self) -> np.ndarray:
-        return self._covariance(self.poses) + self.numbers[1] ** 2 * np.eye(len(self.poses))
+        (scale, noise), weight = self.numbers[:2], self._weight(self.poses)
+        return scale**2 * np.outer(weight, weight) * self._alike(self.poses) + noise**2 * np.eye(len(self.poses))
 
-    def _covariance(self, poses: RestingPoses) -> np.ndarray:
-        """Of residuals at `poses` with those that were recorded, m². Shape (M, N)."""
-        scale, _, pull_length, gravity_length, _ = self.numbers
-        squares = _squares(self._shares(poses), self._shares(self.poses)) / pull_length**2
-        squares += _squares(poses.gravity, self.poses.gravity) / (STANDARD_GRAVITY * gravity_length) ** 2
-        return scale**2 * self._weight(poses)[:, None] * self._weight(self.poses) * np.exp(-squares / 2)
+    def _alike(self, poses: RestingPoses) -> np.ndarray:
+        """The exponentials of `poses` and those that were recorded, at most 1. Shape (M, N)."""
+        apart = self.features(poses)[:, None] - self.features(self.poses)
+        return np.exp(-(apart**2).sum(axis=2) / 2)
 
     def _weight(self, poses: RestingPoses) -> np.ndarray:
-        return np.sqrt(self.numbers[4] ** 2 + (self._shares(poses) ** 2).sum(axis=1))
-
-    def _shares(self, poses: RestingPoses) -> np.ndarray:
-        largest = max(float(self.poses.pulls.max(initial=0)), 1e-6)  # m
-        return np.maximum(poses.pulls, 0) / largest
+        return np.sqrt(self.numbers[4] ** 2 + (self.shares(poses) ** 2).sum(axis=1))
 
 
-def _squares(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Squared distances of rows. (M, D) and (N, D) to (M, N)."""
-    return ((a[:, None] - b[None]) ** 2).sum(axis=2)
+def moved(rest: Equilibrium, chain: Chain, gravity: np.ndarray, learnt: ResidualMap | None) -> Equilibrium:
+    """Where the arm has its tips that rests as its twin in N equilibria.
+
+    Args:
+        gravity: base frame, m/s². Shape (3,) or (N, 3). learnt: None where no poses tell of the arm.
+    """
+    if learnt is None:
+        return rest
+    poses = RestingPoses.of(chain, rest, np.broadcast_to(gravity, rest.position.shape))
+    return replace(rest, position=rest.position + learnt.mean(poses))

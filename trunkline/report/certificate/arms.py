@@ -10,6 +10,7 @@ import numpy as np
 from trunkline.identification.parameters.parameters import candidate_fields, set_fields
 from trunkline.identification.parameters.spool_scale import wound
 from trunkline.identification.simulate.experiment import SLACK
+from trunkline.kinematics.residual.residual_map import ResidualMap, RestingPoses
 from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.rest import base_frame
 from trunkline.model.statics.chain import Chain, read_chain
@@ -43,6 +44,16 @@ class StaticArm:
     def tips(self, poses: StaticPoses, near: np.ndarray | None = None) -> np.ndarray:
         """Its tip at rest, in the frame of the tracked base, m, NaN where none is found. Shape (N, 3)."""
         return self.placed(self.rest(poses, near))
+
+    def shift(self, learnt: ResidualMap | None, poses: StaticPoses) -> np.ndarray:
+        """By how far the tip of the arm that it stands for rests beside its own, in the frame of the tracked base, m; 0
+        where nothing is learnt. Shape (N, 3)."""
+        if learnt is None:
+            return np.zeros((len(poses), 3))
+        return learnt.mean(self.resting(poses)) @ self.turn.T
+
+    def resting(self, poses: StaticPoses) -> RestingPoses:
+        return RestingPoses.of(self.chain, self.rest(poses), poses.gravity @ self.turn)
 
     def placed(self, equilibrium: Equilibrium) -> np.ndarray:
         tips = np.where(equilibrium.converged[:, None], equilibrium.position, np.nan)

@@ -1,10 +1,11 @@
 """The uncertainty of the tip at rest, in the form of the Guide (JCGM 100, 101 and 102).
 
 The measurand is where the tip is, m, in the frame of the tracked base, after slow commands, from whichever side. Its
-estimate is the twin's tip in the middle of what friction can hold. Of every input x_i with standard uncertainty u_i the
-twin gives the sensitivity c_i = ∂tip/∂x_i, and u² = Σ c_i u_i c_j u_j r_ij. The radius within which the tip lies in
-95 of 100 cases is not taken from u but from draws of all inputs at once, through the twin (JCGM 101; a sphere is its
-region of coverage, JCGM 102, 7.6): it is the 95th percentile of the tip's distance from the estimate.
+estimate is the twin's tip in the middle of what friction can hold, moved by the residual map where there is one. Of
+every input x_i with standard uncertainty u_i the twin gives the sensitivity c_i = ∂tip/∂x_i, and
+u² = Σ c_i u_i c_j u_j r_ij. The radius within which the tip lies in 95 of 100 cases is not taken from u but from draws
+of all inputs at once, through the twin (JCGM 101; a sphere is its region of coverage, JCGM 102, 7.6): it is the 95th
+percentile of the tip's distance from the estimate.
 """
 
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ import mujoco
 import numpy as np
 
 from trunkline.identification.parameters.parameters import parameter_named
+from trunkline.kinematics.residual.residual_map import ResidualMap
 from trunkline.report.certificate.arms import StaticArm, arm_of, arms_with
 from trunkline.report.certificate.discrepancy import discrepancy
 from trunkline.report.certificate.poses import StaticPoses
@@ -78,12 +80,14 @@ class Inputs:
         parameters: what is known of them.
         lacking: what the model lacks; None where no held-out trial tells it.
         noise: of the cameras' tip, standard uncertainty of each coordinate, m.
+        residual_map: by how far the tip rests beside the twin's, where recorded poses tell.
     """
 
     model: mujoco.MjModel
     parameters: Posterior
     lacking: Discrepancy | None
     noise: float
+    residual_map: ResidualMap | None = None
 
 
 def held_out(
@@ -127,7 +131,7 @@ def sensitivities(model: mujoco.MjModel, parameters: Posterior, arm: StaticArm, 
 def budget(inputs: Inputs, poses: StaticPoses, arms: int, each: int, rng: np.random.Generator) -> Budget:
     """Of the tip in `poses`, by so many draws of the parameters, `each` of them with so many of everything else."""
     arm, parameters = arm_of(inputs.model), inputs.parameters
-    tips = arm.tips(poses)
+    tips = arm.tips(poses) + arm.shift(inputs.residual_map, poses)
     friction, ways = arm.friction(poses), arm.ways(poses)
     moves = sensitivities(inputs.model, parameters, arm, poses)
     offsets = np.tile(parameter_shifts(inputs.model, parameters, arm, poses, arms, rng), (each, 1, 1))

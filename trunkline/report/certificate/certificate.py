@@ -23,7 +23,7 @@ from trunkline.report.certificate.arms import arm_of
 from trunkline.report.certificate.budget import Budget, Inputs, budget, held_out, sure_pulls
 from trunkline.report.certificate.coverage import Bring, covered
 from trunkline.report.certificate.facts import error_rows, parameter_facts, uncertainty_facts
-from trunkline.report.certificate.held_out import at_rest, tip_residuals
+from trunkline.report.certificate.held_out import at_rest, learnt_from, tip_residuals
 from trunkline.report.certificate.poses import draw_poses, posed
 from trunkline.report.certificate.replays import packed
 from trunkline.report.certificate.words import Use, limits_of, next_step, verdict
@@ -94,6 +94,8 @@ def certify(
         constant, *shares = inputs.lacking.rms
         uncertainty["lacking_constant_mm"] = 1e3 * constant
         uncertainty["lacking_pct"] = {"of_what_gravity_moves": 100 * shares[0], "of_what_cables_move": 100 * shares[1]}
+    if inputs.residual_map is not None:
+        uncertainty["residual_map"] = inputs.residual_map.errors_mm()
     if len(sessions := sessions_of(trials)) > 1:
         uncertainty["mounted_as_in"] = sessions[0]
     uncertainty["measured"] = None
@@ -126,6 +128,8 @@ def certify(
     numbers = {"radius_mm": uncertainty["radius_mm"], "combined_mm": uncertainty["combined_mm"],
                "held_out_trials": uncertainty["held_out_trials"], "without_rest": uncertainty["without_rest"],
                "open": sum(len(stage["open"]) for stage in facts["parameters"].values())}  # fmt: skip
+    if "residual_map" in uncertainty:
+        numbers["residual_map"] = uncertainty["residual_map"]
     if uncertainty["measured"]:
         numbers["coverage"] = uncertainty["measured"]
     replays = packed(prediction, model, trials[0].markers)
@@ -134,7 +138,10 @@ def certify(
         pulls = np.maximum(arm_of(model).chain.straight_lengths - poses.commands, 0).sum(axis=1)
         sure = sure_pulls(pulls, tip_budget.radius, SURE * length)
         uncertainty["sure_pulls_mm"] = 1e3 * sure
-        lacking = Lacking(twin.provenance.digest, inputs.lacking, **vars(conditions), sure_pulls=sure)
+        lacking = Lacking(
+            twin.provenance.digest, inputs.lacking, **vars(conditions), sure_pulls=sure,
+            residual_map=inputs.residual_map,
+        )
     return Certificate(facts, numbers, replays, held_out_shapes(prediction), tip_budget, lacking)
 
 
@@ -144,11 +151,13 @@ def inputs_of(twin: Twin, trials: list[Trial], ingested: dict, arms: int, rng: n
     rested = at_rest(trials)
     tip = replay(model, [], trials[0].markers).tip
     residuals = tip_residuals(model, rested, tip)
-    usable = np.isfinite(residuals)
-    lacking = None
-    if usable.sum() >= FEWEST:
-        lacking = held_out(model, parameters, noise, posed(rested, model)[usable], residuals[usable], arms, rng)
-    return Inputs(model, parameters, lacking, noise)
+    usable = np.isfinite(residuals).all(axis=1)
+    if usable.sum() < FEWEST:
+        return Inputs(model, parameters, None, noise)
+    poses, residuals = posed(rested, model)[usable], residuals[usable]
+    learnt, missed = learnt_from(model, poses, residuals)
+    lacking = held_out(model, parameters, noise, poses, np.linalg.norm(missed, axis=1), arms, rng)
+    return Inputs(model, parameters, lacking, noise, learnt)
 
 
 def check_fitted(tables: dict[str, dict], trials: list[Trial]) -> None:

@@ -1,15 +1,18 @@
-"""How far the twin's tip is from the measured one in the held-out trials at rest."""
+"""How far the twin's tip is from the measured one in the held-out trials at rest, and what can be learnt of that."""
 
 import mujoco
 import numpy as np
 
 from trunkline.identification.evaluation.evaluation import marker_positions
 from trunkline.identification.parameters.per_session import model_in
+from trunkline.kinematics.residual.residual_map import FEWEST, ResidualMap
 from trunkline.recordings.trials.experiments import is_static
 from trunkline.recordings.trials.splits import VALIDATE
 from trunkline.recordings.trials.trial import Trial, sessions_of
 from trunkline.report.certificate.arms import arm_of
-from trunkline.report.certificate.poses import posed
+from trunkline.report.certificate.poses import StaticPoses, posed
+
+MOST = 300  # poses that a map is learnt from, evenly taken: its network has a column for each
 
 
 def at_rest(trials: list[Trial]) -> list[Trial]:
@@ -19,15 +22,37 @@ def at_rest(trials: list[Trial]) -> list[Trial]:
 
 
 def tip_residuals(model: mujoco.MjModel, trials: list[Trial], tip: int) -> np.ndarray:
-    """Distances of the twin's marker of number `tip` from where `trials` at rest saw it, m, NaN where they did not.
-    Shape (N,)."""
-    lengths = np.full(len(trials), np.nan)
+    """From the twin's marker of number `tip` to where `trials` at rest saw it, m, in the frame of the twin's mount, NaN
+    where they did not see it. Shape (N, 3)."""
+    residuals = np.full((len(trials), 3), np.nan)
     for session in sessions_of(trials):
-        session_model = model_in(session, model)
+        arm = arm_of(model_in(session, model))
         places = [i for i, trial in enumerate(trials) if trial.session == session]
-        equilibria = arm_of(session_model).rest(posed([trials[i] for i in places], session_model))
+        equilibria = arm.rest(posed([trials[i] for i in places], arm.model))
         for i, qpos, rested in zip(places, equilibria.qpos, equilibria.converged, strict=True):
             if rested and trials[i].measured[-1, tip]:
-                place = marker_positions(session_model, trials[i].markers, qpos)[tip]
-                lengths[i] = np.linalg.norm(place - trials[i].positions[-1, tip])
-    return lengths
+                place = marker_positions(arm.model, trials[i].markers, qpos)[tip]
+                residuals[i] = (trials[i].positions[-1, tip] - place) @ arm.turn
+    return residuals
+
+
+def learnt_from(
+    model: mujoco.MjModel, poses: StaticPoses, residuals: np.ndarray
+) -> tuple[ResidualMap | None, np.ndarray]:
+    """What held-out trials tell of by how far the tip rests beside the twin's, and by how much each is missed with
+    that learnt from the others alone, m (N, 3). None, and the residuals, where the trials are too few, or no nearer
+    with it.
+
+    Args:
+        residuals: as `tip_residuals` has them, finite ones. Shape (N, 3).
+    """
+    if len(poses) < FEWEST:
+        return None, residuals
+    few, arm = np.linspace(0, len(poses) - 1, min(len(poses), MOST)).round().astype(int), arm_of(model)
+    resting = arm.resting(poses)
+    learnt = ResidualMap.fit(resting[few], residuals[few], arm.chain.length)
+    if not learnt.is_worth_it:
+        return None, residuals
+    missed = residuals - learnt.mean(resting)
+    missed[few] = learnt.left_out()
+    return learnt, missed

@@ -169,6 +169,12 @@ def _uncertainty(facts: dict, pictures: dict[str, bytes]) -> str:
             f"{constant:.2g} mm everywhere, {shares['of_what_gravity_moves']:.2g} % of how far gravity moves the tip "
             f"and {shares['of_what_cables_move']:.2g} % of how far the cables do, root mean squares."
         )
+        if learnt := uncertainty.get("residual_map"):
+            lacking += (
+                f" A residual map from {learnt['poses']} of them moves the twin's tip: in the median it rests "
+                f"{learnt['left_out']:.2g} mm from there in poses that are left out, {learnt['twin']:.2g} mm without. "
+                "All radii are of the tip that it moves."
+            )
         if sure := uncertainty["sure_pulls_mm"]:
             lacking += f" Where motors pull by {sure:.0f} mm in all or less, the tip is within 1 % of the length."
     mounted = ""
