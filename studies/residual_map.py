@@ -1,10 +1,10 @@
 """What poses that a lab records are worth: `python -m studies.residual_map`
 
 The lab's arm is sent commands that are drawn as `train_ik` draws them, with another seed, and moves by itself until its
-cameras see it rest (`qualification/seen.py`). From some of these poses a certificate learns how far the tip rests beside
-the twin's; the others, which nothing has learnt from, say how near it then is, and how often it is within the radius
-that the certificate states. Beside it: nothing learnt, and learnt from the static trials that the session has anyway.
-Takes some ten minutes.
+cameras see it rest (`qualification/seen.py`). From some of these poses a certificate learns how far the tip rests
+beside the twin's; the others, which nothing has learnt from, say how near it then is, and how often it is within the
+radius that the certificate states. Beside it: nothing learnt, and learnt from the static trials of the session. Takes
+some ten minutes.
 """
 
 import argparse
@@ -81,8 +81,9 @@ def measure() -> None:
     print("| learnt from | tip, mm: median / 95 % | within the session's pulls | in the 95 % radius | its length |")
     print("|---|---:|---:|---:|---:|")
     poses, residuals = recorded_poses.session()
-    print(row(f"nothing; radius by the session's {len(poses)} trials", tips, [recorded_poses.stated(poses, residuals, False)], within))
-    print(row("the session's trials", tips, [recorded_poses.stated(poses, residuals)], within))
+    for name, learn in (("nothing; radius by the session's", False), ("the session's", True)):
+        stated = [recorded_poses.stated(poses, residuals, learn)]
+        print(row(f"{name} {len(poses)} static trials", tips, stated, within))
     for size in SIZES:
         sets = [rng.permutation(learnt)[:size] for _ in range(SETS if 2 * size < len(learnt) else 1)]
         stated = [recorded_poses.stated(recorded_poses.poses[rows], recorded_poses.residuals[rows]) for rows in sets]
