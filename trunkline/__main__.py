@@ -27,6 +27,7 @@ VERBS = {
     "describe": Verb("trunkline.tools.describe.__main__", "units, tendons and markers of an arm, with a drawing"),
     "check": Verb("trunkline.tools.check.__main__", "what a session can identify, before hours of fits"),
     "suggest": Verb("trunkline.tools.suggest.__main__", "which experiments to record next"),
+    "record-poses": Verb("trunkline.tools.record_poses.__main__", "poses to record, to learn where the tip rests"),
     "evaluate": Verb("trunkline.tools.evaluate.__main__", "how far a model is from a session, without a fit"),
     "report": Verb("trunkline.pipeline.report", "the certificate: one page on how far the twin can be trusted"),
     "export": Verb("trunkline.tools.export.__main__", "a session beside its simulation, for Foxglove and Rerun"),
