@@ -66,7 +66,7 @@ class Recorded:
         model, rng = self.twin.arm.model, np.random.default_rng(SEED)
         learnt, missed = learnt_from(model, poses, residuals) if learn else (None, residuals)
         lengths = np.linalg.norm(missed, axis=1)
-        lacking = held_out(model, self.twin.posterior, NOISE, poses, lengths, ARMS, rng)
+        lacking = held_out(model, self.twin.posterior, NOISE, poses, lengths, ARMS, rng, mapped=learnt is not None)
         return budget(Inputs(model, self.twin.posterior, lacking, NOISE, learnt), self.poses[OTHERS], ARMS, EACH, rng)
 
 

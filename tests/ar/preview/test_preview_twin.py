@@ -62,8 +62,13 @@ def test_the_friction_band_is_left_out_where_the_model_that_is_stepped_rubs(hole
 
 
 def test_poses_of_the_arm_move_the_tip_that_is_stated_and_not_its_radius():
-    """By a map in the arm's base frame, whose y and z are opposite to the flange's."""
-    made = robot_model(CASES["no friction on the holes"])
+    """By a map in the arm's base frame, whose y and z are opposite to the flange's. Friction is in the map's poses."""
+    knows = replace(LACKING, residual_map=everywhere([0.0, 0.0, 0.001]))
+    dry = replace(robot_model(CASES["no friction on the holes"]), lacking=knows)
+    uncertain = dry.tip_uncertainty(pull(dry.arm.copy().compile()), None)
+    assert isinstance(uncertain, TipUncertainty)
+    assert not uncertain.friction.any()
+    made = robot_model(CASES["rubbing"])
     trajectory = pull(made.arm.copy().compile())
     twin = compose_twin(made, World("w"), None, trajectory.joints[0], trajectory.commands[0], SETTINGS)
     shift = np.array([0.004, 0.002, -0.001])

@@ -14,7 +14,7 @@ from trunkline.identification.simulate.experiment import SLACK
 from trunkline.recordings.trials.conditions import Conditions
 from trunkline.report.certificate import budget as budgets
 from trunkline.report.certificate.arms import arm_of, arms_with
-from trunkline.report.certificate.budget import FRICTION, NOISE, Inputs, budget
+from trunkline.report.certificate.budget import FRICTION, LACKING, NOISE, Inputs, budget
 from trunkline.report.certificate.discrepancy import discrepancy
 from trunkline.report.certificate.poses import StaticPoses, draw_poses
 from trunkline.twin.discrepancy import Discrepancy
@@ -233,3 +233,19 @@ def test_the_tip_that_it_is_about_is_moved_by_the_residual_map(model):
     tips = [budget(replace(inputs, residual_map=m), poses, 2, 5, np.random.default_rng(0)) for m in maps]
     np.testing.assert_allclose(tips[1].tips - tips[0].tips, [turn @ shift] * 2, atol=1e-7)
     np.testing.assert_array_equal(tips[1].radius, tips[0].radius)
+
+
+def test_with_a_residual_map_parameters_and_friction_are_in_what_is_lacking_and_count_once():
+    model = small_model(3)
+    lacking = Discrepancy(np.array([[0.003, 0.0, 0.0]]), 30)
+    poses = draw_poses(arm_of(model).chain, Conditions(20.0, 20.0, 0.02, 0.02), 6, np.random.default_rng(1))
+    inputs = Inputs(model, mounts(0.0), lacking, 1e-4, everywhere([0.0, 0.0, 0.001]))
+    mapped, rng = budget(inputs, poses, 20, 50, np.random.default_rng(0)), np.random.default_rng(0)
+    assert [source.name for source in mapped.sources] == [LACKING, NOISE]
+    plain = budget(replace(inputs, residual_map=None), poses, 20, 50, rng)
+    assert np.median(plain.radius) > 1.5 * np.median(mapped.radius)
+    np.testing.assert_allclose(mapped.radius, 0.003 * np.sqrt(-np.log(0.05)), rtol=0.1)
+    missed = np.full(6, 0.003)
+    alone = budgets.held_out(model, mounts(0.0), 1e-4, poses, missed, 5, rng, mapped=True)
+    beside = budgets.held_out(model, mounts(0.0), 1e-4, poses, missed, 5, rng)
+    assert alone.rms[0] > beside.rms[0]

@@ -73,7 +73,8 @@ class RobotModel:
         if beyond:
             return beyond
         pose = StaticPoses(gravity[None], commands[None][:, order])
-        ways, friction = arm.ways(pose)[0], np.zeros(3) if model.rubs else base @ arm.friction(pose)[0]
+        counted = model.rubs or self.lacking.residual_map is not None  # in the futures, or in the map's poses
+        ways, friction = arm.ways(pose)[0], np.zeros(3) if counted else base @ arm.friction(pose)[0]
         if not np.isfinite(ways).all():
             return "the twin does not come to rest there"
         hanging = None if hangs is None else Hanging(hangs, places[0], bases[0])

@@ -6,6 +6,9 @@ every input x_i with standard uncertainty u_i the twin gives the sensitivity c_i
 u² = Σ c_i u_i c_j u_j r_ij. The radius within which the tip lies in 95 of 100 cases is not taken from u but from draws
 of all inputs at once, through the twin (JCGM 101; a sphere is its region of coverage, JCGM 102, 7.6): it is the 95th
 percentile of the tip's distance from the estimate.
+
+With a residual map, what parameters and friction do to the tip is in the poses that it is learnt from, and so in how
+far these are missed when they are left out: nothing else but the cameras' noise then counts beside that.
 """
 
 from dataclasses import dataclass
@@ -92,11 +95,13 @@ class Inputs:
 
 def held_out(
     model: mujoco.MjModel, parameters: Posterior, noise: float, poses: StaticPoses, residuals: np.ndarray, arms: int,
-    rng: np.random.Generator,
+    rng: np.random.Generator, mapped: bool = False,
 ) -> Discrepancy:
     """What the model lacks, from how far the tips of held-out poses are from the twin's, m (N,), beside what `arms`
-    draws of the parameters make of them."""
+    draws of the parameters make of them; of a residual map (`mapped`), all that it lacks."""
     arm = arm_of(model)
+    if mapped:
+        return discrepancy(residuals, arm.ways(poses), np.full(len(poses), 3 * noise**2))
     shifts = parameter_shifts(model, parameters, arm, poses, arms, rng)
     others = 3 * noise**2 + (arm.friction(poses) ** 2).sum(axis=1) / 3 + np.nanmean((shifts**2).sum(axis=2), axis=0)
     return discrepancy(residuals, arm.ways(poses), others)
@@ -133,6 +138,8 @@ def budget(inputs: Inputs, poses: StaticPoses, arms: int, each: int, rng: np.ran
     arm, parameters = arm_of(inputs.model), inputs.parameters
     tips = arm.tips(poses) + arm.shift(inputs.residual_map, poses)
     friction, ways = arm.friction(poses), arm.ways(poses)
+    if inputs.residual_map is not None:
+        parameters, friction = Posterior.from_tables({}), np.zeros_like(friction)
     moves = sensitivities(inputs.model, parameters, arm, poses)
     offsets = np.tile(parameter_shifts(inputs.model, parameters, arm, poses, arms, rng), (each, 1, 1))
     draws = arms * each
@@ -146,8 +153,9 @@ def budget(inputs: Inputs, poses: StaticPoses, arms: int, each: int, rng: np.ran
         for name, deviation, degrees, move
         in zip(parameters.names, parameters.deviation, parameters.degrees, moves, strict=True)
     ]  # fmt: skip
-    sources.append(UncertaintySource(FRICTION, "rectangular, between both ends of its band", 1 / np.sqrt(3),
-                                     "half bands", np.inf, np.linalg.norm(friction, axis=1) / np.sqrt(3)))  # fmt: skip
+    if inputs.residual_map is None:
+        sources.append(UncertaintySource(FRICTION, "rectangular, between both ends of its band", 1 / np.sqrt(3),
+                       "half bands", np.inf, np.linalg.norm(friction, axis=1) / np.sqrt(3)))  # fmt: skip
     if inputs.lacking:
         sources.append(UncertaintySource(LACKING, f"from {inputs.lacking.trials} held-out trials at rest", None, "mm",
                            inputs.lacking.trials, inputs.lacking.deviation(ways)))  # fmt: skip

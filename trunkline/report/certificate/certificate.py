@@ -156,7 +156,8 @@ def inputs_of(twin: Twin, trials: list[Trial], ingested: dict, arms: int, rng: n
         return Inputs(model, parameters, None, noise)
     poses, residuals = posed(rested, model)[usable], residuals[usable]
     learnt, missed = learnt_from(model, poses, residuals)
-    lacking = held_out(model, parameters, noise, poses, np.linalg.norm(missed, axis=1), arms, rng)
+    lengths, mapped = np.linalg.norm(missed, axis=1), learnt is not None
+    lacking = held_out(model, parameters, noise, poses, lengths, arms, rng, mapped)
     return Inputs(model, parameters, lacking, noise, learnt)
 
 
