@@ -112,6 +112,11 @@ RESULTS = {
         ),
         ("… share of targets sent to that arm with a warning", (Shown("on_plant.doubted"),)),
         (
+            "… to that arm, with a residual map from 30 poses of it: median / 95th percentile / of those within the "
+            "session's pulls",
+            (*both("on_plant.with_poses.position_error_mm"), *both("on_plant.with_poses.within.position_error_mm")),
+        ),
+        (
             "… to tips at which that arm itself rested, tip error: median / 95th percentile / of those within the "
             "session's pulls",
             (*both("on_plant.own_surface.position_error_mm"), *both("on_plant.own_surface.within.position_error_mm")),
@@ -482,10 +487,12 @@ def _command_row(root: Path) -> str:
 
     twin = sent("as_controls.frictionless", "as_controls.targets")
     rubbing = sent("as_controls.friction", "as_controls.friction.targets")
+    with_poses = _numbers(metrics, (figure.key for figure in both("on_plant.with_poses.position_error_mm")))
     what = "Tip error of the network's commands, median / 95th percentile "
     what += "(targets missed by more than 1 % of length without a warning; share of all with one)"
     return (
-        f"| {what} | **on the simulated lab's arm: {sent('on_plant', 'on_plant.targets')}** "
+        f"| {what} | **on the simulated lab's arm: {sent('on_plant', 'on_plant.targets')}; {with_poses} mm after "
+        "[30 recorded poses](docs/lab-tools.md#poses-to-record)** "
         f"| on the twin without friction: {twin}; with friction: {rubbing} |"
     )
 

@@ -119,7 +119,7 @@ def test_with_a_residual_map_commands_are_for_the_twin_s_tip_less_the_map_and_th
     network, straight = InverseKinematics(8, poses, commands, commands + 0.01), np.array([0.42, 0.53, 0.6])
     down = np.tile([0.0, 0.0, -STANDARD_GRAVITY], (6, 1)) + rng.normal(size=(6, 3)) * (gravity.shape[1] > 0)
     learnt = ResidualMap(RestingPoses(rng.uniform(0, 0.03, (6, 3)), down * (gravity.shape[1] > 0)),
-                         np.array([0.01, -0.015, 0.008]) + 1e-3 * rng.normal(size=(6, 3)),
+                         np.array([0.01, -0.015, 0.008]) + 1e-3 * rng.normal(size=(6, 3)), np.ones(6),
                          np.array([0.01, 1e-4, 2.0, 3.0, 1.5]))  # fmt: skip
     alone, at_rest = to_onnx(network, ["a", "b", "c"], 0.05), TrialsAtRest(straight, 0.0, 0.0, 0.0, learnt)
     both = ask(session(to_onnx(network, ["a", "b", "c"], 0.05, at_rest)), poses)

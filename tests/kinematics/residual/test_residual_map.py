@@ -73,6 +73,8 @@ def test_its_table_brings_it_back(fitted):
         {"gravity": table["pulls"][:-1]},
         {"pulls": [0.1]},
         {"numbers": [1.0] * 4},
+        {"noisier": [1.0] * 59},
+        {"noisier": [0.5] * 60},
         {"numbers": [1.0, 1.0, 0.0, 1.0, 1.0]},
         {"residuals": lost.tolist()},
     ):
@@ -107,9 +109,23 @@ def test_letting_out_counts_as_no_pull(fitted):
 @pytest.mark.parametrize("left", [0, 31, 59])
 def test_a_pose_that_is_left_out_is_foreseen_by_all_others_alone(fitted, left):
     others = np.delete(np.arange(60), left)
-    without = ResidualMap(fitted.poses[others], fitted.residuals[others], fitted.numbers)
+    without = ResidualMap(fitted.poses[others], fitted.residuals[others], fitted.noisier[others], fitted.numbers)
     error = fitted.residuals[left] - without.mean(fitted.poses[[left]])[0]
     np.testing.assert_allclose(fitted.left_out()[left], error, rtol=1e-6)
+
+
+def test_poses_that_are_far_off_spoil_neither_the_map_nor_what_it_is_worth():
+    """Two of forty, off by 4 cm as where an arm snaps."""
+    rng = np.random.default_rng(6)
+    poses, others = drawn(40, rng), drawn(200, rng)
+    residuals = measured(poses, rng)
+    clean = ResidualMap.fit(poses, residuals, LENGTH)
+    residuals[[7, 23]] += [[0.04, 0, 0], [0.0, -0.03, 0.03]]
+    spoilt = ResidualMap.fit(poses, residuals, LENGTH)
+    assert spoilt.is_worth_it
+    assert set(np.argsort(spoilt.noisier)[-2:]) == {7, 23}
+    left = [float(np.median(lengths(smooth(others) - each.mean(others)))) for each in (clean, spoilt)]
+    assert left[1] < 2 * left[0]
 
 
 def test_residuals_that_nothing_tells_are_not_worth_a_map():

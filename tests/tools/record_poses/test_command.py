@@ -66,13 +66,13 @@ def test_the_mount_stays_as_it_is_unless_it_is_to_be_tilted(tmp_path, capsys):
     assert not numbers(rows, "tilt_deg", "azimuth_deg").any()
     printed = capsys.readouterr().out
     assert "the mount stays as it is, the arm hanging straight" in printed
-    assert "in all some 5 minutes:" in printed, "15 times 3 + 2 + 3 + 10 + 3 s"
+    assert "in all some 8 minutes:" in printed, "15 times 3 + 2 + 3 + 20 + 3 s"
 
 
 def test_tilts_take_minutes_of_their_own_and_are_told_by_their_side(tmp_path, capsys):
     write(tmp_path / "poses", "--count", "15", "--tilt", "30", "--mounts", "3", "--standing")
     printed = " ".join(capsys.readouterr().out.split())
-    assert "in all some 14 minutes, with 3 for each tilt of the mount:" in printed
+    assert "in all some 17 minutes, with 3 for each tilt of the mount:" in printed
     assert "the mount has 3 tilts, one after the other: turn it by tilt_deg from the standing arm" in printed
 
 
@@ -82,8 +82,8 @@ def test_it_prints_what_to_do_and_where_to_see_what_it_brought(tmp_path, capsys)
     loose = -numbers(rows, *(f"{name}_mm" for name in NAMES)).min()
     assert f"let all cables out by {loose:.0f} mm from the straight arm within 3 s, and wait 2 s" in printed
     assert "2 s later draw its motors in to the row's pulls, evenly within 3 s" in printed
-    assert "touch nothing for 10 s" in printed
-    assert "its trial is from 15 s on" in printed
+    assert "touch nothing for 20 s" in printed
+    assert "its trial is from 25 s on" in printed
     assert "dvc repro artifacts/report/certificate.html then shows" in printed
 
 
@@ -95,7 +95,7 @@ def test_its_trials_are_read_as_a_session(tmp_path):
     session = read_session(folder)
     assert [trial.name for trial in session.trials] == [row["pose"] for row in rows]
     assert {(trial.experiment, trial.split, trial.window) for trial in session.trials} == {
-        ("static_pull", "validate", (15.0, 18.0))
+        ("static_pull", "validate", (25.0, 28.0))
     }
     assert session.tendons == {name: name for name in NAMES}
     assert session.frame.gravity == "standard"

@@ -6,8 +6,10 @@ and Williams 2006, chapters 2 and 5), its three coordinates alike and apart:
     k(x, x') = s² w(u) w(u') exp(-|u - u'|² / 2 a² - |g - g'|² / 2 b²),    w(u) = √(d² + |u|²),
 
 u being pulls over the largest that was recorded, longer tendons counting as none, and g gravity over the standard one.
-So the residual grows with the pulls, as models that were fitted to an arm at rest leave it. Cameras add noise. The five
-numbers are those of the largest posterior density, under log-normal priors of wide spread.
+So the residual grows with the pulls, as models that were fitted to an arm at rest leave it. Poses add noise. The five
+numbers are those of the largest posterior density, under log-normal priors of wide spread. Near where an arm snaps from
+one shape to another, or where it had not come to rest, a pose tells nothing of its neighbours: what is missed by more
+than `FAR` times the usual where it is left out has as much more noise (Huber 1964), and the numbers are sought anew.
 
 How far off it still is, poses say that are left out one by one: `trunkline/report/certificate` makes a radius of that.
 """
@@ -28,7 +30,8 @@ from trunkline.model.statics.equilibria import Equilibrium
 MIDDLE = np.array([0.008, 0.001, 0.5, 1.0, 0.3])
 SPREAD = np.array([1.0, 0.7, 0.7, 0.7, 0.7])
 FEWEST = 15  # poses, below which there is no map
-TABLE = ("pulls", "gravity", "residuals", "numbers")
+TABLE = ("pulls", "gravity", "residuals", "noisier", "numbers")
+FAR, USUAL, ROUNDS = 2.5, 1.538, 3  # deviations; of a vector's length its median over a coordinate's deviation
 WORTH = 0.9  # of the errors without the map: poses that are left out have to be so much nearer with it
 
 
@@ -57,10 +60,12 @@ class RestingPoses:
 
 @dataclass(frozen=True)
 class ResidualMap:
-    """poses: that were recorded. residuals: theirs, m. Shape (N, 3). numbers: s and the noise, m, a, b, d."""
+    """poses: that were recorded. residuals: theirs, m. Shape (N, 3). noisier: times that each has the noise of others.
+    Shape (N,). numbers: s and the noise, m, a, b, d."""
 
     poses: RestingPoses
     residuals: np.ndarray
+    noisier: np.ndarray
     numbers: np.ndarray
 
     @classmethod
@@ -75,16 +80,26 @@ class ResidualMap:
         if not np.isfinite(residuals).all():
             bad = np.flatnonzero(~np.isfinite(residuals).all(axis=1))[0]
             raise InputError(f"pose {bad}: found the residual {residuals[bad].tolist()} m, expected finite numbers")
-        middle = np.log(MIDDLE * [length, length, 1, 1, 1])
+        learnt = cls(poses, residuals, np.ones(len(poses)), MIDDLE)
+        for _ in range(ROUNDS):
+            learnt = learnt._likeliest(length)
+            missed = np.linalg.norm(learnt.left_out(), axis=1)
+            usual = max(float(np.median(missed)) / USUAL, 1e-9)
+            learnt = replace(learnt, noisier=np.maximum(missed / (FAR * usual), 1.0))
+        return learnt
+
+    def _likeliest(self, length: float) -> "ResidualMap":
+        """The same poses with the numbers of the largest posterior density. length: of the arm, m."""
+        residuals, middle = self.residuals, np.log(MIDDLE * [length, length, 1, 1, 1])
 
         def loss(logs: np.ndarray) -> float:
-            factor = cho_factor(cls(poses, residuals, np.exp(logs))._noisy())
+            factor = cho_factor(replace(self, numbers=np.exp(logs))._noisy())
             fit = 0.5 * float(np.sum(residuals * cho_solve(factor, residuals)))
             prior = 0.5 * float(np.sum(((logs - middle) / SPREAD) ** 2))
             return fit + 3 * float(np.log(np.diag(factor[0])).sum()) + prior
 
         bounds = list(zip(middle - 4 * SPREAD, middle + 4 * SPREAD, strict=True))
-        return cls(poses, residuals, np.exp(minimize(loss, middle, method="L-BFGS-B", bounds=bounds).x))
+        return replace(self, numbers=np.exp(minimize(loss, middle, method="L-BFGS-B", bounds=bounds).x))
 
     def mean(self, poses: RestingPoses) -> np.ndarray:
         """By how far the tip rests beside the twin's, m. Shape (M, 3)."""
@@ -98,9 +113,9 @@ class ResidualMap:
 
     @property
     def is_worth_it(self) -> bool:
-        """Whether poses that are left out are nearer with the map than without, in the root mean square."""
-        rms = [float(np.sqrt(np.mean(errors**2))) for errors in (self.left_out(), self.residuals)]
-        return rms[0] <= WORTH * rms[1]
+        """Whether poses that are left out are nearer with the map than without, in the median."""
+        errors = self.errors_mm()
+        return errors["left_out"] <= WORTH * errors["twin"]
 
     def errors_mm(self) -> dict:
         """How many poses there are, and the median of how far the tip is from the twin's, mm, as it is ("twin") and
@@ -137,24 +152,27 @@ class ResidualMap:
             "pulls": np.round(self.poses.pulls, 7).tolist(),
             "gravity": np.round(self.poses.gravity, 6).tolist(),
             "residuals": np.round(self.residuals, 7).tolist(),
+            "noisier": np.round(self.noisier, 4).tolist(),
             "numbers": [float(f"{number:.6g}") for number in self.numbers],
         }
 
     @classmethod
     def from_table(cls, table: dict) -> "ResidualMap":
         """Raises: KeyError, TypeError, ValueError: it is no such table."""
-        pulls, gravity, residuals, numbers = (np.array(table[name], float) for name in TABLE)
+        pulls, gravity, residuals, noisier, numbers = (np.array(table[name], float) for name in TABLE)
         if pulls.ndim != 2 or gravity.shape != (len(pulls), 3) or residuals.shape != gravity.shape:
             raise ValueError(f"residual map of shapes {pulls.shape}, {gravity.shape}, {residuals.shape}")
         if numbers.shape != MIDDLE.shape or not (numbers > 0).all() or not np.isfinite(numbers).all():
             raise ValueError(f"residual map with the numbers {numbers.tolist()}")
-        if not all(np.isfinite(part).all() for part in (pulls, gravity, residuals)):
+        if noisier.shape != (len(pulls),) or not (noisier >= 1).all():
+            raise ValueError(f"residual map with poses noisier by {noisier.tolist()}")
+        if not all(np.isfinite(part).all() for part in (pulls, gravity, residuals, noisier)):
             raise ValueError("residual map with numbers that are not finite")
-        return cls(RestingPoses(pulls, gravity), residuals, numbers)
+        return cls(RestingPoses(pulls, gravity), residuals, noisier, numbers)
 
     def _noisy(self) -> np.ndarray:
         (scale, noise), weight = self.numbers[:2], self._weight(self.poses)
-        return scale**2 * np.outer(weight, weight) * self._alike(self.poses) + noise**2 * np.eye(len(self.poses))
+        return scale**2 * np.outer(weight, weight) * self._alike(self.poses) + np.diag((noise * self.noisier) ** 2)
 
     def _alike(self, poses: RestingPoses) -> np.ndarray:
         """The exponentials of `poses` and those that were recorded, at most 1. Shape (M, N)."""

@@ -102,7 +102,8 @@ def certify(
     if bring:
         drawn = draw_poses(arm_of(model).chain, conditions, config.covered, rng)
         stated = budget(inputs, drawn, config.arms, config.each, rng)
-        uncertainty["measured"] = covered(arm_of(model).chain, drawn, stated, bring, rng).metrics()
+        coverage = covered(arm_of(model).chain, drawn, stated, bring, rng)
+        uncertainty["measured"] = coverage.metrics() if len(coverage.inside) else None
     rows = error_rows({stage: metrics[stage] for stage in tables}, metrics["score"])
     limits = limits_of(conditions, [trial.load for trial in trials])
     headline = headline_of(list(tables), metrics)

@@ -1,8 +1,8 @@
 """How often the tip is within the radius that a certificate states: poses that no trial has, on the arm itself.
 
-Half of the pulled poses are reached from straight and half from beyond. A pose counts only if the arm rests in it, and
-the twin's radius there is finite. The share comes with Wilson's interval of 95 % (E. B. Wilson, Probable inference, the
-law of succession, and statistical inference, JASA 22 (1927) 209).
+Half of the pulled poses are reached from straight and half from beyond. A pose counts only if the arm rests in it; one
+in which the twin finds no rest counts as not within. The share comes with Wilson's interval of 95 % (E. B. Wilson,
+Probable inference, the law of succession, and statistical inference, JASA 22 (1927) 209).
 """
 
 from collections.abc import Callable
@@ -21,15 +21,17 @@ Bring = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 @dataclass
 class Coverage:
-    """Of N poses. inside: whether the tip was within the stated radius. pulled: whether a motor pulled. Shape (N,)."""
+    """Of N poses. inside: whether the tip was within the stated radius. pulled: whether a motor pulled. Shape (N,).
+    unrested: of how many further ones the arm did not rest, which therefore tell nothing."""
 
     inside: np.ndarray
     pulled: np.ndarray
+    unrested: int = 0
 
     def metrics(self) -> dict:
         """Shares of all poses and, apart, of those with a pull, as an arm that only hangs is nearer to its twin."""
         pulled = {"pulled": share_of(self.inside[self.pulled])} if self.pulled.any() else {}
-        return share_of(self.inside) | {"stated": COVERAGE} | pulled
+        return share_of(self.inside) | {"stated": COVERAGE, "unrested": self.unrested} | pulled
 
 
 def share_of(inside: np.ndarray) -> dict:
@@ -52,7 +54,7 @@ def pulls_of(chain: Chain, poses: StaticPoses) -> np.ndarray:
 
 
 def is_inside(tips: np.ndarray, stated: Budget) -> np.ndarray:
-    """Whether tips (N, 3), m, lie within the stated radius: not where the arm or the twin does not rest. Shape (N,)."""
+    """Whether tips (N, 3), m, lie within the stated radius: not where the twin does not rest. Shape (N,)."""
     off = np.linalg.norm(tips - stated.tips, axis=1)
     return np.isfinite(stated.radius) & (off <= stated.radius)
 
@@ -62,4 +64,5 @@ def covered(chain: Chain, poses: StaticPoses, stated: Budget, bring: Bring, rng:
     pulls = pulls_of(chain, poses)
     pulled = np.max(pulls, axis=1, initial=0.0) > 0
     tips = bring(pulls, poses.gravity, from_beyond(pulled, rng))
-    return Coverage(is_inside(tips, stated), pulled)
+    rested = np.isfinite(tips).all(axis=1)
+    return Coverage(is_inside(tips, stated)[rested], pulled[rested], int((~rested).sum()))

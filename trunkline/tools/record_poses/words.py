@@ -13,7 +13,7 @@ from trunkline.recordings.trials.splits import VALIDATE
 from trunkline.tools.record_poses.draw import Mounts, PosesToRecord
 
 CREEP = 0.01  # share of the way to rest that may be left
-LEAST_WAIT = 10.0  # s to rest at least: releases of some seconds do not show how a printed arm creeps after that
+LEAST_WAIT = 20.0  # s to rest at least: releases of some seconds do not show how a printed arm creeps after that
 RAMP, LEAD, RECORDED = 3.0, 2.0, 3.0  # s to let cables out or draw them in; of a log before that; of a log at rest
 
 
