@@ -20,7 +20,7 @@ const ARROWS = { ArrowLeft: [-1, 0, 0], ArrowRight: [1, 0, 0], ArrowUp: [0, 1, 0
 
 export class DesktopHands {
   /**
-   * `acts`: what else keys do: `stop` and `reach`; `deadman(on)` at each change of the dead man's key, `key(code)` at
+   * `acts`: what else keys do: `stop`, `reach` and `correct`; `deadman(on)` at each change of the dead man's key, `key(code)` at
    * each key pressed. Positions are in the base frame, z up.
    */
   constructor(canvas, camera, orbit, base, marks, handles, rigidHand, acts) {
@@ -158,6 +158,7 @@ export class DesktopHands {
     else if (code === "KeyR") this.accept();
     else if (code === "KeyF") this.press("stick_pressed");
     else if (code === "KeyH") this.acts.reach();
+    else if (code === "KeyC") this.acts.correct();
   }
 
   arrow(event) {

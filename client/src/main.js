@@ -9,6 +9,7 @@ import { DesktopHands } from "./desktop.js";
 import { Handles } from "./handles.js";
 import { doubtQuestion, isDoubtful, lasts, ofDevice, success, whyLost, whyNothing } from "./hints.js";
 import { Immersive, canImmerse } from "./immersive.js";
+import { MeasuredArm, camerasText, correctionText } from "./measured.js";
 import { Marks } from "./rays.js";
 import { PagePanel, RoomPanel, predictionText, remedy, uiText } from "./panel.js";
 import { Playback } from "./playback.js";
@@ -53,12 +54,14 @@ class Page {
     this.orbit.target.set(0.25, 0.35, 0);
     this.drawn = new RobotScene();
     this.marks = new Marks(this.drawn.base, RIGID_HAND);
+    this.measured = new MeasuredArm(this.drawn.base);
     this.board = new RoomPanel(this.drawn.scene);
     this.panel = new PagePanel(find);
     this.handles = new Handles(this.drawn.base);
     this.desktop = new DesktopHands(this.renderer.domElement, this.camera, this.orbit, this.drawn.base, this.marks, this.handles, RIGID_HAND, {
       stop: () => this.wire.stop(),
       reach: () => this.chooseReach(),
+      correct: () => this.chooseCorrection(),
       deadman: (on) => find("grip").setAttribute("aria-pressed", String(on)),
       key: (code) => this.explain(code),
     });
@@ -132,6 +135,7 @@ class Page {
         this.prediction = message;
         this.drawn.showPrediction(message);
       },
+      measured: (message) => this.measured.receive(message, clock()),
       error: ({ reason, closing }) => closing || this.warn(reason),
     };
   }
@@ -186,6 +190,11 @@ class Page {
     this.drawn.showReach(!this.drawn.reachShown);
   }
 
+  /** Whether plans that are asked for from now on may correct themselves by cameras; without them they never do. */
+  chooseCorrection() {
+    this.corrects = Boolean(this.measured.message) && !this.corrects;
+  }
+
   /** As well as drawing is fast. */
   redraw() {
     if (!this.reachChosen) this.drawn.showReach(this.quality.reach);
@@ -223,6 +232,8 @@ class Page {
   /** A preview begins; null ends it. */
   show(message) {
     this.digest = message?.digest ?? "";
+    this.planned = message;
+    this.measured.bound(message?.correction);
     this.playback = message && new Playback({ ...message, width: this.drawn.count * STRIDE });
     this.phases = message?.phases ?? [];
     this.begins = message?.begins ?? 0;
@@ -257,6 +268,8 @@ class Page {
       this.desktop.press("stick_pressed");
     });
     tapped("reach", () => this.chooseReach());
+    tapped("cameras", () => (this.measured.shown = !this.measured.shown));
+    tapped("correct", () => this.chooseCorrection());
     for (const view of ["fit", "front", "side", "top"]) tapped(view, () => this.lookFrom(view));
     for (const step of document.querySelectorAll("#pad [data-step]")) {
       step.addEventListener("click", () => {
@@ -421,7 +434,7 @@ class Page {
     if (!immersed && !document.hidden) this.quality.input(gap, now);
     this.inputAt = now;
     const visible = immersed ? this.immersive.visible : !document.hidden;
-    this.wire.input(this.confirming.filter(hands, this.state?.mode, this.prediction), visible, now);
+    this.wire.input(this.confirming.filter(hands, this.state?.mode, this.prediction), visible, now, Boolean(this.corrects) && !immersed); // the board has no room for its bounds
   }
 
   play(dt) {
@@ -437,7 +450,7 @@ class Page {
     const phase = this.phases.findLast(([, since]) => since <= this.begins + playing.at)?.[0];
     const text = `${playing.at.toFixed(1)} of ${playing.duration.toFixed(1)} s${phase && !this.recording ? `, ${phase}` : ""}`;
     if (find("played").textContent !== text) find("played").textContent = text;
-    const caption = this.recording ? "A recording." : predictionText(this.prediction);
+    const caption = this.recording ? "A recording." : [predictionText(this.prediction), correctionText(this.planned)].filter(Boolean).join(" ");
     find("foreseen").toggleAttribute("data-doubtful", !this.recording && isDoubtful(this.prediction));
     if (find("foreseen").textContent !== caption) find("foreseen").textContent = caption;
   }
@@ -466,6 +479,10 @@ class Page {
     const device = immersed ? "controllers" : this.desktop.touches ? "touch" : "keys";
     const status = uiText({ state, lease, id: wire?.id ?? "", age: this.rounded(age), up: Boolean(wire?.up && wire.id), reason, ended: this.ended, stale, device, pressed: this.desktop.isPressed });
     this.addNotices(status, device);
+    this.measured.update(clock());
+    const cameras = camerasText(this.measured.message);
+    if (cameras) status.facts.Cameras = cameras;
+    if (state?.correction) status.facts.Correction = state.correction;
     if (immersed) {
       const { alignment } = this.immersive;
       if (!alignment.done && wire?.up) [status.title, status.next] = ["Where is the robot?", alignment.next];
@@ -484,6 +501,9 @@ class Page {
     find("go").hidden = !controls || !(stopped || (offers && !this.desktop.deadman));
     setText(find("which"), this.desktop.chosen === this.desktop.rigid ? "Mount" : "Tip");
     find("reach").setAttribute("aria-pressed", String(this.drawn.reachShown));
+    for (const id of ["cameras", "correct"]) find(id).hidden = !this.measured.message;
+    find("cameras").setAttribute("aria-pressed", String(this.measured.shown));
+    find("correct").setAttribute("aria-pressed", String(Boolean(this.corrects)));
     setText(find("control"), controls ? "Release control" : lease?.holder ? "Ask for control" : "Take control");
     find("control").disabled = !wire?.up || wire.offset === null;
     const ready = state?.mode === "ready";

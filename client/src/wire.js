@@ -26,7 +26,7 @@ export function decode(buffer) {
 }
 
 /** A binary message of a client; `hands` as `desktop` and `immersive` give them, of an input only; `pose` of a view, null where it is lost. */
-export function encode(name, { received, stamp, hands = null, visible = false, drawn = false, pose = null }) {
+export function encode(name, { received, stamp, hands = null, visible = false, drawn = false, correct = false, pose = null }) {
   const kind = FROM_CLIENT[name], rows = hands ? HANDS.length : kind.row.length ? 1 : 0;
   const message = new DataView(new ArrayBuffer(HEAD_BYTES + 4 * rows * kind.row.length));
   let flags = 0;
@@ -43,6 +43,7 @@ export function encode(name, { received, stamp, hands = null, visible = false, d
     });
     if (visible) flags |= kind.flags.visible;
     if (drawn) flags |= kind.flags.drawn;
+    if (correct) flags |= kind.flags.correct;
   }
   message.setUint8(HEAD.type.offset, kind.type);
   message.setUint8(HEAD.flags.offset, flags);
@@ -149,9 +150,9 @@ export class Wire {
     if (this.up) this.socket.send(JSON.stringify({ type, ...fields }));
   }
 
-  /** Poses and buttons of a frame of the page at `stamp`, s; it acknowledges what has come, and what was drawn. */
-  input(hands, visible, stamp) {
-    this.sendBinary("input", { hands, visible, stamp, drawn: this.drawn });
+  /** Poses and buttons of a frame of the page at `stamp`, s; it acknowledges what has come, and what was drawn. `correct`: a plan that it asks for may correct itself. */
+  input(hands, visible, stamp, correct = false) {
+    this.sendBinary("input", { hands, visible, stamp, drawn: this.drawn, correct });
     this.drawn = false;
   }
 

@@ -95,7 +95,8 @@ export const FROM_CLIENT = {
       "left_tracked": 1,
       "right_tracked": 2,
       "visible": 4,
-      "drawn": 8
+      "drawn": 8,
+      "correct": 16
     }
   },
   "view": {
@@ -214,6 +215,7 @@ export const SERVER_MESSAGES = {
     "targets": "required",
     "robot": "required",
     "fault": "required",
+    "correction": "",
     "type": "state"
   },
   "preview": {
@@ -222,6 +224,8 @@ export const SERVER_MESSAGES = {
     "duration": "required",
     "begins": "required",
     "phases": "required",
+    "correction": null,
+    "uncorrected": "",
     "type": "preview"
   },
   "foreseen": {
@@ -238,6 +242,16 @@ export const SERVER_MESSAGES = {
     "unknown": "",
     "offer": null,
     "type": "foreseen"
+  },
+  "measured": {
+    "markers": "required",
+    "tip": "required",
+    "apart": "required",
+    "age": "required",
+    "rate": "required",
+    "loss": "required",
+    "fault": "required",
+    "type": "measured"
   },
   "world": {
     "world": "required",

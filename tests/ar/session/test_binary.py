@@ -53,7 +53,7 @@ def test_a_frame_has_16_bytes_and_28_a_body():
 
 
 @pytest.mark.parametrize("message", [
-    b"", bytes(15), packed()[:-1], packed() + b"x", packed(count=3), packed(flags=16), bytes([99]) + bytes(15),
+    b"", bytes(15), packed()[:-1], packed() + b"x", packed(count=3), packed(flags=32), bytes([99]) + bytes(15),
     packed("ack", count=1), packed("stop", count=0) + bytes(4),
 ])  # fmt: skip
 def test_what_is_no_message_is_refused_in_one_line(message):

@@ -2,6 +2,7 @@
 
     trunkline live PACKAGE [--host ADDRESS --tls | --cert FILE --key FILE] [--port N]
                              [--dry-run | [--robot panda|fr3|ros2] [--motors gm6020 --bus can0 [--interface NAME]]]
+                             [--cameras simulated|natnet]
 
 PACKAGE: the folder or .tgz that the stage package_unity writes. It listens on this machine alone; a headset comes over
 USB: `adb reverse tcp:8443 tcp:8443`. Another address needs TLS. The address that is printed opens the session: whoever
@@ -16,7 +17,7 @@ from pathlib import Path
 
 from trunkline.ar.drivers.simulated_motors import SIMULATED
 from trunkline.ar.session.auth import is_local, names_of
-from trunkline.ar.session.hardware import MOTORS, ROBOTS
+from trunkline.ar.session.hardware import CAMERAS, MOTORS, ROBOTS
 from trunkline.ar.session.tls import fingerprint, make_certificate, tls_context
 from trunkline.errors import InputError, in_one_line
 from trunkline.program import program_name
@@ -40,6 +41,7 @@ def parsed(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--cert", type=Path, help="a certificate of your own, PEM")
     parser.add_argument("--key", type=Path, help="its key, PEM")
     parser.add_argument("--dry-run", action="store_true", help="on the simulated robot, as without --robot, --motors")
+    parser.add_argument("--cameras", choices=CAMERAS, default="", help="of the arm; conf/live says where they are")
     parser.add_argument("--robot", choices=ROBOTS, default=ROBOTS[0], help="docs/hardware.md says what was tried")
     parser.add_argument("--motors", choices=MOTORS, default=MOTORS[0], help="of the tendons")
     parser.add_argument("--bus", default="", help=f"the motors', such as can0; {SIMULATED}: simulated motors behind it")
@@ -53,6 +55,8 @@ def parsed(arguments: list[str]) -> argparse.Namespace:
         raise InputError(f"--host {args.host}: found every address, expected one: the page is served under it alone")
     if args.dry_run and (args.robot != ROBOTS[0] or args.motors != MOTORS[0]):
         raise InputError("--dry-run: found --robot or --motors besides, expected it alone: nothing real moves")
+    if args.cameras == "simulated" and (args.robot != ROBOTS[0] or args.bus):
+        raise InputError("--cameras simulated: found --robot or --bus besides, expected it alone: it sees no real arm")
     if not 0 < args.port < 65536:
         raise InputError(f"--port: found {args.port}, expected 1 to 65535")
     return args

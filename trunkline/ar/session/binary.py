@@ -55,7 +55,7 @@ FROM_SERVER = {
 }  # fmt: skip
 FROM_CLIENT = {
     "input": BinaryMessage(
-        16, HAND, ("left_tracked", "right_tracked", "visible", "drawn"), "2: the left, then the right hand",
+        16, HAND, ("left_tracked", "right_tracked", "visible", "drawn", "correct"), "2: the left, then the right hand",
         "binary messages received so far, on this connection", "s of the client's clock at which the poses were so",
     ),
     "view": BinaryMessage(

@@ -11,6 +11,7 @@ from trunkline.ar.teleop.alignment import base_quaternion
 from trunkline.ar.teleop.vectors import DOWN, conjugate, rotate
 
 STATES = 0.1  # s between states that tell no new mode
+DIGITS = 4  # after the decimal point, of positions, m
 TURNED = np.cos(np.radians(1.0))  # of gravity in the soft base, from which on there is a new shell
 
 
@@ -22,6 +23,7 @@ class Broadcast:
         self._controller, self._shells = controller, shells
         self._sent: tuple[float, messages.StateMessage | None] = (0.0, None)
         self._down, self._shelled = None, 0
+        self._measured = 0.0
 
     def robot(self, now: float) -> bytes:
         """A frame of its bodies and of the markers."""
@@ -68,6 +70,28 @@ class Broadcast:
             return None
         self._sent = now, state
         return state
+
+    def new_measured(self, now: float) -> messages.MeasuredMessage | None:
+        """The arm as cameras see it, every STATES; None without, or too soon."""
+        controller = self._controller
+        arm = controller.arm
+        if arm is None or now - self._measured < STATES:
+            return None
+        self._measured = now
+        tip, apart = _point(arm.tip), None
+        drawn = controller.drawn_tip()
+        if tip is not None and drawn is not None:
+            apart = round(float(np.linalg.norm(arm.tip - drawn)), DIGITS)
+        markers = tuple(_point(pose[:3]) for pose in arm.poses)
+        figures = round(arm.age, 3), round(arm.rate, 1), round(arm.loss, 3)
+        return messages.MeasuredMessage(markers, tip, apart, *figures, arm.fault)
+
+
+def _point(position: np.ndarray) -> messages.Point | None:
+    if not np.isfinite(position).all():
+        return None
+    x, y, z = (round(float(value), DIGITS) for value in position)
+    return x, y, z
 
 
 def piece(frames: PreviewPiece) -> bytes:

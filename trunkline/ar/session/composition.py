@@ -1,6 +1,6 @@
 """A session made of a package: core, processes, scene. Everything comes out of the package's file."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +9,7 @@ from trunkline.ar.preview.package import Package, read_package
 from trunkline.ar.preview.preview_twin import compose_twin, robot_model_of
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import preview_process, simulated
+from trunkline.ar.session.arm_cameras import ArmCameras, ArmCameraSettings, SimulatedArmCameras, natnet_cameras
 from trunkline.ar.session.bodies import drawn_bodies
 from trunkline.ar.session.certificate import certificate_of
 from trunkline.ar.session.controller import SessionController
@@ -47,9 +48,12 @@ class SessionParts:
     previewer: PreviewProcess
     log_writer: LogWriterProcess
     certificate: bytes
+    cameras: ArmCameras | None = None
 
     def close(self) -> None:
         self.robot.close()  # first: it may be moving
+        if self.cameras is not None:
+            self.cameras.close()
         self.previewer.close()
         self.log_writer.close()
 
@@ -59,11 +63,12 @@ def make(
     teleop: Teleop,
     config: SessionConfig,
     hardware: Hardware | None = None,
+    cameras: str = "",
 ) -> SessionParts:
-    """Of the package at `path`, the robot simulated, or as `hardware` has it.
+    """Of the package at `path`, the robot simulated, or as `hardware` has it. cameras: of CAMERAS, "" for none.
 
     Raises:
-        InputError: there is no package, or it cannot be previewed with.
+        InputError: there is no package, or it cannot be previewed with, or cameras do not answer.
     """
     package = read_package(path)
     joints = RigidIK(teleop.mount_offset).solve(SEARCH, config.ready, DOWN, 0.0)
@@ -73,15 +78,36 @@ def make(
     previewer = PreviewProcess(preview_process.run, setup)  # first: it takes longest until it is ready
     drawing = scene(simulation.twin.model, simulation.bodies, maps, package.geometry.length)
     subject = subject_of(simulation, hardware)
+    arm_cameras = cameras_of(cameras, simulation, subject, config.cameras)
+    if arm_cameras is not None:
+        subject = replace(subject, measured=arm_cameras.names)
     log_writer = LogWriterProcess(new_path(Path(config.journal.folder)), subject, config.journal.period)
     robot = robot_of(simulation, hardware)
     core = Teleoperation(teleop.core, package.reach, package.digest, teleop.mount_offset)
     lift = teleop.handling.least_lift
-    controller = SessionController(core, robot, previewer, world, lift, log_writer, package.period)
+    controller = SessionController(
+        core, robot, previewer, world, lift, log_writer, package.period, arm_cameras, config.correction
+    )
     controller.begin(config.rate, __version__)
     log_writer.await_begun()
     certificate = certificate_of(path, package.files)
-    return SessionParts(controller, package.digest, drawing, Shells.of(maps), robot, previewer, log_writer, certificate)
+    return SessionParts(
+        controller, package.digest, drawing, Shells.of(maps), robot, previewer, log_writer, certificate, arm_cameras
+    )
+
+
+def cameras_of(kind: str, simulation: Simulation, subject: Subject, settings: ArmCameraSettings) -> ArmCameras | None:
+    """They see the arm from now on; None where `kind` is "".
+
+    Raises:
+        InputError: they do not answer.
+    """
+    if not kind:
+        return None
+    simulated_arm = kind == "simulated"
+    cameras = SimulatedArmCameras(simulation, subject.tip, settings) if simulated_arm else natnet_cameras(settings)
+    cameras.connect()
+    return cameras
 
 
 def subject_of(simulation: Simulation, hardware: Hardware | None = None) -> Subject:

@@ -12,10 +12,14 @@ from typing import Protocol
 
 import numpy as np
 
+from trunkline.ar.correction.correction import CorrectionSettings
 from trunkline.ar.preview.world_model import update_world
 from trunkline.ar.session import messages
+from trunkline.ar.session.arm_cameras import MeasuredArm
 from trunkline.ar.session.binary import MARKERS
 from trunkline.ar.session.controller_input import NOWHERE
+from trunkline.ar.session.correction_control import CorrectionControl
+from trunkline.ar.session.correction_steps import CorrectionAnswer
 from trunkline.ar.session.follow import FollowControl
 from trunkline.ar.session.log_writer import LogWriter
 from trunkline.ar.session.previewer import (
@@ -46,7 +50,8 @@ from trunkline.ar.teleop.messages import (
     Vector,
     World,
 )
-from trunkline.ar.teleop.plan import Plan
+from trunkline.ar.teleop.plan import CorrectionBounds, Plan
+from trunkline.frames import rotation_from_wxyz
 
 JUST_AFTER = 1e-3  # s of the core's clock between the last input of whom controlled and the first of who does now
 HERE = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))  # of poses that are in the base frame already
@@ -54,6 +59,7 @@ NUMBER = re.compile(r"[\d.]+")
 DIGITS = 4  # after the decimal point, of targets that are told
 UNDRAWN = 0.25  # s in which who moves the robot may have drawn no new pose of it
 ACTING = ("delay", "execute", "follow")  # modes in which it moves, or is about to
+SWINGS, RARELY = 10.0, 0.25  # s after a motion in which all that cameras see is logged, and from one to the next later
 MOST_INPUTS = 8  # of a tick; older ones than these are left out, presses and all
 
 
@@ -74,11 +80,20 @@ class HandInput:
     stamp: float
     left: Controller
     right: Controller
+    correct: bool = False
+
+
+class Cameras(Protocol):
+    """What sees the arm; simulated ones are shown where the robot's drawn bodies are, (N, 7)."""
+
+    def show(self, bodies: np.ndarray) -> None: ...
+    def latest(self) -> MeasuredArm: ...
 
 
 class SessionController:
-    """One robot, one core. `lift`: m by which a grasp lifts at least. `log_writer`: of the session.
-    `period`: s, of the arm's slowest vibration mode."""
+    """One robot, one core. `lift`: m by which a grasp lifts at least. `log_writer`: of the session. `period`: s, of the
+    arm's slowest vibration mode. `cameras`: that see the arm, None without; `correction`: of plans, by what they see.
+    """
 
     def __init__(
         self,
@@ -89,6 +104,8 @@ class SessionController:
         lift: float,
         log_writer: LogWriter | None = None,
         period: float = 0.0,
+        cameras: Cameras | None = None,
+        correction: CorrectionSettings | None = None,
     ) -> None:
         self.core, self.robot, self.previewer, self.world = core, robot, previewer, world
         self.lift, self.period = lift, period
@@ -112,6 +129,14 @@ class SessionController:
         self._requested, self._ordered, self._started, self._ran = 0, False, "", False
         self._logged: tuple = ()
         self._follow = FollowControl(previewer.submit, robot.hear)
+        self.cameras, self.arm = cameras, None
+        self._moved = (
+            self._written
+        ) = -math.inf  # s, when anything moved, and of the newest of what cameras saw in the log
+        self.correction = CorrectionControl(
+            correction or CorrectionSettings(), previewer.submit, robot.start, robot.stop, self.log_writer.event
+        )
+        self._bounds: CorrectionBounds | None = None  # of the plan that is asked for
 
     def begin(self, rate: float, version: str = "") -> None:
         """The log's first line: all that a replay needs besides the package. rate: of ticks, Hz. version: of
@@ -125,9 +150,10 @@ class SessionController:
 
     # --- what is heard
 
-    def hear(self, stamp: float, left: Controller, right: Controller, drawn: bool) -> str:
+    def hear(self, stamp: float, left: Controller, right: Controller, drawn: bool, correct: bool = False) -> str:
         """An input of whom controls, `stamp` s by its own clock; why it does not count, "" where it does. drawn: since
-        the one before, a new pose of the robot was drawn where the user sees it."""
+        the one before, a new pose of the robot was drawn where the user sees it. correct: a plan that it asks for may
+        correct itself."""
         last = self._inputs[-1] if self._inputs else self._last
         if self._fresh and math.isfinite(stamp):  # another's clock: the core's goes on from where it was
             self._shift = last.stamp + JUST_AFTER - stamp if self.state.stamp is not None else 0.0
@@ -137,7 +163,7 @@ class SessionController:
             return f"input: stamp {stamp:.6g} s is not after {heard:.6g} s: heard before"
         stamp += self._shift
         self._drawn = self._drawn or drawn
-        self._inputs.append(HandInput(stamp, left, right))
+        self._inputs.append(HandInput(stamp, left, right, correct))
         return ""
 
     def stop(self) -> None:
@@ -154,6 +180,7 @@ class SessionController:
         self._drawn, self._undrawn = False, 0.0
         self.align(alignment, unfit)
         self.robot.stop()
+        self.correction.hold()
 
     def align(self, alignment: Pose | None, unfit: str) -> None:
         """Of whom controls, its reference frame in the base; `unfit`: why nothing may be executed so, "" where it
@@ -185,6 +212,10 @@ class SessionController:
         """An answer of the previewer, None if it has ended; whether it is of the plan that is wanted."""
         if answer is None:
             self.report = PlanReport(self._requested, refused="the process that plans has ended")
+            self.correction.answer(None)
+            return False
+        if isinstance(answer, CorrectionAnswer):
+            self.correction.answer(answer)
             return False
         if isinstance(answer, FollowAnswer):
             self._follow.answer(answer)
@@ -195,6 +226,9 @@ class SessionController:
         if isinstance(answer, PlanAnswer):
             if self._started:  # its preview breaks off, but it runs already
                 return False
+            if answer.plan is not None and answer.plan.correction not in (None, self._bounds):
+                refused = "correction: found bounds that nobody asked for"
+                answer = PlanAnswer(PlanReport(serial, refused=refused))
             self.report, self.plan = answer.report, answer.plan
             self.log_writer.event("planned", report=answer.report)
         elif isinstance(answer, PreviewBegun):
@@ -214,7 +248,8 @@ class SessionController:
     def tick(self, dt: float) -> Intent:
         """Let `dt` s pass; every input since the last tick is a step of the core. One that moves the robot and draws
         nothing counts as silent."""
-        robot_state, executor = self.robot.robot_state(), self.robot.state()
+        robot_state, executor = self.robot.robot_state(), self.correction.report(self.robot.state())
+        self._see(robot_state)
         if self.state.mode in ("hold", "aim"):
             self._believe(robot_state, executor)
         joints: Joints = tuple(float(q) for q in robot_state.joints)  # type: ignore[assignment]
@@ -237,13 +272,15 @@ class SessionController:
                 executor, offer,
             )  # fmt: skip
             self.state, intent = self.core.step(self.state, core_input, dt / len(steps))
-            self._ask(intent, robot_state)
+            self._ask(intent, robot_state, hands.correct)
             self._follow.advance(dt / len(steps))
             if intent.mode == "follow":
                 self._follow.seek(intent.targets, robot_state.joints, self.world)
             else:
                 self._follow.end()
             self._drive(intent)
+            if intent.motion == "execute" and not self._fault:
+                self.correction.advance(dt / len(steps), self.robot.state(), self.arm, robot_state)
             self.log_writer.step(dt / len(steps), core_input, intent)
         self._last = steps[-1]
         self.intent = intent
@@ -302,7 +339,29 @@ class SessionController:
         stamp = self.state.stamp if self.state.stamp is not None else 0.0
         return HandInput(stamp, NOWHERE, NOWHERE)
 
-    def _ask(self, intent: Intent, robot_state: RobotState) -> None:
+    def _see(self, robot_state: RobotState) -> None:
+        if self.cameras is None:
+            return
+        self.cameras.show(robot_state.bodies)
+        before, self.arm = self.arm, self.cameras.latest()
+        now = robot_state.time
+        if self.intent is not None and self.intent.motion != "hold":
+            self._moved = now
+        if self.arm.stamp > self._written + (0.0 if now - self._moved < SWINGS else RARELY):
+            self._written = self.arm.stamp
+            self.log_writer.measured(self.arm.stamp, self.arm.poses)
+        if before is not None and self.arm.fault != before.fault:
+            self.log_writer.event("cameras", fault=self.arm.fault)
+
+    def why_uncorrected(self, targets: Targets) -> str:
+        """Why a plan for these targets cannot correct itself by what cameras see, "" where it may be able to."""
+        if self.cameras is None or self.arm is None:
+            return "the session has no cameras"
+        if self.arm.fault:
+            return f"cameras: {self.arm.fault}"
+        return f"the arm would touch {targets.object}" if targets.object else ""
+
+    def _ask(self, intent: Intent, robot_state: RobotState, correct: bool = False) -> None:
         request = intent.request
         if request is not None and request.serial != self._requested:
             self._requested, self.report, self.plan, self.preview = request.serial, None, None, None
@@ -310,7 +369,10 @@ class SessionController:
             self._ordered = True
             self.log_writer.event("request", request=request)
             here = robot_state.joints, robot_state.commands, robot_state.hangs
-            self.previewer.submit(Order(request, self.world, *here))
+            uncorrected = self.why_uncorrected(request.targets) if correct else ""
+            asks = correct and not uncorrected
+            self._bounds = self.correction.bounds(request.targets.tip.position) if asks else None
+            self.previewer.submit(Order(request, self.world, *here, self._bounds, uncorrected))
         elif self._ordered and intent.mode in ("hold", "stopped", "aim", "execute"):
             self._ordered = False
             self.previewer.leave()
@@ -321,23 +383,25 @@ class SessionController:
             self._fault = self._fault if intent.mode == "stopped" else ""
             if running.mode == "running" or (self._started and not self._ran):  # a start on its way reads as idle
                 self.robot.stop()
+            self.correction.hold()
             self._started, self._ran = "", False
             return
         if self._started != (intent.execute or FOLLOWS):
             self._begin(intent)
         self._ran = self._ran or running.mode == "running"
-        if self._ran and running.mode == "idle":
+        if self._ran and running.mode == "idle" and not (self.correction.takes_over or self.correction.over):
             self._fault = "it has come to rest by itself"
         fault = self.blocked or (self._follow.fault if intent.motion == "follow" else "")
         if fault and not self._fault:
             self._fault = fault
             self.robot.stop()
-        if not self._fault:
+        if not self._fault and not self.correction.over:
             self.robot.permit()
 
     def _begin(self, intent: Intent) -> None:
         """Start the plan that was confirmed, or to follow, once."""
         self._started = intent.execute or FOLLOWS
+        self.correction.forget()
         if intent.motion == "follow":
             following = Following(self.core.settings.follow_delay, self.period, self.core.mount_offset)
             self._fault = self.blocked or self.robot.follow(following)
@@ -350,6 +414,8 @@ class SessionController:
             return
         self._fault = self.blocked or self.robot.start(self.plan, intent.execute)
         self.log_writer.event("execute", digest=intent.execute, refused=self._fault)
+        if not self._fault:
+            self.correction.begin(self._requested, self.plan, self.world)
 
     def _believe(self, robot_state: RobotState, executor: ExecutorReport) -> None:
         done = executor.mode == "done" and executor.digest != self._believed and self.plan is not None
@@ -369,6 +435,14 @@ class SessionController:
     def refused(self) -> str:
         """Why the newest targets are not followed, "" where they are."""
         return self._follow.refused
+
+    def drawn_tip(self) -> np.ndarray | None:
+        """Where the drawn robot's tip is, m, (3,); None where its body is not drawn."""
+        subject = self.log_writer.subject
+        if subject.tip[0] not in subject.bodies:
+            return None
+        pose = self.robot.robot_state().bodies[subject.bodies.index(subject.tip[0])]
+        return pose[:3] + rotation_from_wxyz(pose[3:]).apply(subject.tip[1])
 
     def markers(self) -> np.ndarray:
         """Poses of MARKERS, (4, 7); NaN where there are none."""
@@ -391,7 +465,7 @@ class SessionController:
 
     def state_message(self, holder: str) -> messages.StateMessage:
         """The state for clients, `holder` controlling; where nobody does, the core's notice is left out: of nobody."""
-        intent, robot = self.intent, self.robot.state()
+        intent, robot = self.intent, self.correction.report(self.robot.state())
         assert intent is not None
         hands = self.state.hands
         touched = hands[self._rigid].target is not None, hands[1 - self._rigid].target is not None
@@ -401,7 +475,7 @@ class SessionController:
         return messages.StateMessage(
             intent.mode, intent.motion, _joined(notice, self.blocked), words, keys,
             round(intent.countdown, 2), intent.preview, intent.execute, _rounded(intent.targets),
-            robot.mode, robot.fault,
+            robot.mode, robot.fault, self.correction.words,
         )  # fmt: skip
 
 

@@ -18,6 +18,7 @@ from trunkline.compute.processes import leave_signals_to_parent
 
 POSES, STATIC = "/tf", "/tf_static"
 TWIN = "/tf_twin"  # poses of the twin of a real robot: not measured
+MEASURED = "/rigid_bodies"  # what cameras see of the arm
 JOINTS_SENT, JOINTS = "/joints/command", "/joint_states"  # the latter: ROS's name for what is measured
 TENDONS_SENT, TENDONS = "/tendons/command", "/tendons/state"
 HEADSET, PARTS = "/headset/", ("left", "right", "view")
@@ -29,7 +30,7 @@ TEXT = 240  # bytes of a fault
 TEXTS = (EVENTS, INPUT, INTENT)
 GEOMETRY = ("Vector3", "Point", "Quaternion", "Pose", "Transform", "TransformStamped")
 TYPES = {
-    **dict.fromkeys((POSES, TWIN), "tf2_msgs/msg/TFMessage"),
+    **dict.fromkeys((POSES, TWIN, MEASURED), "tf2_msgs/msg/TFMessage"),
     STATIC: "tf2_msgs/msg/TFMessage",
     **dict.fromkeys((JOINTS_SENT, JOINTS, TENDONS_SENT, TENDONS), "sensor_msgs/msg/JointState"),
     **{HEADSET + part: "geometry_msgs/msg/PoseStamped" for part in PARTS},
@@ -52,7 +53,7 @@ class Record(NamedTuple):
 class Subject:
     """Whose session it is: names of the bodies (N), of the rigid robot's joints and of the cables (K), whose lengths
     are `straight` (K,), m, in the straight arm; a pull is that less the length. tip: the body of the arm's tip, and
-    where it is in that, m. hardware: what of it is real, in words."""
+    where it is in that, m. hardware: what of it is real, in words. measured: names of the bodies that cameras see."""
 
     bodies: tuple[str, ...]
     joints: tuple[str, ...]
@@ -60,11 +61,17 @@ class Subject:
     straight: np.ndarray
     tip: tuple[str, tuple[float, float, float]]
     hardware: str = SIMULATED
+    measured: tuple[str, ...] = ()
 
     @property
     def poses(self) -> str:
         """The topic of the bodies' poses."""
         return POSES if self.hardware == SIMULATED else TWIN
+
+    @property
+    def absent(self) -> tuple[str, ...]:
+        """Topics that its log does not have."""
+        return (POSES if self.poses == TWIN else TWIN, *(() if self.measured else (MEASURED,)))
 
 
 NOTHING = Subject((), (), (), np.empty(0), ("", (0.0, 0.0, 0.0)))
@@ -81,7 +88,7 @@ class LogFormat:
         self._channels = {
             topic: self._writer.register_channel(topic, "cdr", schemas[name])
             for topic, name in TYPES.items()
-            if topic not in (POSES, TWIN) or topic == subject.poses
+            if topic not in subject.absent
         }
         self._posed = -np.inf
 
@@ -130,7 +137,7 @@ class LogFormat:
         if record.topic.startswith(HEADSET):
             x, y, z, qw, qx, qy, qz = (float(value) for value in content)
             return types["geometry_msgs/msg/PoseStamped"](header, pose(point(x, y, z), turn(qx, qy, qz, qw)))
-        names = (REFERENCE,) if record.topic == STATIC else subject.bodies
+        names = {STATIC: (REFERENCE,), MEASURED: subject.measured}.get(record.topic, subject.bodies)
         return types["tf2_msgs/msg/TFMessage"]([
             stamped(header, name, transform(vector(x, y, z), turn(qx, qy, qz, qw)))
             for name, (x, y, z, qw, qx, qy, qz) in zip(names, np.atleast_2d(content).tolist(), strict=True)

@@ -28,6 +28,7 @@ from trunkline.ar.session.log_format import (
     INTENT,
     JOINTS,
     JOINTS_SENT,
+    MEASURED,
     NOTHING,
     REFERENCE,
     STATIC,
@@ -93,6 +94,11 @@ class LogWriter:
             if axes is not None and np.isfinite(axes).all():
                 self.keep(Record(topic, robot.time, now, axes))
         self.keep(Record(self.subject.poses, robot.time, now, robot.bodies, BASE))
+
+    def measured(self, stamp: float, poses: np.ndarray) -> None:
+        """Of the bodies that cameras saw at `stamp`, s, NaN where one was not seen. Shape (B, 7)."""
+        if self.subject.measured:
+            self.keep(Record(MEASURED, stamp, self.now(), poses, BASE))
 
     def headset(self, part: str, at: float, pose: np.ndarray, in_base: bool) -> None:
         """Pose (7,) of the `left` or `right` hand, or of the `view`."""

@@ -10,6 +10,7 @@ from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError
 
 from trunkline.ar.session.binary import VERSION
 from trunkline.ar.teleop.messages import Mode, Motion, Offer, Pose, Targets, World
+from trunkline.ar.teleop.plan import CorrectionBounds
 from trunkline.errors import InputError, first_problem
 
 STRICT = {"extra": "forbid", "ser_json_inf_nan": "null"}
@@ -203,6 +204,7 @@ class StateMessage:
     notice: one line for the user, "" for none. next: the one next action in words, for whom controls; keys: the same at
     mouse and keyboard. countdown: s to the execution, when this was sent. preview, execute: digests. targets: as the
     core has them; where they are now, the markers of the robot's frames say. robot: what it does; fault: in words.
+    correction: the one that goes on, or how the last ended, in words.
     """
 
     mode: Mode
@@ -216,20 +218,46 @@ class StateMessage:
     targets: Targets | None
     robot: Literal["idle", "running", "done", "fault"]
     fault: str
+    correction: str = ""
     type: Literal["state"] = "state"
+
+
+Point = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class MeasuredMessage:
+    """The arm as cameras see it, ten times a second where a session has any. markers: m, from the mount to the tip,
+    null where one is not seen; tip: m. apart: from there to the drawn robot's tip, m; null where it is not seen. age:
+    s; rate: Hz; loss: share of the frames that did not come. fault: why nothing is corrected by them any more, ""
+    while they are sound."""
+
+    markers: tuple[Point | None, ...]
+    tip: Point | None
+    apart: float | None
+    age: float
+    rate: float
+    loss: float
+    fault: str
+    type: Literal["measured"] = "measured"
 
 
 @dataclass(frozen=True)
 class PreviewMessage:
     """A plan is there: its `digest`, and the preview that follows in binary pieces: `step` s between frames, `duration`
     s in all, which a client shows at that pace. begins: s of the plan at the first frame. phases: name and s of the
-    plan."""
+    plan. correction: by how much it may correct itself by what cameras see, once it has arrived, which the digest
+    covers; null where it may not, and `uncorrected` says why, where it was asked to. target: of the tip, m. steps: at
+    most. longest: m, change of all commands together in a step; `steps` times that in all. astray: m from the target,
+    beyond which the tip ends it."""
 
     digest: str
     step: float
     duration: float
     begins: float
     phases: tuple[tuple[str, float], ...]
+    correction: CorrectionBounds | None = None
+    uncorrected: str = ""
     type: Literal["preview"] = "preview"
 
 
@@ -276,6 +304,7 @@ ServerMessage = (
     | StateMessage
     | PreviewMessage
     | PredictionMessage
+    | MeasuredMessage
     | WorldMessage
 )
 

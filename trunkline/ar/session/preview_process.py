@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_limits
 
 from trunkline.ar.preview.package import Package, read_package
 from trunkline.ar.preview.settings import Previewing
-from trunkline.ar.session.previewer import Answer, FollowRequest, Order, PlanAnswer, PreviewPiece, PreviewPlanner
+from trunkline.ar.session.previewer import Answer, AnyOrder, Order, PlanAnswer, PreviewPiece, PreviewPlanner
 from trunkline.ar.teleop.config import TeleoperationConfig
 from trunkline.ar.teleop.messages import Request, Target, Targets, World
 from trunkline.ar.teleop.vectors import DOWN
@@ -70,7 +70,7 @@ class PreviewProcess:
         """Whether its process is there."""
         return self._process.is_alive()
 
-    def submit(self, order: Order | FollowRequest) -> None:
+    def submit(self, order: AnyOrder) -> None:
         with self._lock:
             self._newest.value += 1
             self._orders.put((self._newest.value, order))

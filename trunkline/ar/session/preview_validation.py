@@ -118,7 +118,7 @@ def _end(later: list[dict], digest: str, last: float) -> tuple[str, float]:
     """State of the robot at the end of a plan, and the time, s, until which that plan ran."""
     end, until = "the log ends", last
     for event in later:
-        if event["event"] == "execute":
+        if event["event"] in ("execute", "correction"):  # the tip's place is looked at before it is corrected
             return end, min(until, event["time"])
         robot = event.get("robot") if event["event"] == "robot" else None
         if robot is None or end != "the log ends":

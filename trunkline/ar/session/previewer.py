@@ -8,7 +8,7 @@ A live session has them made by a process (`preview_process.py`), a rehearsal by
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Protocol
 
@@ -23,10 +23,11 @@ from trunkline.ar.preview.preview_twin import at_rest, compose_twin, robot_model
 from trunkline.ar.preview.settings import Previewing
 from trunkline.ar.session import messages
 from trunkline.ar.session.bodies import BodyPoses
+from trunkline.ar.session.correction_steps import CorrectionAnswer, CorrectionOrder, CorrectionSteps, why_uncorrected
 from trunkline.ar.teleop.config import TeleoperationConfig
 from trunkline.ar.teleop.following import sought
 from trunkline.ar.teleop.messages import PlanReport, Request, Targets, World, WorldObject
-from trunkline.ar.teleop.plan import Plan
+from trunkline.ar.teleop.plan import CorrectionBounds, Plan
 from trunkline.ar.teleop.planner import Planner
 from trunkline.errors import InputError
 
@@ -34,13 +35,16 @@ from trunkline.errors import InputError
 @dataclass(frozen=True)
 class Order:
     """A plan that is asked for, from the robot at rest at `joints` (7,), rad, and `commands` (K,), m. hangs: where the
-    straight arm's tip is seen in its base frame, (3,), m; None where nobody sees it."""
+    straight arm's tip is seen in its base frame, (3,), m; None where nobody sees it. correction: within which it may
+    correct itself, None where it may not; uncorrected: why not, where it was asked to."""
 
     request: Request
     world: World
     joints: np.ndarray
     commands: np.ndarray
     hangs: np.ndarray | None = None
+    correction: CorrectionBounds | None = None
+    uncorrected: str = ""
 
 
 @dataclass(frozen=True)
@@ -98,13 +102,14 @@ class PredictionAnswer:
     prediction: messages.PredictionMessage
 
 
-Answer = PlanAnswer | PreviewBegun | PreviewPiece | PredictionAnswer | FollowAnswer
+AnyOrder = Order | FollowRequest | CorrectionOrder
+Answer = PlanAnswer | PreviewBegun | PreviewPiece | PredictionAnswer | FollowAnswer | CorrectionAnswer
 
 
 class Previewer(Protocol):
     """One order at a time, the newest."""
 
-    def submit(self, order: Order | FollowRequest) -> None:
+    def submit(self, order: AnyOrder) -> None:
         """It does not wait; the order before is left."""
         ...
 
@@ -125,6 +130,7 @@ class PreviewPlanner:
         self.planner, self.foresight, self.bodies = planner, foresight, bodies
         self.robot_model, self.previewing = foresight.robot_model, foresight.settings
         self.prediction: PlanPrediction | None = None
+        self._corrections = CorrectionSteps(planner)
         self._composed: tuple[tuple, ComposedTwin | None, Rotation | None] = ((), None, None)
         self._grasped: PlanPrediction | None = None  # the last grasp: of an object that is held, the one that was run
 
@@ -140,18 +146,22 @@ class PreviewPlanner:
         foresight = GraspPreviewer(robot_model_of(previewing, package.files), package.grips(config), previewing)
         return cls(package.planner(config), foresight, bodies)
 
-    def answers(self, order: Order | FollowRequest, go_on: Callable[[], None] = lambda: None) -> Iterator[Answer]:
+    def answers(self, order: AnyOrder, go_on: Callable[[], None] = lambda: None) -> Iterator[Answer]:
         """All that comes of an order, each as soon as it is known. `go_on` raises where it need not be. A plan whose
         preview breaks off is refused, as it could never be confirmed."""
         try:
             if isinstance(order, FollowRequest):
                 yield FollowAnswer(order.serial, *sought(self.planner, order.targets, order.joints, order.world))
+            elif isinstance(order, CorrectionOrder):
+                yield self._corrections.answer(order)
             else:
                 yield from self._answers(order, go_on)
         except (InputError, ArithmeticError, ValueError) as error:
             refused = f"preview: {type(error).__name__}: {error}".splitlines()[0]
             if isinstance(order, FollowRequest):
                 yield FollowAnswer(order.serial, None, refused)
+            elif isinstance(order, CorrectionOrder):
+                yield CorrectionAnswer(order.serial, order.number, None, refused)
             else:
                 yield PlanAnswer(PlanReport(order.request.serial, refused=refused))
 
@@ -165,6 +175,11 @@ class PreviewPlanner:
         except InputError as error:
             yield PlanAnswer(PlanReport(serial, refused=str(error)))
             return
+        bounds, uncorrected = order.correction, order.uncorrected
+        if bounds is not None:
+            lacking = self.robot_model.lacking
+            uncorrected = why_uncorrected(plan, request.targets, order.world, bounds, self.planner, lacking)
+            plan = plan if uncorrected else replace(plan, correction=bounds)
         digest = plan.digest()
         yield PlanAnswer(PlanReport(serial, digest, "", plan.package, plan.world), plan)
         way = self.foresight.whole(plan, bool(request.targets.object))
@@ -173,7 +188,9 @@ class PreviewPlanner:
             twin()  # a preview's time begins once it is composed
         phases = tuple((name, plan.step * row) for name, row in plan.phases)
         step = self.previewing.step * max(round(FRAME / self.previewing.step), 1)
-        yield PreviewBegun(serial, messages.PreviewMessage(digest, step, way.duration, step, phases))
+        yield PreviewBegun(serial, messages.PreviewMessage(
+            digest, step, way.duration, step, phases, plan.correction, uncorrected
+        ))  # fmt: skip
         go_on()
         if self.bodies:
             yield from self._pieces_of(serial, twin(), way, go_on)
@@ -249,11 +266,11 @@ class PreviewPlanner:
 class InlinePreviewer:
     """A `Previewer` in the caller's process: the same `answers`, all there at the next poll."""
 
-    def __init__(self, answers: Callable[[Order | FollowRequest], Iterator[Answer]]) -> None:
+    def __init__(self, answers: Callable[[AnyOrder], Iterator[Answer]]) -> None:
         self._answers = answers
         self._ready: list[Answer | None] = []
 
-    def submit(self, order: Order | FollowRequest) -> None:
+    def submit(self, order: AnyOrder) -> None:
         self._ready += self._answers(order)
 
     def leave(self) -> None:

@@ -273,7 +273,7 @@ class Server:
             return
         reason = client.clock.fault(received.stamp, now)
         hands, drawn = controller_input.controllers(received), "drawn" in received.flags
-        reason = reason or self.controller.hear(received.stamp, *hands, drawn)
+        reason = reason or self.controller.hear(received.stamp, *hands, drawn, "correct" in received.flags)
         if reason:
             self._refuse(client, reason)
         else:
@@ -486,14 +486,17 @@ class Server:
     def _show(self, now: float) -> None:
         """The robot, its reach and the state to all."""
         frame, shell = self.broadcast.robot(now), self.broadcast.new_shell(now)
-        state = self.broadcast.new_state(now, self.lease.holder)
+        state, measured = self.broadcast.new_state(now, self.lease.holder), self.broadcast.new_measured(now)
         text = messages.tell(state) if state is not None else ""
+        arm = messages.tell(measured) if measured is not None else ""
         for client in self.clients.values():
             client.outbox.show("robot", frame)
             if shell:
                 client.outbox.show("shell", shell)
             if text:
                 client.outbox.state("state", text)
+            if arm:
+                client.outbox.state("measured", arm)
 
     def _tell_lease(self) -> None:
         people = tuple(messages.Person(client.id, client.name) for client in self.clients.values())

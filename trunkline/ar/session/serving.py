@@ -125,9 +125,10 @@ async def opened(
     hardware: Hardware | None = None,
     config: SessionConfig | None = None,
     teleop: Teleop | None = None,
+    cameras: str = "",
 ) -> AsyncIterator[tuple[Server, SessionParts]]:
     """A session that is ready, on the simulated robot where there is no hardware, by conf/live and conf/teleop where
-    there is no `config` and `teleop`; its processes end with it.
+    there is no `config` and `teleop`; its processes end with it. cameras: as of `make`.
 
     Raises:
         InputError: no package, a process that ends, a log that cannot be written, an address that cannot be had.
@@ -138,7 +139,7 @@ async def opened(
         teleop = hardware.slow_enough(teleop)
     alignment = alignment_for(hardware, config.alignment)
     anchors = Anchors(Path(alignment.anchors))
-    made = await asyncio.to_thread(make, package, teleop, config, hardware)
+    made = await asyncio.to_thread(make, package, teleop, config, hardware, cameras)
     try:
         composition = Composition(
             made.controller, make_token(), address.origins, made.package, made.scene, made.shells, config.rate, PAGE,
@@ -176,7 +177,7 @@ async def serve(options: argparse.Namespace, names: list[str], context: ssl.SSLC
             log("The motors wind up their cables now, before the page is there: stand clear. Ctrl-C lets them go.")
     address = Address(options.port, options.host, tuple(names), context)
     expect_free(address)  # what a session needs takes long to load
-    async with opened(options.package, address, log, hardware) as (server, made):
+    async with opened(options.package, address, log, hardware, cameras=options.cameras) as (server, made):
         log(f"log: {made.log_writer.path}")
         log(f"{address.url}/#token={server.composition.token}")
         _pair(server, log, asyncio.get_running_loop())

@@ -6,7 +6,9 @@ from typing import Annotated
 
 from pydantic import Field
 
+from trunkline.ar.correction.correction import CorrectionSettings
 from trunkline.ar.preview.settings import Previewing
+from trunkline.ar.session.arm_cameras import ArmCameraSettings
 from trunkline.ar.teleop.messages import Obstacle, WorldObject
 from trunkline.pipeline.config import PROJECT, load_folder
 from trunkline.settings import settings
@@ -52,6 +54,8 @@ class SessionConfig:
     object: WorldObject | None
     journal: LogSettings
     alignment: AlignmentSettings
+    cameras: ArmCameraSettings
+    correction: CorrectionSettings
     preview: Previewing
 
 

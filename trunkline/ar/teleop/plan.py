@@ -7,10 +7,23 @@ import numpy as np
 
 
 @dataclass(frozen=True)
+class CorrectionBounds:
+    """By how much a plan may correct itself once it has arrived. target: of the tip, m, in the base frame. steps: at
+    most. longest: m, by which all commands together may change in a step, and `steps` times that in all. astray: m from
+    the target, beyond which the tip ends it."""
+
+    target: tuple[float, float, float]
+    steps: int
+    longest: float
+    astray: float
+
+
+@dataclass(frozen=True)
 class Plan:
     """Rows every `step` s: `joints` (T, 7), rad, and the motors' `commands` (T, K), m.
 
     `phases`: name and number of the first row of each. `package`, `world`: digests of those for which it was made.
+    `correction`: of what comes after its end; None where it stays as it arrives.
     """
 
     step: float
@@ -19,6 +32,7 @@ class Plan:
     phases: tuple[tuple[str, int], ...]
     package: str
     world: str
+    correction: CorrectionBounds | None = None
 
     @property
     def duration(self) -> float:
@@ -37,5 +51,6 @@ class Plan:
         digest = hashlib.sha256()
         for rows in (self.joints, self.commands):
             digest.update(repr(rows.shape).encode() + np.ascontiguousarray(rows, dtype="<f8").tobytes())
-        digest.update(repr((self.step, self.phases, self.package, self.world)).encode())
+        corrects = () if self.correction is None else (self.correction,)
+        digest.update(repr((self.step, self.phases, self.package, self.world, *corrects)).encode())
         return digest.hexdigest()

@@ -1,0 +1,199 @@
+"""Steps of a correction as the process that plans makes them: of a small arm that is not as its twin."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.ar.session.test_controller import some_plan
+from tests.ar.session.test_preview_process import made
+from tests.ar.session.test_preview_process import order as plain
+from tests.ar.teleop.test_plan import OFFSET, START, request
+from tests.support.small_arm import small_spec
+from trunkline.ar.correction.correction import CorrectionSettings
+from trunkline.ar.preview.world_model import make_world
+from trunkline.ar.session.correction_steps import (
+    DOWN,
+    CorrectionAnswer,
+    CorrectionOrder,
+    CorrectionSteps,
+    soft_base,
+    why_uncorrected,
+)
+from trunkline.ar.session.previewer import PlanAnswer, PreviewBegun, PreviewPlanner
+from trunkline.ar.teleop.alignment import base_quaternion
+from trunkline.ar.teleop.messages import Obstacle
+from trunkline.ar.teleop.plan import CorrectionBounds
+from trunkline.frames import rotation_from_wxyz
+from trunkline.model.statics.chain import read_chain
+from trunkline.model.statics.equilibria import actuated
+from trunkline.twin.discrepancy import Discrepancy, Lacking
+
+SETTINGS = CorrectionSettings(astray=30e-3)
+WORLD = make_world(())
+CHAIN = read_chain(small_spec().compile()).smooth
+PLANNER = replace(made().planner, chain=CHAIN)
+BEYOND = Lacking("", Discrepancy(np.array([[0.01, 0.0, 0.0]]), 16), 180.0, 180.0, 1.0, 4.0)
+
+
+def tip_of(chain, commands):
+    """In the base frame."""
+    place, turn = soft_base(START, OFFSET)
+    return place + turn @ actuated(chain, commands[None], DOWN @ turn).position[0]
+
+
+def pulled(*pulls):
+    return CHAIN.straight_lengths - np.array(pulls)
+
+
+def order(number, commands, tip, target, **changes):
+    bounds = CorrectionBounds(tuple(map(float, target)), SETTINGS.steps, SETTINGS.longest, SETTINGS.astray)
+    arguments = {"bounds": bounds, "settings": SETTINGS} | changes
+    joints, world = START, changes.pop("world", WORLD)
+    arguments.pop("world", None)
+    return CorrectionOrder(
+        7, number, joints=joints, commands=commands, tip=tip, world=world, package="p" * 64, **arguments
+    )
+
+
+ARMS = {
+    "bent at rest": CHAIN._replace(rest=CHAIN.rest + 0.02),
+    "soft cables": CHAIN._replace(gain=0.3 * CHAIN.gain),
+    "heavier": CHAIN._replace(mass=2 * CHAIN.mass),
+}
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_steps_bring_an_arm_that_is_not_as_its_twin_to_the_target_within_their_bounds(name):
+    arm, steps, commands = ARMS[name], CorrectionSteps(PLANNER), pulled(0.02, 0, 0)
+    target, errors = tip_of(CHAIN, commands), []
+    begin = commands
+    for number in range(SETTINGS.steps + 2):
+        tip = tip_of(arm, commands)
+        errors.append(np.linalg.norm(tip - target))
+        answer = steps.answer(order(number, commands, tip, target))
+        assert (answer.serial, answer.number) == (7, number)
+        if answer.plan is None:
+            break
+        plan = answer.plan
+        np.testing.assert_array_equal(plan.commands[0], commands)
+        np.testing.assert_array_equal(plan.joints, np.tile(START, (len(plan.joints), 1)))
+        assert np.linalg.norm(plan.commands - commands, axis=1).max() <= SETTINGS.longest + 1e-12
+        assert np.linalg.norm(plan.commands - begin, axis=1).max() <= SETTINGS.steps * SETTINGS.longest
+        speed = np.abs(np.diff(plan.commands, axis=0)).max() / plan.step
+        assert speed <= PLANNER.limits.velocity[7]
+        assert (plan.world, plan.correction) == (WORLD.digest, None)
+        commands = plan.commands[-1]
+    print(f"errors, mm: {np.round(1e3 * np.array(errors), 2)}; {answer.ended}")
+    assert errors[0] > 1.2e-3
+    assert errors[-1] < 0.5 * errors[0]
+    assert answer.ended
+
+
+def test_the_soft_base_is_the_one_by_which_plans_are_made():
+    plan = PLANNER.plan(request((0.5, 0.1, 0.5), tuple(tip_of(CHAIN, pulled(0.02, 0, 0)) - soft_base(START, OFFSET)[0]
+                                                       + (0.5, 0.1, 0.5))), WORLD, START, PLANNER.straight)  # fmt: skip
+    place, turn = soft_base(plan.joints[-1], OFFSET)
+    np.testing.assert_allclose(
+        turn, rotation_from_wxyz(np.array(base_quaternion((0, 0, -1), 0.0))).as_matrix(), atol=1e-3
+    )
+    assert np.linalg.norm(place - (0.5, 0.1, 0.5)) < 0.02
+
+
+def test_the_way_back_is_taken_where_the_last_step_led_away_and_is_no_longer_than_a_step():
+    steps, commands = CorrectionSteps(PLANNER), pulled(0.02, 0, 0)
+    tip = tip_of(CHAIN, commands)
+    target = tip + np.array([5e-3, 0, 0])
+    first = steps.answer(order(0, commands, tip, target, settings=replace(SETTINGS, steps=1)))
+    there = first.plan.commands[-1]
+    worse = order(1, there, tip - np.array([5e-3, 0, 0]), target, settings=replace(SETTINGS, steps=1))
+    back = steps.answer(worse)
+    assert back.ended == "1 steps are done"
+    np.testing.assert_allclose(back.plan.commands[-1], commands, atol=1e-12)
+    again = CorrectionSteps(PLANNER)
+    again.answer(order(0, commands, tip, target, settings=replace(SETTINGS, steps=1)))
+    short = again.answer(replace(worse, bounds=replace(worse.bounds, longest=1e-4)))
+    assert np.linalg.norm(short.plan.commands[-1] - there) == pytest.approx(1e-4)
+
+
+def test_a_loose_cable_that_lies_farther_than_a_step_ends_it():
+    loose = pulled(0.02, 0, 0) + np.array([0, 0.02, 0.02])
+    tip = tip_of(CHAIN, loose)
+    for aside in (5e-3, -5e-3):
+        answer = CorrectionSteps(PLANNER).answer(order(0, loose, tip, tip + np.array([0, aside, 0])))
+        assert answer.plan is None
+        assert answer.ended.startswith("a loose cable lies")
+
+
+def test_a_step_into_an_obstacle_is_none():
+    commands = pulled(0.02, 0, 0)
+    tip = tip_of(CHAIN, commands)
+    low, high = tip - 0.05, tip + 0.05
+    wall = Obstacle("the wall", tuple(map(float, low)), tuple(map(float, high)))
+    answer = CorrectionSteps(PLANNER).answer(
+        order(0, commands, tip, tip + np.array([5e-3, 0, 0]), world=make_world((wall,)))
+    )
+    assert answer.plan is None
+    assert answer.ended.startswith("world: the arm")
+
+
+@pytest.mark.parametrize("changes", [{"serial": 8}, {"number": 2}, {"number": 1}])
+def test_what_it_does_not_know_of_is_no_step(changes):
+    steps, commands = CorrectionSteps(PLANNER), pulled(0.02, 0, 0)
+    tip = tip_of(CHAIN, commands)
+    later = replace(order(1, commands, tip, tip + np.array([5e-3, 0, 0])), **changes)
+    assert steps.answer(later) == CorrectionAnswer(
+        later.serial, later.number, None, "the process that plans has lost it"
+    )
+
+
+# --- whether a plan may correct itself
+
+
+def near(distance):
+    x, y, z = BOUNDS.target
+    return Obstacle("the table", (x + distance, y - 1, z - 1), (x + 1, y + 1, z + 1))
+
+
+BOUNDS = CorrectionBounds((0.5, 0.1, 0.2), 5, 5e-3, 30e-3)
+MAY = [
+    ("", (), PLANNER, BEYOND, ""),
+    ("the cup", (), PLANNER, BEYOND, "the arm would touch the cup"),
+    ("", (), replace(PLANNER, chain=None), BEYOND, "the package has no statics of the arm"),
+    ("", (near(0.031),), PLANNER, BEYOND, ""),
+    ("", (near(0.029),), PLANNER, BEYOND, "the table is 29 mm from the tip's target, expected 30 mm"),
+    ("", (near(-0.1),), PLANNER, BEYOND, "the table is 0 mm from the tip's target, expected 30 mm"),
+    ("", (), PLANNER, None, "no trial at rest was held out, or the package is of an earlier release"),
+    ("", (), PLANNER, replace(BEYOND, pull=0.019), "a motor pulls 20.0 mm, in trials up to 19.0 mm"),
+    ("", (), PLANNER, replace(BEYOND, pull=0.021), ""),
+]
+
+
+@pytest.mark.parametrize(("object", "obstacles", "planner", "lacking", "reason"), MAY)
+def test_which_plans_may_correct_themselves(object, obstacles, planner, lacking, reason):
+    plan = replace(some_plan(), commands=np.tile(pulled(0.02, 0, 0), (2, 1)))
+    planner = replace(planner, straight=CHAIN.straight_lengths)
+    targets = replace(request((0, 0, 0), BOUNDS.target).targets, object=object)
+    assert why_uncorrected(plan, targets, make_world(obstacles), BOUNDS, planner, lacking) == reason
+
+
+@pytest.mark.parametrize(("lacking", "unasked"), [(BEYOND, ""), (None, ""), (BEYOND, "cameras: silent")])
+def test_the_digest_that_is_previewed_has_the_bounds_or_the_reason_why_there_are_none(lacking, unasked):
+    robot_model = replace(made().robot_model, lacking=lacking)
+    planning = PreviewPlanner(PLANNER, replace(made().foresight, robot_model=robot_model), ())
+    tip = soft_base(START, OFFSET)[0]
+    tip = np.array((0.5, 0.1, 0.5)) + tip_of(CHAIN, pulled(0.02, 0, 0)) - tip
+    asked = plain(tip=tuple(map(float, tip)))
+    bounds = replace(BOUNDS, target=asked.request.targets.tip.position)
+    wishes = {"uncorrected": unasked} if unasked else {"correction": bounds}
+    answers = planning.answers(replace(asked, **wishes))
+    planned, begun = next(answers), next(answers)
+    assert isinstance(planned, PlanAnswer)
+    assert isinstance(begun, PreviewBegun)
+    assert planned.plan is not None, planned.report.refused
+    corrected = lacking is not None and not unasked
+    assert planned.plan.correction == begun.preview.correction == (bounds if corrected else None)
+    assert planned.report.digest == planned.plan.digest() == begun.preview.digest
+    assert begun.preview.uncorrected == (unasked or ("" if corrected else MAY[6][-1]))
+    plainly = next(planning.answers(asked))
+    assert (plainly.report.digest == planned.report.digest) == (not corrected)

@@ -1,0 +1,157 @@
+"""The arm as cameras see it, in the robot's base frame: markers along it, and its tip.
+
+The tracker is a process of its own (`trunkline/ar/tracking`). What it says is looked at once a tick, without waiting.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+from scipy.spatial.transform import Rotation
+
+from trunkline.ar.session.bodies import BodyPoses
+from trunkline.ar.session.simulated import Simulation
+from trunkline.ar.teleop.messages import Pose
+from trunkline.ar.tracking.natnet import NatNetSettings, NatNetTracker
+from trunkline.ar.tracking.simulated_cameras import CameraSettings, SimulatedTracker
+from trunkline.ar.tracking.stream_checks import StreamLimits
+from trunkline.ar.tracking.tracker import ExpectedBodies, Tracker
+from trunkline.errors import InputError
+from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
+
+EVERY = 4  # units from one that the simulated cameras see to the next
+MOUNT = "base"  # the arm's first body
+Place = tuple[Annotated[float, Field(ge=-100, le=100)], Annotated[float, Field(ge=-100, le=100)],
+              Annotated[float, Field(ge=-100, le=100)]]  # fmt: skip
+Turn = tuple[Annotated[float, Field(ge=-1, le=1)], Annotated[float, Field(ge=-1, le=1)],
+             Annotated[float, Field(ge=-1, le=1)], Annotated[float, Field(ge=-1, le=1)]]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ArmCameraSettings:
+    """bodies: names of the rigid bodies in the stream, from the mount to the tip. apart: m from each of them to the
+    next. tip: of the arm in the frame of the last, m. position, m, and quaternion, wxyz: of the cameras' frame in the
+    robot's base frame. limits: of the stream, `distance` as a share of the first of `apart`: an arm that curls brings
+    only neighbors no nearer to each other. natnet: where Motive is. simulated: of the simulated robot's cameras, which
+    need none of these but limits.
+    """
+
+    bodies: Annotated[tuple[Annotated[str, Field(min_length=1, max_length=64)], ...], Field(max_length=100)]
+    apart: Annotated[tuple[Annotated[float, Field(gt=0, le=10)], ...], Field(max_length=100)]
+    tip: Place
+    position: Place
+    quaternion: Turn
+    limits: StreamLimits
+    natnet: NatNetSettings
+    simulated: CameraSettings
+
+    def __post_init__(self) -> None:
+        if len(self.apart) != max(len(self.bodies) - 1, 0):
+            counts = f"{len(self.bodies)} bodies and {len(self.apart)} distances"
+            raise ValueError(f"bodies, apart: found {counts}, expected a distance from each to the next")
+        norm = float(np.linalg.norm(self.quaternion))
+        if abs(norm - 1) > 1e-3:
+            raise ValueError(f"quaternion: found a length of {norm:.3g}, expected 1")
+
+
+@dataclass(frozen=True)
+class MeasuredArm:
+    """The newest that is measured, in the base frame. stamp: s of this machine's monotonic clock. poses: of the bodies,
+    m and wxyz, NaN where one is not tracked. Shape (B, 7). tip: m. Shape (3,). age, s, rate, Hz, loss, fault: as of
+    `TrackedPoses`."""
+
+    stamp: float
+    poses: np.ndarray
+    tip: np.ndarray
+    age: float
+    rate: float
+    loss: float
+    fault: str
+
+
+class ArmCameras:
+    """A tracker of the arm's bodies, from the mount to the tip. pose: of the cameras' frame in the base. tip: m, in the
+    frame of the last body. Shape (3,)."""
+
+    def __init__(self, tracker: Tracker, names: Sequence[str], pose: Pose, tip: np.ndarray) -> None:
+        self.names, self._tracker, self._tip = tuple(names), tracker, tip
+        self._turn, self._origin = rotation_from_wxyz(np.array(pose.quaternion)), np.array(pose.position)
+
+    def connect(self) -> None:
+        """As of `Tracker`."""
+        self._tracker.connect()
+
+    def show(self, bodies: np.ndarray) -> None:
+        """The robot's drawn bodies (N, 7) are there now: nothing to true cameras."""
+
+    def latest(self) -> MeasuredArm:
+        tracked = self._tracker.latest()
+        visible = np.isfinite(np.hstack([tracked.positions, tracked.quaternions])).all(axis=1)
+        poses = np.full((len(self.names), 7), np.nan)
+        if visible.any():
+            turns = self._turn * rotation_from_wxyz(tracked.quaternions[visible])
+            poses[visible, :3] = self._turn.apply(tracked.positions[visible]) + self._origin
+            poses[visible, 3:] = wxyz_from_rotation(turns)
+        tip = poses[-1, :3].copy()
+        if np.isfinite(tip).all():
+            tip += rotation_from_wxyz(poses[-1, 3:]).apply(self._tip)
+        return MeasuredArm(tracked.stamp, poses, tip, tracked.age, tracked.rate, tracked.loss, tracked.fault)
+
+    def close(self) -> None:
+        self._tracker.stop()
+
+
+class SimulatedArmCameras(ArmCameras):
+    """Of the simulated robot."""
+
+    def __init__(self, simulation: Simulation, tip: tuple[str, Sequence[float]], settings: ArmCameraSettings) -> None:
+        """tip: body of the arm's tip, and where it is in that, m."""
+        units = [name for name in simulation.bodies if name.startswith("unit_")]
+        last = units.index(tip[0])
+        names = [MOUNT, *units[last % EVERY : last + 1 : EVERY]]
+        poses = BodyPoses(simulation.twin.model, simulation.bodies).of(_start(simulation))
+        self._rows = [simulation.bodies.index(name) for name in names]
+        apart = np.linalg.norm(np.diff(poses[self._rows, :3], axis=0), axis=1)
+        cameras = settings.simulated
+        turn = rotation_from_wxyz(np.array(cameras.quaternion)).inv()
+        pose = _pose(turn, -turn.apply(np.array(cameras.origin)))
+        self._simulated = SimulatedTracker(cameras, _expected(names, apart), settings.limits)
+        super().__init__(self._simulated, names, pose, np.array(tip[1], float))
+        self.show(poses)
+
+    def show(self, bodies: np.ndarray) -> None:
+        rows = bodies[self._rows]
+        self._simulated.show(rows[:, :3], rows[:, 3:])
+
+
+def natnet_cameras(settings: ArmCameraSettings) -> ArmCameras:
+    """By Motive's stream.
+
+    Raises:
+        InputError: the settings name no bodies.
+    """
+    if not settings.bodies:
+        raise InputError("cameras.bodies: found none, expected the names of the arm's rigid bodies in Motive")
+    expected = _expected(settings.bodies, np.array(settings.apart))
+    tracker = NatNetTracker(settings.natnet, expected, settings.limits)
+    return ArmCameras(tracker, settings.bodies, Pose(settings.position, settings.quaternion), np.array(settings.tip))
+
+
+def _expected(names: Sequence[str], apart: np.ndarray) -> ExpectedBodies:
+    """Bodies from the mount on, of which neighbors are `apart`, m. Shape (B - 1,)."""
+    distances, rows = np.full((len(names), len(names)), np.nan), np.arange(len(apart))
+    distances[rows, rows + 1] = distances[rows + 1, rows] = apart
+    return ExpectedBodies(tuple(names), True, None, distances)
+
+
+def _start(simulation: Simulation) -> np.ndarray:
+    start = simulation.twin.start
+    return simulation.twin.model.qpos0 if start is None else start
+
+
+def _pose(turn: Rotation, position: np.ndarray) -> Pose:
+    x, y, z = (float(value) for value in position)
+    a, b, c, d = (float(value) for value in wxyz_from_rotation(turn))
+    return Pose((x, y, z), (a, b, c, d))
