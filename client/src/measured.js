@@ -22,7 +22,7 @@ export class MeasuredArm {
     this.dots = [];
     this.label = new Label(MEASURED);
     this.group.add(this.line, this.label.sprite);
-    const glass = { color: TIP, transparent: true, opacity: 0.15, depthWrite: false };
+    const glass = { color: TIP, transparent: true, opacity: 0.3, depthWrite: false };
     this.bounds = new Mesh(new SphereGeometry(1, 32, 20), new MeshBasicMaterial(glass));
     this.bounds.renderOrder = 4;
     this.bounds.visible = this.group.visible = false;

@@ -266,6 +266,45 @@ test("the tip's marker that is dragged onto an object marks it, and a handle mov
   assert.ok(after[2] - before[2] > 0.02, `rose by ${after[2] - before[2]} m`);
 });
 
+test("the arm as cameras see it is drawn, a plan that may correct itself says its bounds, and a stream that is not sound is named", async (t) => {
+  const fresh = await anew(t);
+  const { page, wrongs } = await open(t, browser, fresh);
+  await loaded(page);
+  await takeControl(page);
+  assert.ok(await page.evaluate(() => document.querySelector("#correct").hidden));
+  await fresh.command("cameras");
+  await until(page, () => globalThis.trunkline.measured.group.visible && !document.querySelector("#correct").hidden);
+  await until(page, () => /7 of 7 bodies, 120 Hz; tip 7.5 mm from the twin/.test(document.querySelector("#facts").textContent));
+  await picture(page, "measured");
+  await page.click("#cameras");
+  await until(page, () => !globalThis.trunkline.measured.group.visible);
+  await page.click("#cameras");
+  await page.keyboard.press("c");
+  await until(page, () => document.querySelector("#correct").getAttribute("aria-pressed") === "true");
+  await drag(page, "rigid", 16, -12);
+  await drag(page, "tip", -30, -45);
+  await until(page, () => globalThis.trunkline.state.targets && true);
+  await page.keyboard.press("Enter");
+  await inMode(page, "ready");
+  await until(page, () => /by 5 steps at most, each of up to 5 mm of cable, 25 mm in all, the tip within 60 mm of its target/.test(document.querySelector("#foreseen").textContent));
+  assert.ok(await page.evaluate(() => globalThis.trunkline.measured.bounds.visible));
+  await page.waitForTimeout(500);
+  await picture(page, "measured-ready");
+  await page.keyboard.down("KeyG");
+  await page.waitForTimeout(300);
+  await page.keyboard.press("Enter");
+  await inMode(page, "execute");
+  await until(page, () => globalThis.trunkline.state.correction === "waits until the tip rests");
+  await inMode(page, "aim");
+  await page.keyboard.up("KeyG");
+  await until(page, () => /Correctionnot corrected, [\d.]+ mm off: the tip is \d+ mm off, expected at most 60 mm/.test(document.querySelector("#facts").textContent));
+  assert.ok(await page.evaluate(() => !globalThis.trunkline.measured.bounds.visible));
+  await fresh.command("blind");
+  await until(page, () => /not relied on: found no frame for 0.20 s/.test(document.querySelector("#facts").textContent) && !globalThis.trunkline.measured.group.visible);
+  await picture(page, "measured-blind");
+  assert.deepEqual(wrongs, []);
+});
+
 test("the twin's certificate is linked, and opens as a page that runs its own script and reaches nothing", async (t) => {
   const { page, wrongs } = await open(t, browser, server, { drawn: false });
   await loaded(page);

@@ -4,7 +4,8 @@
 
 prints `ready PORT TOKEN` and serves until its input ends. A line on its input is a fault to be shown: `silent` and
 `speak` (the robot tells nothing new), `drop` and `listen` (all connections end, and none is taken until then), `fault`
-(the robot reports one); `doubtful` and `sure`: how a grasp is foreseen; `code` renews the pairing code. The modes that
+(the robot reports one); `doubtful` and `sure`: how a grasp is foreseen; `cameras` and `blind`: they see the arm, and
+their stream is not sound any more; `code` renews the pairing code. The modes that
 there were, and what else the server logged, come back as a line of JSON. With `--light` meshes have few triangles. It
 is patient with clients that draw by software beside other work: PATIENCE.
 """
@@ -33,15 +34,19 @@ from trunkline.ar.session import controller as control
 from trunkline.ar.session import lease, messages
 from trunkline.ar.session import scene as pictured
 from trunkline.ar.session.anchors import Anchors
+from trunkline.ar.session.arm_cameras import MeasuredArm
 from trunkline.ar.session.auth import Origins, make_token
 from trunkline.ar.session.bodies import drawn_bodies
 from trunkline.ar.session.controller import SessionController
+from trunkline.ar.session.correction_steps import CorrectionAnswer, CorrectionOrder
+from trunkline.ar.session.log_format import Subject
+from trunkline.ar.session.log_writer import LogWriter
 from trunkline.ar.session.previewer import (
     Answer,
+    AnyOrder,
     FollowAnswer,
     FollowRequest,
     InlinePreviewer,
-    Order,
     PlanAnswer,
     PredictionAnswer,
     PreviewBegun,
@@ -71,6 +76,7 @@ CENTRE, REACH = (0.0, 0.0, 0.333), 0.85  # m, of the ball in which the mount can
 AROUND, ALONG = 32, 10
 CERTIFICATE = b"""<!doctype html><title>Certificate</title><style>p { color: green }</style><p>of the twin</p>
 <script type="module">fetch("/").catch(() => document.title = "Replay, no requests");</script>"""
+OFF = np.array([0.006, 0.004, 0.002])  # m
 TABLE = Obstacle("the table", (0.35, -0.5, -0.05), (0.95, 0.5, -0.02))
 CUP = WorldObject("the cup", "cylinder", 0.05, 0.12, 0.1, (0.65, 0.3, 0.04), support="standing")
 
@@ -164,6 +170,21 @@ def within(targets: Targets) -> Targets:
     return replace(targets, tip=replace(targets.tip, position=tip))
 
 
+class Cameras:
+    """They see every fourth body of the arm, OFF from where it is drawn."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot, self.fault = robot, ""
+        self.rows = [0, *range(3, UNITS, 4)]
+
+    def show(self, bodies: np.ndarray) -> None:
+        first = self.robot.figure.bodies.index("unit_01")
+        self.poses = bodies[[first + row for row in self.rows]] + np.pad(OFF, (0, 4))
+
+    def latest(self) -> MeasuredArm:
+        return MeasuredArm(time.monotonic(), self.poses, self.poses[-1, :3], 0.01, 120.0, 0.0, self.fault)
+
+
 class Planning:
     """Plans at once; its previews are the plan itself."""
 
@@ -172,10 +193,13 @@ class Planning:
         self.probability = 0.84
         self.planner = Planner(RigidIK(OFFSET), NETWORK, STRAIGHT, LIMITS, OFFSET, step=0.005)
 
-    def answers(self, order: Order | FollowRequest) -> Iterator[Answer]:
+    def answers(self, order: AnyOrder) -> Iterator[Answer]:
         if isinstance(order, FollowRequest):
             targets = order.targets and within(order.targets)
             yield FollowAnswer(order.serial, *sought(self.planner, targets, order.joints, order.world))
+            return
+        if isinstance(order, CorrectionOrder):
+            yield CorrectionAnswer(order.serial, order.number, None, "no motor brings the tip nearer")
             return
         serial = order.request.serial
         try:
@@ -184,13 +208,16 @@ class Planning:
         except InputError as error:
             yield PlanAnswer(PlanReport(serial, refused=str(error)))
             return
+        plan = replace(plan, correction=order.correction)
         digest, step = plan.digest(), 1 / RATE
         times = np.arange(0.0, plan.duration, step)
         poses = np.array([self.figure.poses(*plan.at(time)) for time in times], dtype=np.float32)
         tips, shares = poses[::9, -1, :3].astype(float), np.linspace(0, 1, len(times[::9]))
         yield PlanAnswer(PlanReport(serial, digest, "", plan.package, plan.world), plan)
         phases = tuple((name, plan.step * row) for name, row in plan.phases)
-        preview = messages.PreviewMessage(digest, step, float(times[-1]), 0.0, phases)
+        preview = messages.PreviewMessage(
+            digest, step, float(times[-1]), 0.0, phases, plan.correction, order.uncorrected
+        )
         yield PreviewBegun(serial, preview)
         for first in range(0, len(times), 18):
             piece = poses[first : first + 18]
@@ -219,7 +246,7 @@ async def listen(runner: web.AppRunner, port: int) -> web.TCPSite:
 
 
 async def obey(
-    server: Server, robot: Robot, planning: Planning, runner: web.AppRunner, port: int, log: list[str]
+    server: Server, robot: Robot, cameras: Cameras, planning: Planning, runner: web.AppRunner, port: int, log: list[str]
 ) -> None:
     """Lines of the input, until it ends; the log goes out for each."""
     loop = asyncio.get_running_loop()
@@ -230,6 +257,9 @@ async def obey(
         robot.is_silent = word == "silent" or (robot.is_silent and word != "speak")
         robot.fault = {"fault": "joint 4: torque", "well": ""}.get(word, robot.fault)
         planning.probability = {"doubtful": 0.4, "sure": 0.84}.get(word, planning.probability)
+        if word == "cameras":
+            server.controller.cameras = cameras
+        cameras.fault = "found no frame for 0.20 s" if word == "blind" else cameras.fault
         if word == "drop":
             await site.stop()
             for client in list(server.clients.values()):
@@ -249,7 +279,9 @@ async def serve(port: int, folder: Path) -> None:
     safety = replace(core.safety, silence=PATIENCE, plan_wait=PATIENCE, start_wait=PATIENCE)
     settings = replace(core, delay=0.3, safety=safety)
     core = Teleoperation(settings, Balls(), PACKAGE, OFFSET)
-    controller = SessionController(core, robot, InlinePreviewer(planning.answers), make_world((TABLE,), (CUP,)), 0.1)
+    subject = Subject(figure.bodies, (), (), STRAIGHT, (figure.bodies[-1], (0.0, 0.0, 0.0)))
+    world, previewer = make_world((TABLE,), (CUP,)), InlinePreviewer(planning.answers)
+    controller = SessionController(core, robot, previewer, world, 0.1, LogWriter(subject))
     page, origins = PROJECT / "trunkline/ar/session/page", Origins.of(["127.0.0.1"], port, tls=False)
     alignment = load_folder(SessionConfig, PROJECT / "conf/live").alignment
     anchors = Anchors(folder / "anchors.json")
@@ -268,7 +300,7 @@ async def serve(port: int, folder: Path) -> None:
     server.tick = watched
     runner = web.AppRunner(server.app())
     await runner.setup()
-    await obey(server, robot, planning, runner, port, log)
+    await obey(server, robot, Cameras(robot), planning, runner, port, log)
     await runner.cleanup()
 
 

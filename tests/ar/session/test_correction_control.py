@@ -147,6 +147,11 @@ class Correcting(Played):
             assert self.robot.state().mode == "running"
         return self
 
+    @property
+    def travelled(self):
+        """Share of a step that the first motor has gone since the plan arrived."""
+        return float((self.controller.plan.commands[-1] - self.robot.commands)[0] / self.planning.change)
+
     def assert_nothing_follows(self):
         """Whatever its buttons are and however long."""
         self.wait(0.5)
@@ -281,6 +286,30 @@ def test_a_stop_that_comes_with_the_answer_is_before_it(session):
     session.assert_nothing_follows()
 
 
+@pytest.mark.parametrize("happens", ["unaligned", "log"])
+def test_where_nothing_may_be_executed_the_answer_starts_no_step(session, happens):
+    session.planning.mute = True
+    session.corrects("asks")
+    session.controller.answered(session.planning.step(session.planning.orders[-1]), session.now)
+    if happens == "log":
+        session.log.fault = "log: no space left"
+    else:
+        session.controller.align(BASE, "it is not sure enough")
+    session.tick()
+    assert session.robot.state().mode == "done"
+    session.wait(1.0)
+    assert session.travelled == 0
+
+
+def test_a_robot_whose_correction_has_ended_is_permitted_nothing_more(session):
+    session.corrects()
+    permits = session.robot.permits
+    session.controller.correction.end("the end")
+    for _ in range(3):  # it brakes still
+        session.tick()
+    assert session.robot.permits == permits
+
+
 @pytest.mark.parametrize("phase", ["arrives", "rests", "asks", "moves"])
 def test_a_stream_that_is_not_sound_ends_it_where_it_is(session, phase):
     session.planning.mute = phase == "asks"
@@ -288,13 +317,14 @@ def test_a_stream_that_is_not_sound_ends_it_where_it_is(session, phase):
         session.executing()
     else:
         session.corrects(phase)
-    begin = session.robot.commands.copy()
     session.cameras.fault = "found the labels 'a' and 'b' taken for each other, expected measured poses"
     session.until(lambda intent: intent.mode == "aim")
     assert "cameras: found the labels" in session.words
-    if phase != "arrives":
-        assert np.abs(session.robot.commands - begin).max() < session.planning.change
+    permits = session.robot.permits
     session.assert_nothing_follows()
+    assert session.robot.permits == permits
+    if phase != "arrives":
+        assert session.travelled < (0.8 if phase == "moves" else 1e-9)
     assert len(session.planning.orders) == (0 if phase in ("arrives", "rests") else 1)
 
 
@@ -304,6 +334,7 @@ def test_a_tip_far_off_ends_it_before_a_step_and_within_one(session):
     session.until(lambda intent: intent.mode == "aim")
     assert "the tip is 40 mm off, expected at most 30 mm" in session.words
     session.assert_nothing_follows()
+    assert session.travelled < 0.9
     other = Correcting()
     other.cameras.shift = np.array([0.0, 0.04, 0.0])
     other.executing().until(lambda intent: intent.mode == "aim")

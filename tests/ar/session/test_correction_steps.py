@@ -147,6 +147,16 @@ def test_what_it_does_not_know_of_is_no_step(changes):
     )
 
 
+@pytest.mark.parametrize("number", [1, 3])
+def test_an_answer_is_to_the_next_step_alone(number):
+    steps, commands = CorrectionSteps(PLANNER), pulled(0.02, 0, 0)
+    tip = tip_of(CHAIN, commands)
+    first = order(0, commands, tip, tip + np.array([5e-3, 0, 0]))
+    for later in (first, replace(first, number=1)):
+        assert steps.answer(later).plan is not None
+    assert steps.answer(replace(first, number=number)).ended == "the process that plans has lost it"
+
+
 # --- whether a plan may correct itself
 
 
