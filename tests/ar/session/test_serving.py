@@ -370,7 +370,7 @@ def test_a_session_that_is_told_to_end_is_closed_in_order(monkeypatch, capsys, n
         signal.signal(ending, signal.default_int_handler if ending == signal.SIGINT else signal.SIG_DFL)
 
     @contextlib.asynccontextmanager
-    async def opened(*_):
+    async def opened(*_, **__):
         try:
             asyncio.get_running_loop().call_later(0.05, os.kill, os.getpid(), number)
             await asyncio.sleep(10.0)
