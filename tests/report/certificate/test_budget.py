@@ -15,7 +15,7 @@ from trunkline.recordings.trials.conditions import Conditions
 from trunkline.report.certificate import budget as budgets
 from trunkline.report.certificate.arms import arm_of, arms_with
 from trunkline.report.certificate.budget import FRICTION, LACKING, NOISE, Inputs, budget
-from trunkline.report.certificate.discrepancy import discrepancy
+from trunkline.report.certificate.discrepancy import discrepancy, holding
 from trunkline.report.certificate.poses import StaticPoses, draw_poses
 from trunkline.twin.discrepancy import Discrepancy
 from trunkline.twin.posterior import Posterior
@@ -233,6 +233,20 @@ def test_the_tip_that_it_is_about_is_moved_by_the_residual_map(model):
     tips = [budget(replace(inputs, residual_map=m), poses, 2, 5, np.random.default_rng(0)) for m in maps]
     np.testing.assert_allclose(tips[1].tips - tips[0].tips, [turn @ shift] * 2, atol=1e-7)
     np.testing.assert_array_equal(tips[1].radius, tips[0].radius)
+
+
+@pytest.mark.parametrize(("far", "wider"), [(0, 1.0), (1, 1.0), (3, 4.0)])
+def test_scales_are_so_wide_that_so_many_trials_are_within_their_radii(far, wider):
+    """Forty trials, all but a few within the radius, these four times as far off: of 40, one may be beyond."""
+    inferred, ways = Discrepancy(np.tile([0.003, 0.01, 0.02], (400, 1)), 40), np.full((40, 2), 0.05)
+    radius = np.sqrt((inferred.scales[0] ** 2) @ np.array([1, 0.0025, 0.0025])) * np.sqrt(-np.log(0.05))
+    residuals = 0.9 * radius * np.linspace(0.1, 1.0, 40)
+    residuals[:far] = wider * radius if far == 3 else 4 * radius
+    widened = holding(inferred, residuals, ways, 0.95)
+    np.testing.assert_allclose(widened.scales / inferred.scales, wider, rtol=0.1)
+    assert holding(inferred, residuals[:15], ways[:15], 0.95).scales[0, 0] == pytest.approx(
+        0.003 * max(residuals[:15].max() / radius, 1.0), rel=0.1
+    )
 
 
 def test_with_a_residual_map_parameters_and_friction_are_in_what_is_lacking_and_count_once():

@@ -19,7 +19,7 @@ import numpy as np
 from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.kinematics.residual.residual_map import ResidualMap
 from trunkline.report.certificate.arms import StaticArm, arm_of, arms_with
-from trunkline.report.certificate.discrepancy import discrepancy
+from trunkline.report.certificate.discrepancy import discrepancy, holding
 from trunkline.report.certificate.poses import StaticPoses
 from trunkline.twin.discrepancy import Discrepancy
 from trunkline.twin.posterior import Posterior
@@ -101,7 +101,8 @@ def held_out(
     draws of the parameters make of them; of a residual map (`mapped`), all that it lacks."""
     arm = arm_of(model)
     if mapped:
-        return discrepancy(residuals, arm.ways(poses), np.full(len(poses), 3 * noise**2))
+        ways = arm.ways(poses)
+        return holding(discrepancy(residuals, ways, np.full(len(poses), 3 * noise**2)), residuals, ways, COVERAGE)
     shifts = parameter_shifts(model, parameters, arm, poses, arms, rng)
     others = 3 * noise**2 + (arm.friction(poses) ** 2).sum(axis=1) / 3 + np.nanmean((shifts**2).sum(axis=2), axis=0)
     return discrepancy(residuals, arm.ways(poses), others)

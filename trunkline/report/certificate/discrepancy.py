@@ -8,7 +8,13 @@ vector across the arm with variance v² = s_0² + s_g² g² + s_p² p²,
 and with the prior 1 / (s_0 s_g s_p), which assumes nothing about a scale, L / (s_0 s_g s_p) is the distribution of the
 scales (JCGM 101, 6.4.9, takes the same prior for a deviation). So with few trials the tip is more uncertain than their
 residuals show.
+
+Errors have longer tails than that where an arm is near to snapping from shape to shape: `holding` widens the scales
+until so many of the trials are within their own radii as are to be, one of them more counted as missed (Vovk et al.
+2005, split conformal prediction).
 """
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -40,3 +46,14 @@ def discrepancy(residuals: np.ndarray, ways: np.ndarray, variances: np.ndarray) 
     chosen = np.searchsorted(np.cumsum(likelihood), places * likelihood.sum())
     triples = [axis[index] for axis, index in zip(axes, np.unravel_index(chosen, log.shape), strict=True)]
     return Discrepancy(np.stack(triples, axis=1), len(residuals))
+
+
+def holding(inferred: Discrepancy, residuals: np.ndarray, ways: np.ndarray, coverage: float) -> Discrepancy:
+    """The same with scales so wide, and no narrower than they are, that the share `coverage` of the residuals (N,), m,
+    is within the radius that they give: the arguments of `discrepancy`. Of few trials, all."""
+    rng = np.random.default_rng(0)
+    deviations = np.sqrt(inferred.scales**2 @ (lengths_of(ways) ** 2).T)  # (S, N)
+    lengths = deviations * np.sqrt(rng.standard_exponential(deviations.shape))  # across the arm
+    ratios = np.sort(residuals / np.quantile(lengths, coverage, axis=0))
+    rank = min(int(np.ceil((len(ratios) + 1) * coverage)), len(ratios))
+    return replace(inferred, scales=inferred.scales * max(float(ratios[rank - 1]), 1.0))
