@@ -68,11 +68,11 @@ def test_the_headline_shows_what_misses_its_goal_beside_what_meets_it(tmp_path):
         for median, p95, unsaid, targets, doubted in
         ((0.5, 1.5, 0, 50, 0.04), (13.0, 29.0, 170, 200, 1.0), (2.0, 6.0, 7, 40, 0.126))
     )  # fmt: skip
-    network = {"as_controls": {"frictionless": sent, "friction": rubbing, "targets": 50}, "on_plant": bad}
+    network = {"as_controls": {"frictionless": sent, "friction": rubbing, "targets": 50}, "on_plant": bad | {"with_poses": rubbing}}
     goals = "rehearse:\n  reach.rate: {better: higher, goal: 0.98}\n  follow.rate: {min: 0.95}\n"
     (tmp_path / "tests").mkdir()
     (tmp_path / "tests/limits.yaml").write_text(goals)
-    assert "**" not in headline(tmp_path).replace("**on the", "").replace("(– of –; –)** |", "")
+    assert "**" not in headline(tmp_path).replace("**on the", "").replace("recorded poses](docs/lab-tools.md#poses-to-record)** |", "")
     for stage, metrics in {"train_ik": network, "rehearse": rehearsed}.items():
         (tmp_path / f"artifacts/{stage}").mkdir(parents=True)
         write_json(tmp_path / f"artifacts/{stage}/metrics.json", metrics)
@@ -81,7 +81,7 @@ def test_the_headline_shows_what_misses_its_goal_beside_what_meets_it(tmp_path):
         text = headline(tmp_path)
     twin = "on the twin without friction: 0.5 / 1.5 mm (0 of 50; 4 %); with friction: 2 / 6 mm (7 of 40; 12.6 %)"
     assert f"| {twin} |" in text
-    assert "| **on the simulated lab's arm: 13 / 29 mm (170 of 200; 100 %)** |" in text
+    assert "| **on the simulated lab's arm: 13 / 29 mm (170 of 200; 100 %); 2 / 6 mm after [30 recorded poses]" in text
     reached = "| **reach 90 %** (within 20 mm, and no other part touched anything: 80 %), follow 100 %, grasp 95 %, "
     assert f"{reached}hand-over 50 % | goal: reach ≥ 98 %, follow ≥ 95 % |" in text
     assert text.endswith("The last row: rehearsal **STALE**: of code abc.")

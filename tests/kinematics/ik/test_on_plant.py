@@ -167,6 +167,6 @@ def test_other_networks_are_scored_beside_on_the_same_tips(model, chain, drawn):
         model, chain, exact(chain), drawn.targets, drawn.commands, Rig(rig.reach, 1.0), {"with_poses": informed}
     )
     assert len(rig.sent) == 5
-    own = [part["own_surface"]["position_error_mm"]["median"] for part in (result["with_poses"], result)]
-    assert own[0] < 0.05 < own[1]
+    medians = [part["own_surface"]["position_error_mm"]["median"] for part in (result["with_poses"], result)]
+    assert medians[0] < 0.05 < medians[1]
     assert set(result["with_poses"]) == set(result) - {"with_poses"}
