@@ -86,7 +86,7 @@ def test_the_drawings_arm_takes_the_identified_ones_place(bench, tmp_path):
     drawing, other = tmp_path / "arm.xml", stump_spec(5)
     other.compile()
     other.to_file(str(drawing))
-    package = Package("", None, None, None, None, None, np.zeros(3), 0.0, {})  # type: ignore[arg-type]
+    package = Package("", None, None, None, None, None, np.zeros(3), 0.0, None, {})  # type: ignore[arg-type]
     ablated = _cad_grasp(replace(bench, package=package), drawing)
     assert ablated.world_model.arm.compile().nv == ablated.package.model.nv == ablated.package.chain.units * 2 == 10
     assert ablated.package.geometry.units == 5

@@ -31,7 +31,7 @@ OBJECT = np.array([0.6, 0.1, 0.1])
 PREDICTION = SimpleNamespace(
     preview=SimpleNamespace(
         stated=Stated(np.zeros(1), np.zeros((1, 3)), np.zeros(1)), interval=None, probability=None, samples=(),
-        nominal=SimpleNamespace(tip=np.zeros((1, 1, 3))), unknown="",
+        nominal=SimpleNamespace(tip=np.zeros((1, 1, 3))), shown=np.zeros((1, 3)), unknown="",
     ),
     begins=0.0,
     offer=None,

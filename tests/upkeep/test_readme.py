@@ -68,11 +68,13 @@ def test_the_headline_shows_what_misses_its_goal_beside_what_meets_it(tmp_path):
         for median, p95, unsaid, targets, doubted in
         ((0.5, 1.5, 0, 50, 0.04), (13.0, 29.0, 170, 200, 1.0), (2.0, 6.0, 7, 40, 0.126))
     )  # fmt: skip
-    network = {"as_controls": {"frictionless": sent, "friction": rubbing, "targets": 50}, "on_plant": bad | {"with_poses": rubbing}}
+    network = {"as_controls": {"frictionless": sent, "friction": rubbing, "targets": 50}}
+    network["on_plant"] = bad | {"with_poses": rubbing}
     goals = "rehearse:\n  reach.rate: {better: higher, goal: 0.98}\n  follow.rate: {min: 0.95}\n"
     (tmp_path / "tests").mkdir()
     (tmp_path / "tests/limits.yaml").write_text(goals)
-    assert "**" not in headline(tmp_path).replace("**on the", "").replace("recorded poses](docs/lab-tools.md#poses-to-record)** |", "")
+    at_poses = "recorded poses](docs/lab-tools.md#poses-to-record)** |"
+    assert "**" not in headline(tmp_path).replace("**on the", "").replace(at_poses, "")
     for stage, metrics in {"train_ik": network, "rehearse": rehearsed}.items():
         (tmp_path / f"artifacts/{stage}").mkdir(parents=True)
         write_json(tmp_path / f"artifacts/{stage}/metrics.json", metrics)

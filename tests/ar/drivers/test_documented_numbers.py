@@ -28,6 +28,7 @@ from trunkline.ar.session import (
     client,
     clock,
     controller,
+    correction_control,
     follow,
     hardware_process,
     lease,
@@ -38,6 +39,7 @@ from trunkline.ar.session import (
 from trunkline.ar.session.settings import SessionConfig as Live
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.executor import BRAKE
+from trunkline.ar.tracking import stream_checks
 from trunkline.kinematics.panda.limits import ACCELERATION, VELOCITY
 from trunkline.pipeline.config import PROJECT, load_folder
 
@@ -102,6 +104,9 @@ FIGURES = {
         (r"its process ends \| (0\.08) s \|", [robot_process.DEAD_MAN]),
         (r"the same as a stop \| (1) s \|", [follow.PLANNER_TIMEOUT]),
         (r"permits nothing \| (0\.15) s \|", [robot_process.STALE]),
+        (r"a stream within (0\.1) to (0\.25) s, the tip (0\.1) and (0\.5) s",
+         [stream_checks.LASTS, stream_checks.StreamLimits().silence + stream_checks.LASTS, correction_control.STRAYS,
+          correction_control.BLIND]),
         (r"at once if a write fails; after (1) s in which data", [LIVE.journal.period + log_writer.LATE]),
         (r"A token of (128) bits", [8 * auth.TOKEN_BYTES]),
         (r"valid for (2) minutes and (5) tries", [auth.CODE_SECONDS / 60, auth.CODE_TRIES]),

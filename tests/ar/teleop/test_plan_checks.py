@@ -356,7 +356,7 @@ def test_the_speed_of_the_advance_is_that_of_the_settings():
     folder, arm = PROJECT / "conf/teleop", hardening_stump()
     values = compose_settings(folder, {}, str(folder))
     made = validated(TeleoperationConfig, values | {"advance_speed": 0.25}, folder)
-    package = Package("", None, bending(PULL), arm, CHAIN, None, STRAIGHT, 0.0, {})
+    package = Package("", None, bending(PULL), arm, CHAIN, None, STRAIGHT, 0.0, None, {})
     assert (config().advance_speed, package.planner(made).advance_speed) == (0.1, 0.25)
     with pytest.raises(InputError, match=r"advance_speed.*found 0\.251, expected"):
         validated(TeleoperationConfig, values | {"advance_speed": 0.251}, folder)

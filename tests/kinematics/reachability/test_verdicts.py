@@ -46,7 +46,7 @@ def test_sheets_are_checked_with_tips_and_points_beyond(monkeypatch, at_tips, ou
         ("finer", np.zeros((3, 3))), ("workspace_surface_at", None), ("soft_lattice", None), ("soft_field", None),
         ("overlap", 0.75), ("points_beyond", away), ("sample_at", found_there),
     ):  # fmt: skip
-        monkeypatch.setattr(surface_check, name, lambda *_, value=value: value)
+        monkeypatch.setattr(surface_check, name, lambda *_, value=value, learnt=None: value)
     sheets = SimpleNamespace(
         downs=downwards(np.array([0.0, 0.5]), np.zeros(2)), points=np.zeros((2, 4, 5, 3)), at=lambda down: down,
         signal=lambda sheet, points: np.array(outside if points is away else at_tips),
