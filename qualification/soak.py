@@ -31,7 +31,7 @@ from trunkline.ar.session.composition import SEARCH
 from trunkline.ar.session.controller import SessionController
 from trunkline.ar.session.previewer import (
     Answer,
-    FollowRequest,
+    AnyOrder,
     InlinePreviewer,
     Order,
     PlanAnswer,
@@ -88,7 +88,7 @@ class Planning:
     def __init__(self, robot: ScriptedRobot) -> None:
         self.robot, self.limits, self.made = robot.robot, robot.limits, 0
 
-    def answers(self, order: Order | FollowRequest) -> Iterator[Answer]:
+    def answers(self, order: AnyOrder) -> Iterator[Answer]:
         assert isinstance(order, Order)
         request, robot = order.request, self.robot
         self.made += 1
