@@ -429,21 +429,18 @@ def test_a_fault_of_the_robot_in_a_step_stops_it(session):
     session.assert_nothing_follows()
 
 
-def test_a_step_that_the_robot_refuses_or_does_not_start_ends_it(session, monkeypatch):
+@pytest.mark.parametrize(
+    ("refused", "within", "words"),
+    [("busy: another plan runs", 0.5, ": busy: another plan runs"), ("", 1.0, ": a step did not start within 0.2 s")],
+)
+def test_a_step_that_the_robot_refuses_or_does_not_start_ends_it(session, monkeypatch, refused, within, words):
     monkeypatch.setattr(correction_control, "STARTS", 0.2)
     session.planning.mute = True
     session.corrects("asks")
-    session.controller.correction._start = lambda plan, digest: "busy: another plan runs"
+    session.controller.correction._start = lambda plan, digest: refused
     session.controller.answered(session.planning.step(session.planning.orders[-1]), session.now)
-    session.until(lambda intent: intent.mode == "aim", 0.5)
-    assert session.words.endswith(": busy: another plan runs")
-    other = Correcting()
-    other.planning.mute = True
-    other.corrects("asks")
-    other.controller.correction._start = lambda plan, digest: ""
-    other.controller.answered(other.planning.step(other.planning.orders[-1]), other.now)
-    other.until(lambda intent: intent.mode == "aim", 1.0)
-    assert other.words.endswith(": a step did not start within 0.2 s")
+    session.until(lambda intent: intent.mode == "aim", within)
+    assert session.words.endswith(words)
 
 
 # --- what is asked for

@@ -107,7 +107,7 @@ def _gravities(args: argparse.Namespace) -> tuple[Mounts, np.ndarray, float | No
         option = "--tilt" if args.tilt else "--standing"
         raise InputError(f"{option}: found it, expected none: {params} says that gravity does not bend this arm")
     about_y = sampling is not None and isinstance(sampling.gravity, Tilts)  # the network knows no other tilts
-    sides = tuple(args.sides) or (0.0,) * about_y
+    sides = tuple(args.sides) or ((0.0,) if about_y else ())
     mounts = Mounts(args.mounts, args.tilt, sides, args.standing, weightless)
     if sampling is None:
         return mounts, ANY_SIDE * [1, 1, -1 if args.standing else 1], None
