@@ -23,7 +23,7 @@ from trunkline.recordings.trials.experiments import is_static
 from trunkline.recordings.trials.splits import DECIDING, IDENTIFY
 from trunkline.recordings.trials.trial import read_trials
 from trunkline.report.certificate.arms import arm_of
-from trunkline.report.certificate.budget import Budget, Inputs, budget, held_out
+from trunkline.report.certificate.budget import Budget, Inputs, budget, held_out, left_by_map
 from trunkline.report.certificate.coverage import is_inside
 from trunkline.report.certificate.held_out import learnt_from, tip_residuals
 from trunkline.report.certificate.poses import StaticPoses, posed
@@ -63,11 +63,12 @@ class Recorded:
 
     def stated(self, poses: StaticPoses, residuals: np.ndarray, learn: bool = True) -> Budget:
         """Tips and radii that a certificate states of the others, had these poses been held out."""
-        model, rng = self.twin.arm.model, np.random.default_rng(SEED)
+        model, posterior, rng = self.twin.arm.model, self.twin.posterior, np.random.default_rng(SEED)
         learnt, missed = learnt_from(model, poses, residuals) if learn else (None, residuals)
-        lengths = np.linalg.norm(missed, axis=1)
-        lacking = held_out(model, self.twin.posterior, NOISE, poses, lengths, ARMS, rng, mapped=learnt is not None)
-        return budget(Inputs(model, self.twin.posterior, lacking, NOISE, learnt), self.poses[OTHERS], ARMS, EACH, rng)
+        lacking = held_out(model, posterior, NOISE, poses, np.linalg.norm(residuals, axis=1), ARMS, rng)
+        left = learnt and left_by_map(arm_of(model), NOISE, poses, np.linalg.norm(missed, axis=1))
+        inputs = Inputs(model, posterior, lacking, NOISE, learnt, left)
+        return budget(inputs, self.poses[OTHERS], ARMS, EACH, rng)
 
 
 def measure() -> None:

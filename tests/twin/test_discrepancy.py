@@ -42,13 +42,16 @@ def test_the_package_has_it_as_the_artifacts_have(sources, tmp_path):  # noqa: F
 
 def test_a_residual_map_goes_with_it(sources):  # noqa: F811
     model = hashlib.sha256(sources.mjcf.encode()).hexdigest()
-    learnt = replace(lacking(model), residual_map=everywhere([0.001, 0.002, -0.003]))
+    rest = Discrepancy(SCALES / 2, 20)
+    learnt = replace(lacking(model), residual_map=everywhere([0.001, 0.002, -0.003]), left=rest)
     table = json.loads(json.dumps(learnt.table()))
     files, _ = assemble(LABEL, replace(sources, lacking=table), TRAJECTORY, ROBOT)
     packed = Twin.of_package(files).lacking
     assert packed is not None
     assert packed.residual_map is not None
     assert packed.residual_map.table() == everywhere([0.001, 0.002, -0.003]).table()
+    assert packed.left is not None
+    np.testing.assert_allclose(packed.left.scales, SCALES / 2, rtol=1e-5)
     with pytest.raises(InputError, match=r"^file: .*residual map.*expected what the stage report writes"):
         Lacking.from_table(table | {"residual_map": table["residual_map"] | {"numbers": [1.0]}}, model, "file")
 

@@ -69,7 +69,7 @@ class Lacking:
     model: SHA-256 of its file. tilt_deg: of the mount. pulled_tilt_deg: of the mount while a motor pulled. pull: of one
     motor, m. pulls: of all motors together, m. sure_pulls: likewise, up to which the certificate has the tip within
     `SURE` of the arm's length; 0 where none says so. load: at the tip, kg. residual_map: the part of it that recorded
-    poses tell, None where there are too few; the discrepancy is then of the rest.
+    poses tell, None where there are too few. left: what is then lacking where these poses tell all.
     """
 
     model: str
@@ -81,6 +81,7 @@ class Lacking:
     sure_pulls: float = 0.0
     load: float = 0.0  # held-out trials with a load tell nothing of the model alone
     residual_map: ResidualMap | None = None
+    left: Discrepancy | None = None
 
     def beyond(self, pulls: np.ndarray, tilt_deg: float) -> str:
         """What of a pose at rest without a load no trial went up to, "" where trials did: what each motor draws in, m
@@ -99,8 +100,9 @@ class Lacking:
         """As JSON has it."""
         names = ("tilt_deg", "pulled_tilt_deg", "pull", "pulls", "sure_pulls", "load")
         bounds = {name: getattr(self, name) for name in names}
-        scales = [[float(f"{scale:.{DIGITS}g}") for scale in triple] for triple in self.discrepancy.scales.tolist()]
-        learnt = {} if self.residual_map is None else {"residual_map": self.residual_map.table()}
+        scales, learnt = _rounded(self.discrepancy), {}
+        if self.residual_map is not None and self.left is not None:
+            learnt = {"residual_map": self.residual_map.table() | {"scales_left": _rounded(self.left)}}
         return {"model": self.model, "trials": self.discrepancy.trials, "units": UNITS, "conditions": bounds,
                 "scales": scales} | learnt  # fmt: skip
 
@@ -118,8 +120,13 @@ class Lacking:
                 return None
             scales = np.array(table["scales"], dtype=float).reshape(-1, len(UNITS["scales"]))
             bounds = {name: float(bound) for name, bound in table["conditions"].items()}
-            learnt = ResidualMap.from_table(table["residual_map"]) if "residual_map" in table else None
-            return cls(model, Discrepancy(scales, int(table["trials"])), **bounds, residual_map=learnt)
+            learnt, left = None, None
+            if "residual_map" in table:
+                learnt = ResidualMap.from_table(table["residual_map"])
+                rest = np.array(table["residual_map"]["scales_left"], dtype=float).reshape(-1, len(UNITS["scales"]))
+                left = Discrepancy(rest, len(learnt.poses))
+            whole = Discrepancy(scales, int(table["trials"]))
+            return cls(model, whole, **bounds, residual_map=learnt, left=left)
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise InputError(f"{source}: {error!r}, expected what the stage report writes") from error
 
@@ -137,6 +144,10 @@ def read_discrepancy_table(file: Path) -> dict | None:
         return json.loads(file.read_text(encoding="utf-8"))
     except ValueError as error:
         raise InputError(f"{file}: {error}, expected what the stage report writes") from error
+
+
+def _rounded(discrepancy: Discrepancy) -> list[list[float]]:
+    return [[float(f"{scale:.{DIGITS}g}") for scale in triple] for triple in discrepancy.scales.tolist()]
 
 
 def lengths_of(ways: np.ndarray) -> np.ndarray:

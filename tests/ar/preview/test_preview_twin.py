@@ -62,12 +62,15 @@ def test_the_friction_band_is_left_out_where_the_model_that_is_stepped_rubs(hole
 
 
 def test_poses_of_the_arm_move_the_tip_that_is_stated_and_not_its_radius():
-    """By a map in the arm's base frame, whose y and z are opposite to the flange's. Friction is in the map's poses."""
-    knows = replace(LACKING, residual_map=everywhere([0.0, 0.0, 0.001]))
+    """By a map in the arm's base frame, whose y and z are opposite to the flange's. Where it tells all, the friction
+    band and what the twin lacks are in its poses."""
+    knows = replace(LACKING, residual_map=everywhere([0.0, 0.0, 0.001]), left=Discrepancy(np.full((1, 3), 1e-9), 16))
     dry = replace(robot_model(CASES["no friction on the holes"]), lacking=knows)
     uncertain = dry.tip_uncertainty(pull(dry.arm.copy().compile()), None)
     assert isinstance(uncertain, TipUncertainty)
-    assert not uncertain.friction.any()
+    assert uncertain.unknown < 1e-6
+    drawn = uncertain.offsets(np.zeros(3), np.array([0.0, 0.0, -0.3]), 50, np.random.default_rng(0))
+    assert np.linalg.norm(drawn, axis=1).max() < 1e-4 < np.linalg.norm(uncertain.friction)
     made = robot_model(CASES["rubbing"])
     trajectory = pull(made.arm.copy().compile())
     twin = compose_twin(made, World("w"), None, trajectory.joints[0], trajectory.commands[0], SETTINGS)

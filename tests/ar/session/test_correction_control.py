@@ -502,9 +502,15 @@ CASES = [
 
 @pytest.mark.parametrize(("plan", "taken", "reason"), CASES)
 def test_what_a_step_may_change(plan, taken, reason):
-    words = beyond_bounds(taken, plan, STRAIGHT)
+    words = beyond_bounds(taken, plan, STRAIGHT, taken.commands[0])
     assert reason in words
     assert bool(reason) == bool(words)
+
+
+def test_a_step_begins_where_the_motors_are():
+    taken = step((0, 0, 0), (3, 0, 0))
+    aside = taken.commands[0] + [0.0, 5e-4, 0.0]
+    assert beyond_bounds(taken, WITHIN, STRAIGHT, aside) == "a step begins 0.5 mm from the commands as they are"
 
 
 def test_what_the_core_hears_of_a_robot_without_a_correction_is_the_robots(session):

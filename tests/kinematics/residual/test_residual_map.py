@@ -128,6 +128,31 @@ def test_poses_that_are_far_off_spoil_neither_the_map_nor_what_it_is_worth():
     assert left[1] < 2 * left[0]
 
 
+def test_where_poses_tell_nothing_it_is_unknown_and_the_tip_is_the_twin_s():
+    """Poses that all pull the first motor: of the second's pulls they tell nothing."""
+    rng = np.random.default_rng(8)
+    poses = drawn(30, rng)
+    poses.pulls[:, 0] = rng.uniform(0, 0.04, 30)
+    poses.pulls[:, 1:] = -0.05
+    learnt = ResidualMap.fit(poses, measured(poses, rng), LENGTH)
+    down = np.tile([0.0, 0.0, -STANDARD_GRAVITY], (2, 1))
+    first, second = RestingPoses(np.array([[0.02, -0.1, -0.1], [0.0, 0.3, -0.1]]), down)[[0]], RestingPoses(
+        np.array([[0.0, 0.3, -0.1]]), down[:1]
+    )
+    assert learnt.unknown(first)[0] < 0.1
+    assert learnt.unknown(second)[0] > 0.9
+    assert lengths(learnt.mean(second))[0] < 0.3 * lengths(learnt.mean(first))[0] + 1e-3
+    alone = ResidualMap(learnt.poses[1:], learnt.residuals[1:], learnt.noisier[1:], learnt.numbers)
+    np.testing.assert_allclose(learnt.unknown_left_out()[0], alone.unknown(learnt.poses[[0]])[0], atol=0.02)
+
+
+def test_poses_within_two_millimetres_and_three_degrees_are_one_that_was_repeated():
+    down = np.tile([0.0, 0.0, -STANDARD_GRAVITY], (5, 1))
+    down[4] = STANDARD_GRAVITY * np.array([np.sin(0.1), 0.0, -np.cos(0.1)])
+    pulls = np.array([[0.02, 0, -1], [0.0219, 0, -2], [0.0221, 0, 0], [0.02, 0.0021, 0], [0.02, 0, 0]])
+    assert [rows.tolist() for rows in RestingPoses(pulls, down).repeats()] == [[0, 1], [2], [3], [4]]
+
+
 def test_residuals_that_nothing_tells_are_not_worth_a_map():
     rng = np.random.default_rng(5)
     worth = [

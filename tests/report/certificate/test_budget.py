@@ -249,17 +249,37 @@ def test_scales_are_so_wide_that_so_many_trials_are_within_their_radii(far, wide
     )
 
 
-def test_with_a_residual_map_parameters_and_friction_are_in_what_is_lacking_and_count_once():
+def both_ways(unknown: float) -> tuple[Inputs, StaticPoses]:
+    """Of an arm of which a map leaves that share `unknown` everywhere; 3 mm is lacking of it, 6 mm of the twin."""
     model = small_model(3)
-    lacking = Discrepancy(np.array([[0.003, 0.0, 0.0]]), 30)
     poses = draw_poses(arm_of(model).chain, Conditions(20.0, 20.0, 0.02, 0.02), 6, np.random.default_rng(1))
-    inputs = Inputs(model, mounts(0.0), lacking, 1e-4, everywhere([0.0, 0.0, 0.001]))
-    mapped, rng = budget(inputs, poses, 20, 50, np.random.default_rng(0)), np.random.default_rng(0)
-    assert [source.name for source in mapped.sources] == [LACKING, NOISE]
-    plain = budget(replace(inputs, residual_map=None), poses, 20, 50, rng)
-    assert np.median(plain.radius) > 1.5 * np.median(mapped.radius)
+    scales = [Discrepancy(np.array([[scale, 0.0, 0.0]]), 30) for scale in (0.006, 0.003)]
+    learnt = everywhere([0.0, 0.0, 0.001])
+    object.__setattr__(learnt, "unknown", lambda at: np.full(len(at), unknown))
+    return Inputs(model, mounts(0.0), scales[0], 1e-4, learnt, scales[1]), poses
+
+
+def test_where_a_map_tells_all_what_it_is_missed_by_is_the_uncertainty_and_where_nothing_the_twin_s():
+    all_of_it, poses = both_ways(0.0)
+    mapped = budget(all_of_it, poses, 20, 50, np.random.default_rng(0))
     np.testing.assert_allclose(mapped.radius, 0.003 * np.sqrt(-np.log(0.05)), rtol=0.1)
-    missed = np.full(6, 0.003)
-    alone = budgets.held_out(model, mounts(0.0), 1e-4, poses, missed, 5, rng, mapped=True)
-    beside = budgets.held_out(model, mounts(0.0), 1e-4, poses, missed, 5, rng)
-    assert alone.rms[0] > beside.rms[0]
+    values = contributions(mapped)
+    assert values[FRICTION] == values["mount_tilt_x"] == 0.0
+    assert values[LACKING] == pytest.approx(0.003)
+    nothing, _ = both_ways(1.0)
+    without = replace(nothing, residual_map=None, left=None)
+    radii = [budget(each, poses, 20, 50, np.random.default_rng(0)).radius for each in (nothing, without)]
+    np.testing.assert_allclose(*radii, rtol=0.02)  # the arm's tip, and so what is across it, is a mm aside
+    half = budget(both_ways(0.5)[0], poses, 20, 50, np.random.default_rng(0))
+    assert contributions(half)[LACKING] == pytest.approx(np.sqrt((0.006**2 + 0.003**2) / 2))
+    assert np.median(mapped.radius) < np.median(half.radius) < np.median(radii[0])
+
+
+def test_what_a_map_lacks_holds_as_many_of_its_poses_as_are_stated():
+    model, rng = small_model(3), np.random.default_rng(1)
+    poses = draw_poses(arm_of(model).chain, Conditions(20.0, 20.0, 0.02, 0.02), 40, rng)
+    missed = np.full(40, 1e-3)
+    missed[:3] = 0.02
+    left = budgets.left_by_map(arm_of(model), 1e-4, poses, missed)
+    radius = left.deviation(arm_of(model).ways(poses)) * np.sqrt(-np.log(0.05))
+    assert np.sum(missed > 1.1 * radius) <= 2

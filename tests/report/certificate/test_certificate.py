@@ -212,7 +212,8 @@ def test_recorded_poses_move_the_tip_that_it_is_about_and_the_page_says_so():
     model, rng = small_model(4), np.random.default_rng(0)
     trials = sample_trials(model)
     for number in range(16):
-        trial = static_pull(model, np.where(np.arange(3) == number % 3, 20 * rng.random(), 0).tolist(), split=VALIDATE)
+        pulls = np.where(np.arange(3) == number % 3, 0.0, 20 * rng.random(3)).tolist()
+        trial = static_pull(model, pulls, split=VALIDATE)
         positions = trial.positions.copy()
         positions[:, -1] += [0.005, 0.0, 0.0]
         trials.append(replace(trial, name=f"pose_{number:02}", positions=positions))

@@ -63,6 +63,8 @@ class TipUncertainty:
         rotation: of the arm's base frame in the world. Shape (3, 3).
         hanging: None where nobody has seen that.
         shift: by how far the tip rests beside the twin's along the plan, None where no poses of the arm tell.
+        unknown: share of the variance that these poses do not tell of, 1 without.
+        left: what is lacking where they tell all, None without.
     """
 
     discrepancy: Discrepancy
@@ -72,11 +74,16 @@ class TipUncertainty:
     rotation: np.ndarray
     hanging: Hanging | None = None
     shift: TipShift | None = None
+    unknown: float = 1.0
+    left: Discrepancy | None = None
 
     def offsets(self, mount: np.ndarray, tip: np.ndarray, draws: int, rng: np.random.Generator) -> np.ndarray:
         """Of a tip at `tip` (3,) from a mount at `mount` (3,), world, m. Shape (draws, 3), m."""
-        lacking = self.discrepancy.offsets(self.ways[None], (tip - mount)[None], draws, rng)[:, 0]
-        rubbing = rng.uniform(-1, 1, (draws, 1)) * self.friction
+        twin, mapped, pose = np.sqrt(self.unknown), np.sqrt(1 - self.unknown), (self.ways[None], (tip - mount)[None])
+        lacking = twin * self.discrepancy.offsets(*pose, draws, rng)[:, 0]
+        rubbing = twin * rng.uniform(-1, 1, (draws, 1)) * self.friction
+        if self.left is not None:
+            lacking = lacking + mapped * self.left.offsets(*pose, draws, np.random.default_rng(draws))[:, 0]
         shift, turn = self.alignment.draw(draws, rng)
         shown = shift + np.cross(turn, tip)
         if self.hanging is not None:

@@ -22,6 +22,7 @@ from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY, tilt_of_gravity, wxyz_from_rotation
 from trunkline.kinematics.panda.kinematics import mount_pose
 from trunkline.kinematics.panda.mounts import PandaRobot
+from trunkline.kinematics.residual.residual_map import ResidualMap
 from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.rest import settle
 from trunkline.report.certificate.arms import StaticArm, arm_of
@@ -73,24 +74,30 @@ class RobotModel:
         if beyond:
             return beyond
         pose = StaticPoses(gravity[None], commands[None][:, order])
-        counted = model.rubs or self.lacking.residual_map is not None  # in the futures, or in the map's poses
-        ways, friction = arm.ways(pose)[0], np.zeros(3) if counted else base @ arm.friction(pose)[0]
+        ways, friction = arm.ways(pose)[0], np.zeros(3) if model.rubs else base @ arm.friction(pose)[0]
         if not np.isfinite(ways).all():
             return "the twin does not come to rest there"
         hanging = None if hangs is None else Hanging(hangs, places[0], bases[0])
-        shift = self._shift(trajectory, arm, order)
-        return TipUncertainty(self.lacking.discrepancy, ways, friction, self.alignment, base, hanging, shift)
+        uncertainty = TipUncertainty(self.lacking.discrepancy, ways, friction, self.alignment, base, hanging)
+        if self.lacking.residual_map is None:
+            return uncertainty
+        unknown = float(self.lacking.residual_map.unknown(arm.resting(pose))[0])
+        shift = self._shift(trajectory, arm, order, self.lacking.residual_map)
+        return replace(uncertainty, shift=shift, unknown=unknown, left=self.lacking.left)
 
-    def _shift(self, trajectory: CommandTrajectory, arm: StaticArm, order: np.ndarray) -> TipShift | None:
-        """By how far the tip rests beside that of `arm` along a trajectory, its cables in that `order` (K,)."""
-        if self.lacking is None or self.lacking.residual_map is None:
-            return None
+    def _shift(
+        self, trajectory: CommandTrajectory, arm: StaticArm, order: np.ndarray, learnt: ResidualMap
+    ) -> TipShift:
+        """By how far the tip rests beside that of `arm` along a trajectory, its cables in that `order` (K,). Where the
+        twin finds no rest, as before and after."""
         times = np.linspace(0, trajectory.duration, max(round(trajectory.duration / SHIFTED), 1) + 1)
         rows = trajectory.at(times)
         joints, commands = np.split(rows, [trajectory.joints.shape[1]], axis=1)
         bases = _base_frames(joints, self.robot.mount_offset)[1]
         poses = StaticPoses(np.einsum("nji,j->ni", bases, GRAVITY[0]), commands[:, order])
-        return TipShift(times, np.einsum("nij,nj->ni", bases, arm.shift(self.lacking.residual_map, poses)))
+        shifts = np.einsum("nij,nj->ni", bases, arm.shift(learnt, poses))
+        rested = np.isfinite(shifts).all(axis=1)
+        return TipShift(times[rested], shifts[rested]) if rested.any() else TipShift(times, np.zeros_like(shifts))
 
     def lean(self, hangs: np.ndarray | None) -> Rotation | None:
         """How the arm is turned on its mount, by the least turns, so that its tip, straight down, comes to rest in the

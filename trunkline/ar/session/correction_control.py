@@ -205,7 +205,7 @@ class CorrectionControl:
         if answer.plan is None:
             return self.end(answer.ended)
         assert self._plan is not None
-        if reason := beyond_bounds(answer.plan, self._plan, self._from) or self._beyond_steps(answer):
+        if reason := beyond_bounds(answer.plan, self._plan, self._from, self._here) or self._beyond_steps(answer):
             return self.end(reason)
         digest = answer.plan.digest()
         if refused := self._start(answer.plan, digest):
@@ -231,11 +231,11 @@ class CorrectionControl:
             self.end(f"a step did not start within {STARTS:g} s")
 
 
-def beyond_bounds(step: Plan, plan: Plan, begin: np.ndarray) -> str:
+def beyond_bounds(step: Plan, plan: Plan, begin: np.ndarray, here: np.ndarray) -> str:
     """By what a step leaves the bounds of the plan that it corrects, "" where it keeps them.
 
     Args:
-        begin: the motors' commands with which the plan has arrived, m. Shape (K,).
+        begin, here: the motors' commands with which the plan has arrived, and as they are now, m. Shape (K,).
     """
     bounds = plan.correction
     if bounds is None:
@@ -246,7 +246,9 @@ def beyond_bounds(step: Plan, plan: Plan, begin: np.ndarray) -> str:
         step.joints, np.tile(plan.joints[-1], (len(step.joints), 1))
     ):
         return "a step moves the rigid robot, or has values that are not finite"
-    at_once = float(np.linalg.norm(step.commands - step.commands[0], axis=1).max())
+    if off := float(np.linalg.norm(step.commands[0] - here)):
+        return f"a step begins {1e3 * off:.3g} mm from the commands as they are"
+    at_once = float(np.linalg.norm(step.commands - here, axis=1).max())
     if at_once > bounds.longest + ROUNDING:
         return f"a step changes the commands by {1e3 * at_once:.1f} mm, expected at most {1e3 * bounds.longest:g} mm"
     in_all, most = float(np.linalg.norm(step.commands - begin, axis=1).max()), bounds.steps * bounds.longest

@@ -9,7 +9,8 @@ u being pulls over the largest that was recorded, longer tendons counting as non
 So the residual grows with the pulls, as models that were fitted to an arm at rest leave it. Poses add noise. The five
 numbers are those of the largest posterior density, under log-normal priors of wide spread. Near where an arm snaps from
 one shape to another, or where it had not come to rest, a pose tells nothing of its neighbours: what is missed by more
-than `FAR` times the usual where it is left out has as much more noise (Huber 1964), and the numbers are sought anew.
+than `FAR` times the usual where it is left out has as much more noise, and the numbers are sought anew. Poses that were
+recorded several times count once, with their mean.
 
 How far off it still is, poses say that are left out one by one: `trunkline/report/certificate` makes a radius of that.
 """
@@ -29,7 +30,8 @@ from trunkline.model.statics.equilibria import Equilibrium
 # s and the noise as shares of the arm's length, a, b, d: where their priors have the middle, and how far these spread
 MIDDLE = np.array([0.008, 0.001, 0.5, 1.0, 0.3])
 SPREAD = np.array([1.0, 0.7, 0.7, 0.7, 0.7])
-FEWEST = 15  # poses, below which there is no map
+FEWEST = 15  # different poses, below which there is no map
+SAME_PULL, SAME_GRAVITY = 2e-3, 0.5  # m of each motor, and m/s², up to which poses are one that was repeated
 TABLE = ("pulls", "gravity", "residuals", "noisier", "numbers")
 FAR, USUAL, ROUNDS = 2.5, 1.538, 3  # deviations; of a vector's length its median over a coordinate's deviation
 WORTH = 0.9  # of the errors without the map: poses that are left out have to be so much nearer with it
@@ -53,6 +55,18 @@ class RestingPoses:
 
     def __len__(self) -> int:
         return len(self.pulls)
+
+    def repeats(self) -> list[np.ndarray]:
+        """The rows of each pose, those that were recorded several times together."""
+        left, groups = np.arange(len(self)), []
+        while len(left):
+            first = left[0]
+            pulls = np.abs(np.maximum(self.pulls[left], 0) - np.maximum(self.pulls[first], 0)).max(axis=1, initial=0)
+            apart = np.linalg.norm(self.gravity[left] - self.gravity[first], axis=1)
+            same = (pulls <= SAME_PULL) & (apart <= SAME_GRAVITY)
+            groups.append(left[same])
+            left = left[~same]
+        return groups
 
     def __getitem__(self, rows) -> "RestingPoses":
         return RestingPoses(self.pulls[rows], self.gravity[rows])
@@ -116,6 +130,20 @@ class ResidualMap:
         """Whether poses that are left out are nearer with the map than without, in the median."""
         errors = self.errors_mm()
         return errors["left_out"] <= WORTH * errors["twin"]
+
+    def unknown(self, poses: RestingPoses) -> np.ndarray:
+        """Share of a residual's variance that is left there, from 0, where poses tell all, to 1, where they tell
+        nothing and the tip is the twin's. Shape (M,)."""
+        weight, scale = self._weight(poses), self.numbers[0]
+        across = scale**2 * weight[:, None] * self._weight(self.poses) * self._alike(poses)
+        explained = np.einsum("mn,nm->m", across, np.linalg.solve(self._noisy(), across.T))
+        return np.clip(1 - explained / (scale * weight) ** 2, 0, 1)
+
+    def unknown_left_out(self) -> np.ndarray:
+        """`unknown` of each pose where all others alone are learnt from. Shape (N,)."""
+        noise = (self.numbers[1] * self.noisier) ** 2
+        variance = 1 / np.diag(np.linalg.inv(self._noisy())) - noise
+        return np.clip(variance / (self.numbers[0] * self._weight(self.poses)) ** 2, 0, 1)
 
     def errors_mm(self) -> dict:
         """How many poses there are, and the median of how far the tip is from the twin's, mm, as it is ("twin") and

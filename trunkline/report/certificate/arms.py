@@ -2,7 +2,7 @@
 
 import copy
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -53,7 +53,10 @@ class StaticArm:
         return learnt.mean(self.resting(poses)) @ self.turn.T
 
     def resting(self, poses: StaticPoses) -> RestingPoses:
-        return RestingPoses.of(self.chain, self.rest(poses), poses.gravity @ self.turn)
+        """In its mount's frame, pulls NaN where it finds no rest."""
+        rest = self.rest(poses)
+        resting = RestingPoses.of(self.chain, rest, poses.gravity @ self.turn)
+        return replace(resting, pulls=np.where(rest.converged[:, None], resting.pulls, np.nan))
 
     def placed(self, equilibrium: Equilibrium) -> np.ndarray:
         tips = np.where(equilibrium.converged[:, None], equilibrium.position, np.nan)

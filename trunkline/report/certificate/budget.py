@@ -8,7 +8,8 @@ of all inputs at once, through the twin (JCGM 101; a sphere is its region of cov
 percentile of the tip's distance from the estimate.
 
 With a residual map, what parameters and friction do to the tip is in the poses that it is learnt from, and so in how
-far these are missed when they are left out: nothing else but the cameras' noise then counts beside that.
+far these are missed when they are left out. Where the map knows nothing, the tip is the twin's and so is its
+uncertainty; in between, both count by the shares of the variance that the map leaves and explains.
 """
 
 from dataclasses import dataclass
@@ -84,6 +85,7 @@ class Inputs:
         lacking: what the model lacks; None where no held-out trial tells it.
         noise: of the cameras' tip, standard uncertainty of each coordinate, m.
         residual_map: by how far the tip rests beside the twin's, where recorded poses tell.
+        left: what the residual map lacks, None without one.
     """
 
     model: mujoco.MjModel
@@ -91,21 +93,25 @@ class Inputs:
     lacking: Discrepancy | None
     noise: float
     residual_map: ResidualMap | None = None
+    left: Discrepancy | None = None
 
 
 def held_out(
     model: mujoco.MjModel, parameters: Posterior, noise: float, poses: StaticPoses, residuals: np.ndarray, arms: int,
-    rng: np.random.Generator, mapped: bool = False,
+    rng: np.random.Generator,
 ) -> Discrepancy:
     """What the model lacks, from how far the tips of held-out poses are from the twin's, m (N,), beside what `arms`
-    draws of the parameters make of them; of a residual map (`mapped`), all that it lacks."""
+    draws of the parameters make of them."""
     arm = arm_of(model)
-    if mapped:
-        ways = arm.ways(poses)
-        return holding(discrepancy(residuals, ways, np.full(len(poses), 3 * noise**2)), residuals, ways, COVERAGE)
     shifts = parameter_shifts(model, parameters, arm, poses, arms, rng)
     others = 3 * noise**2 + (arm.friction(poses) ** 2).sum(axis=1) / 3 + np.nanmean((shifts**2).sum(axis=2), axis=0)
     return discrepancy(residuals, arm.ways(poses), others)
+
+
+def left_by_map(arm: StaticArm, noise: float, poses: StaticPoses, missed: np.ndarray) -> Discrepancy:
+    """What a residual map lacks, from how far it misses the tips of poses that are left out, m (N,)."""
+    ways = arm.ways(poses)
+    return holding(discrepancy(missed, ways, np.full(len(poses), 3 * noise**2)), missed, ways, COVERAGE)
 
 
 def parameter_shifts(
@@ -139,27 +145,29 @@ def budget(inputs: Inputs, poses: StaticPoses, arms: int, each: int, rng: np.ran
     arm, parameters = arm_of(inputs.model), inputs.parameters
     tips = arm.tips(poses) + arm.shift(inputs.residual_map, poses)
     friction, ways = arm.friction(poses), arm.ways(poses)
-    if inputs.residual_map is not None:
-        parameters, friction = Posterior.from_tables({}), np.zeros_like(friction)
-    moves = sensitivities(inputs.model, parameters, arm, poses)
-    offsets = np.tile(parameter_shifts(inputs.model, parameters, arm, poses, arms, rng), (each, 1, 1))
-    draws = arms * each
+    unknown = np.ones(len(poses)) if inputs.residual_map is None else inputs.residual_map.unknown(arm.resting(poses))
+    twin, mapped = np.sqrt(unknown), np.sqrt(1 - unknown)
+    friction, moves = friction * twin[:, None], sensitivities(inputs.model, parameters, arm, poses) * twin[:, None]
+    shifts = parameter_shifts(inputs.model, parameters, arm, poses, arms, rng) * twin[:, None]
+    offsets, draws = np.tile(shifts, (each, 1, 1)), arms * each
     offsets = offsets + rng.uniform(-1, 1, (draws, len(poses), 1)) * friction
     offsets = offsets + inputs.noise * rng.standard_normal(offsets.shape)
-    if inputs.lacking:
-        offsets = offsets + inputs.lacking.offsets(ways, tips - arm.origin, draws, rng)
+    lacks = np.zeros(len(poses))  # mean square length, m²
+    for part, share in ((inputs.lacking, twin), (inputs.left, mapped)):
+        if part is not None:
+            offsets = offsets + part.offsets(ways, tips - arm.origin, draws, rng) * share[:, None]
+            lacks += (share * part.deviation(ways)) ** 2
     sources = [
         UncertaintySource(name, f"t, {degrees:.0f} degrees of freedom", deviation * parameter_named(name).scale,
                           _axis_unit(name), degrees, np.linalg.norm(move, axis=1))
         for name, deviation, degrees, move
         in zip(parameters.names, parameters.deviation, parameters.degrees, moves, strict=True)
     ]  # fmt: skip
-    if inputs.residual_map is None:
-        sources.append(UncertaintySource(FRICTION, "rectangular, between both ends of its band", 1 / np.sqrt(3),
-                       "half bands", np.inf, np.linalg.norm(friction, axis=1) / np.sqrt(3)))  # fmt: skip
+    sources.append(UncertaintySource(FRICTION, "rectangular, between both ends of its band", 1 / np.sqrt(3),
+                                     "half bands", np.inf, np.linalg.norm(friction, axis=1) / np.sqrt(3)))  # fmt: skip
     if inputs.lacking:
         sources.append(UncertaintySource(LACKING, f"from {inputs.lacking.trials} held-out trials at rest", None, "mm",
-                           inputs.lacking.trials, inputs.lacking.deviation(ways)))  # fmt: skip
+                           inputs.lacking.trials, np.sqrt(lacks)))  # fmt: skip
     every = np.full(len(poses), np.sqrt(3) * inputs.noise)
     sources.append(UncertaintySource(NOISE, "normal, of each coordinate", inputs.noise * 1e3, "mm", np.inf, every))
     both = np.einsum("ink,jnk,ij->n", moves, moves, parameters.correlation - np.eye(len(parameters.names)))

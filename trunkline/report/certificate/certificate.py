@@ -20,7 +20,7 @@ from trunkline.recordings.trials.inventory import missing_lines, recorded_of_eac
 from trunkline.recordings.trials.splits import DECIDING, VALIDATE
 from trunkline.recordings.trials.trial import Trial, sessions_of
 from trunkline.report.certificate.arms import arm_of
-from trunkline.report.certificate.budget import Budget, Inputs, budget, held_out, sure_pulls
+from trunkline.report.certificate.budget import Budget, Inputs, budget, held_out, left_by_map, sure_pulls
 from trunkline.report.certificate.coverage import Bring, covered
 from trunkline.report.certificate.facts import error_rows, parameter_facts, uncertainty_facts
 from trunkline.report.certificate.held_out import at_rest, learnt_from, tip_residuals
@@ -141,7 +141,7 @@ def certify(
         uncertainty["sure_pulls_mm"] = 1e3 * sure
         lacking = Lacking(
             twin.provenance.digest, inputs.lacking, **vars(conditions), sure_pulls=sure,
-            residual_map=inputs.residual_map,
+            residual_map=inputs.residual_map, left=inputs.left,
         )
     return Certificate(facts, numbers, replays, held_out_shapes(prediction), tip_budget, lacking)
 
@@ -157,9 +157,11 @@ def inputs_of(twin: Twin, trials: list[Trial], ingested: dict, arms: int, rng: n
         return Inputs(model, parameters, None, noise)
     poses, residuals = posed(rested, model)[usable], residuals[usable]
     learnt, missed = learnt_from(model, poses, residuals)
-    lengths, mapped = np.linalg.norm(missed, axis=1), learnt is not None
-    lacking = held_out(model, parameters, noise, poses, lengths, arms, rng, mapped)
-    return Inputs(model, parameters, lacking, noise, learnt)
+    lacking = held_out(model, parameters, noise, poses, np.linalg.norm(residuals, axis=1), arms, rng)
+    if learnt is None:
+        return Inputs(model, parameters, lacking, noise)
+    left = left_by_map(arm_of(model), noise, poses, np.linalg.norm(missed, axis=1))
+    return Inputs(model, parameters, lacking, noise, learnt, left)
 
 
 def check_fitted(tables: dict[str, dict], trials: list[Trial]) -> None:

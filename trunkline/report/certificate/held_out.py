@@ -5,14 +5,14 @@ import numpy as np
 
 from trunkline.identification.evaluation.evaluation import marker_positions
 from trunkline.identification.parameters.per_session import model_in
-from trunkline.kinematics.residual.residual_map import FEWEST, ResidualMap
+from trunkline.kinematics.residual.residual_map import FEWEST, ResidualMap, RestingPoses
 from trunkline.recordings.trials.experiments import is_static
 from trunkline.recordings.trials.splits import VALIDATE
 from trunkline.recordings.trials.trial import Trial, sessions_of
 from trunkline.report.certificate.arms import arm_of
 from trunkline.report.certificate.poses import StaticPoses, posed
 
-MOST = 300  # poses that a map is learnt from, evenly taken: its network has a column for each
+MOST = 300  # different poses that a map is learnt from, evenly taken: its network has a column for each
 
 
 def at_rest(trials: list[Trial]) -> list[Trial]:
@@ -40,19 +40,27 @@ def learnt_from(
     model: mujoco.MjModel, poses: StaticPoses, residuals: np.ndarray
 ) -> tuple[ResidualMap | None, np.ndarray]:
     """What held-out trials tell of by how far the tip rests beside the twin's, and by how much each is missed with
-    that learnt from the others alone, m (N, 3). None, and the residuals, where the trials are too few, or no nearer
-    with it.
+    that learnt from other poses alone, m (N, 3). None, and the residuals, where there are too few different poses, or
+    the tip is no nearer with it.
 
     Args:
         residuals: as `tip_residuals` has them, finite ones. Shape (N, 3).
     """
-    if len(poses) < FEWEST:
-        return None, residuals
-    few, arm = np.linspace(0, len(poses) - 1, min(len(poses), MOST)).round().astype(int), arm_of(model)
+    arm = arm_of(model)
     resting = arm.resting(poses)
-    learnt = ResidualMap.fit(resting[few], residuals[few], arm.chain.length)
+    rested = np.flatnonzero(np.isfinite(resting.pulls).all(axis=1))
+    groups = [rested[rows] for rows in resting[rested].repeats()]
+    if len(groups) < FEWEST:
+        return None, residuals
+    few = [groups[i] for i in np.linspace(0, len(groups) - 1, min(len(groups), MOST)).round().astype(int)]
+    different = RestingPoses(*(np.array([part[rows].mean(axis=0) for rows in few])
+                               for part in (resting.pulls, resting.gravity)))  # fmt: skip
+    means = np.array([residuals[rows].mean(axis=0) for rows in few])
+    learnt = ResidualMap.fit(different, means, arm.chain.length)
     if not learnt.is_worth_it:
         return None, residuals
-    missed = residuals - learnt.mean(resting)
-    missed[few] = learnt.left_out()
+    missed = residuals.copy()
+    missed[rested] -= learnt.mean(resting[rested])
+    for rows, mean, left_out in zip(few, means, learnt.left_out(), strict=True):
+        missed[rows] = residuals[rows] - mean + left_out
     return learnt, missed
