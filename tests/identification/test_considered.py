@@ -144,10 +144,10 @@ def test_markers_move_one_by_one_and_the_base_all_at_once():
     last = problem.markers[-1]
     shifted = [replace(e, positions=e.positions.copy()) for e in problem.experiments]
     exact = model.__copy__()
-    exact.site_pos[exact.site(f"{last}_center").id, 0] += 1e-3
+    exact.site_pos[exact.site(f"{last}_center").id, 1] += 1e-3
     blocks = replace(problem, model=exact).residuals(problem.start()[None])
     columns = [(after[0] - before)[:, None] for after, before in zip(blocks, linear.residuals, strict=True)]
-    np.testing.assert_allclose(moves["marker_place", f"{last} x"], linear.answers(columns)[0], rtol=1e-6)
+    np.testing.assert_allclose(moves["marker_place", f"{last} y"], linear.answers(columns)[0], rtol=1e-6)
     for experiment in shifted:
         experiment.positions[...] += np.array([0, 1e-3, 0])
     blocks = replace(problem, experiments=shifted).residuals(problem.start()[None])

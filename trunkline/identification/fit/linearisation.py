@@ -42,8 +42,8 @@ class Linearisation:
         sensitivity -(Σ JᵀJ + prior)⁻¹ Σ JᵀJ_c of consider parameters (Bierman 1977, VIII). Shape (C, P)."""
         normal = self.normals().sum(axis=0) + (0 if self.prior is None else np.diag(self.prior**2))
         scale = 1 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
-        scores = sum(j.T @ columns for j, columns in zip(self.jacobians, changes, strict=True))
-        return -scores.T @ (np.linalg.pinv(normal * np.outer(scale, scale), hermitian=True) * np.outer(scale, scale))
+        scores = np.sum([columns.T @ j for j, columns in zip(self.jacobians, changes, strict=True)], axis=0)
+        return -scores @ (np.linalg.pinv(normal * np.outer(scale, scale), hermitian=True) * np.outer(scale, scale))
 
 
 def linearise(problem: Problem, vector: np.ndarray, residuals: list[np.ndarray] | None = None) -> Linearisation:

@@ -95,7 +95,7 @@ class Problem:
             model, values_in(session, values), {name: blocks[:, i] for i, name in enumerate(self.per_joint)}
         )
         for name in sorted({name for change in changes for name in change.fields} - fields.keys()):
-            if model.ntendon or not name.startswith("tendon_"):
+            if self.model.ntendon or not name.startswith("tendon_"):
                 fields[name] = np.repeat(np.array(getattr(model, name))[None], len(vectors), axis=0)
         for candidate, change in enumerate(changes):
             change.write(fields, candidate, model)
