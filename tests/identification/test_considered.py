@@ -13,9 +13,11 @@ from trunkline.identification.fit.intervals import certainty
 from trunkline.identification.fit.linearisation import Linearisation, linearise
 from trunkline.identification.fit.problem import Bounds, Problem
 from trunkline.identification.fit.search import descend
+from trunkline.identification.parameters.joints import unit_ends
 from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.identification.parameters.tolerances import WAVES, Tolerances, changes, waves
 from trunkline.identification.simulate.experiment import prepare
+from trunkline.model.arm_model import ArmModel
 
 TRIALS, ROWS = 12, 5
 LINE = {"stiffness": Bounds(0.2, 20.0)}
@@ -190,3 +192,60 @@ def test_nothing_is_considered_where_nothing_is_asked_for():
     ]  # fmt: skip
     assert considered(problem, at_truth(problem), Tolerances(), []) == {}
     assert changes(model, Tolerances(hole_place=1e-4, gain=0.1), moving=False, pulled=False) == []
+
+
+def changed_fields(source: str, size: float) -> tuple[mujoco.MjModel, list[dict[str, np.ndarray]]]:
+    """A model, and its fields after each of the changes of a source."""
+    model = small_model()
+    problem = problem_of(tilts(model), model, LINE)
+    listed = changes(model, Tolerances(**{source: size}), moving=True, pulled=True)
+    assert {change.source for change in listed} == {source}
+    return model, [problem.fields(problem.start()[None], changes=[change]) for change in listed]
+
+
+def test_thicker_cores_are_stiffer_by_the_fourth_power_of_their_diameter():
+    model, [fields] = changed_fields("diameter", 0.01)
+    hinges = model.nq
+    thickness = np.cbrt(model.jnt_stiffness[:hinges] / model.jnt_stiffness[0])
+    grown = (thickness + 0.01) / thickness
+    np.testing.assert_allclose(fields["jnt_stiffness"][0, :hinges] / model.jnt_stiffness[:hinges], grown**4, rtol=2e-2)
+
+
+def test_an_oval_section_is_stiffer_to_one_side_and_softer_to_the_other():
+    model, [fields] = changed_fields("ovality", 0.03)
+    about_x = np.abs(model.jnt_axis[:, 0]) > 0.5
+    ratios = fields["jnt_stiffness"][0] / model.jnt_stiffness
+    np.testing.assert_allclose(ratios[about_x], 1.03)
+    np.testing.assert_allclose(ratios[~about_x], 0.97)
+
+
+def test_units_that_end_aside_bend_by_that_over_their_length():
+    model, every = changed_fields("unit_end", 1e-4)
+    lengths = np.linalg.norm(unit_ends(model), axis=1)
+    squares = sum(np.square(fields["qpos_spring"][0] - model.qpos_spring) for fields in every)
+    assert len(every) == 2 * WAVES  # with as many waves as units, they add up to independent scatter
+    np.testing.assert_allclose(np.sqrt(squares), 1e-4 / lengths, rtol=1e-9)
+
+
+def test_holes_move_out_and_round_as_far_and_motors_differ():
+    model, every = changed_fields("hole_place", 2e-4)
+    arm = ArmModel(model)
+    for cable in range(model.nu):
+        sites = arm.cable_sites(arm.cables[cable])
+        place = model.site_pos[sites, :2]
+        out, aside = (fields["site_pos"][0, sites, :2] - place for fields in every[2 * cable : 2 * cable + 2])
+        np.testing.assert_allclose(np.sum(out * place, axis=1), 2e-4 * np.linalg.norm(place, axis=1))
+        np.testing.assert_allclose(np.linalg.norm(aside, axis=1), 2e-4)
+        np.testing.assert_allclose(np.sum(aside * place, axis=1), 0, atol=1e-12)
+    model, every = changed_fields("gain", 0.05)
+    gains = [fields["actuator_gainprm"][0, :, 0] / model.actuator_gainprm[:, 0] for fields in every]
+    np.testing.assert_allclose(gains, [[1, 1.05, 1], [1, 1, 1.05]])
+    biases = [fields["actuator_biasprm"][0, :, 1] / model.actuator_biasprm[:, 1] for fields in every]
+    np.testing.assert_allclose(biases, gains)
+
+
+def test_joints_lie_further_along_towards_the_tip():
+    model, [fields] = changed_fields("place_taper", 0.03)
+    ends = unit_ends(model)
+    moved = np.sum((fields["jnt_pos"][0] - model.jnt_pos) * ends, axis=1) / np.sum(ends**2, axis=1)
+    np.testing.assert_allclose(moved[::2], np.linspace(-0.03, 0.03, len(moved) // 2), atol=1e-12)
