@@ -16,6 +16,7 @@ from trunkline.identification.fit.optimizers import DifferentialEvolution, Least
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.settings import IdentificationSettings
 from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.parameters.tolerances import Tolerances
 from trunkline.identification.simulate.loss import Loss
 from trunkline.pipeline.identify import CAD_MODEL, read_reported, run
 from trunkline.recordings.trials.splits import DECIDING
@@ -191,3 +192,28 @@ def test_tendon_parameters_of_an_arm_without_tendons_are_refused(project):
     config = settings(["release"], ["release"], {"damping": (0.01, 1.0), "tendon_friction": (0.1, 1.0)})
     with pytest.raises(InputError, match="identify_damping.parameters.tendon_friction: found it for an arm without"):
         run("identify_damping", config, root / "artifacts/build_mjcf/arm.xml")
+
+
+def test_what_is_considered_widens_intervals_from_stage_to_stage(project):
+    root, model, write = project
+    middle, damper = (PARAMETERS[name].read(model) for name in ("stiffness", "damping"))
+    trials = [tilt(model, angle, noise=1e-4) for angle in (30, 60, 90)] + [tilt(model, 75, "validate")]
+    write([*trials, *(release(model, bend, split, frames=60)
+                      for bend, split in ((0.3, "identify"), (-0.2, "identify"), (0.25, "validate")))])  # fmt: skip
+    sizes = Tolerances(mass=0.03, tendon_friction=0.1)
+    ranges = {"stiffness": (0.5 * middle, 2 * middle)}
+    run("identify_stiffness", settings(["static_tilt"], ["static_tilt"], ranges, considered=sizes), CAD_MODEL)
+    config = settings(["release"], ["release"], {"damping": (0.2 * damper, 5 * damper)}, considered=sizes)
+    run("identify_damping", config, root / "artifacts/identify_stiffness/arm.xml")
+    files = [root / f"artifacts/identify_{stage}/parameters.json" for stage in ("stiffness", "damping")]
+    first, second = (json.loads(file.read_text()) for file in files)
+    assert first["considered"]["mass"][""]["stiffness"] == pytest.approx(np.log(1.03), rel=0.02)
+    assert first["considered"].keys() == {"mass"}
+    assert second["considered"].keys() == {"mass", "earlier"}
+    row = first["parameters"]["stiffness"]
+    half = np.diff(np.log(row["interval_95_given_model"]))[0] / 2
+    wide = np.sqrt(half**2 + (1.96 * np.log(1.03)) ** 2)
+    np.testing.assert_allclose(np.log(row["interval_95"]), np.log(row["value"]) + np.array([-wide, wide]), rtol=0.03)
+    low, high = second["parameters"]["damping"]["interval_95"]
+    narrow = second["parameters"]["damping"]["interval_95_given_model"]
+    assert low < narrow[0] < narrow[1] < high

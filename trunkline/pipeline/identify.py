@@ -13,6 +13,7 @@ from trunkline.identification.evaluation.baselines import references
 from trunkline.identification.evaluation.error_tables import TABLED, trial_table
 from trunkline.identification.evaluation.evaluation import Prediction, halved_step, replay
 from trunkline.identification.evaluation.repeatability import repeatability
+from trunkline.identification.fit.considered import Earlier
 from trunkline.identification.fit.fit import Fit
 from trunkline.identification.fit.identify import Identification, identify, with_parameters
 from trunkline.identification.fit.problem import Bounds
@@ -25,7 +26,7 @@ from trunkline.identification.results.parameter_table import parameter_table, un
 from trunkline.identification.results.scoring import Compared, fingerprints, predict, start_fit
 from trunkline.identification.simulate.checks import check_trials
 from trunkline.identification.simulate.experiment import Experiment
-from trunkline.identification.stages import MODEL, TABLE, read_table
+from trunkline.identification.stages import MODEL, STAGES, TABLE, read_table, read_tables
 from trunkline.model.arm_model import BACKLASH, CAPSTAN_FRICTION, RATE_LIMIT, ArmModel
 from trunkline.model_files import read_spec
 from trunkline.pipeline.stage import output_folder, write_json, write_metrics
@@ -94,6 +95,9 @@ def load(stage: str, config: IdentificationSettings, model_path: Path) -> FitInp
     # of an arm with tendons also the trials of later stages: a wrong name is an error now, not after minutes
     check_trials(every if model.nu else reported, model)
     model, experiments, settings = set_up(config, reported, model)
+    if model_path != CAD_MODEL and not config.considered.none:
+        before = read_tables(ARTIFACTS, STAGES[: STAGES.index(stage)])
+        settings.earlier = [Earlier.from_table(name, table) for name, table in before.items()]
     inputs = FitInputs(spec, model, model_path == CAD_MODEL, config, reported, experiments, settings)
     folds, most = config.cross_validation_folds, sum(e.split == IDENTIFY for e in inputs.fitted)
     if folds > most:

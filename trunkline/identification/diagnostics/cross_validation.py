@@ -9,6 +9,7 @@ from trunkline.identification.evaluation.evaluation import Prediction, replay
 from trunkline.identification.fit.fit import Fit
 from trunkline.identification.fit.identify import Identification, identify
 from trunkline.identification.fit.optimizers import LeastSquares
+from trunkline.identification.parameters.tolerances import Tolerances
 from trunkline.identification.simulate.experiment import Experiment
 from trunkline.recordings.trials.splits import IDENTIFY
 
@@ -35,7 +36,7 @@ def errors_left_out(
         left_out = fitted[fold::folds]
         others = [e for i, e in enumerate(fitted) if i % folds != fold]
         title = f"{label} fold {fold + 1} of {folds}"
-        refit = identify(title, result.models["coarse"], others, replace(fit, method=near))
+        refit = identify(title, result.models["coarse"], others, replace(fit, method=near, considered=Tolerances()))
         models = {name: refit.models[name] for name in ("coarse", "identified")}
         replays = {name: replay(model, left_out, fit.markers) for name, model in models.items()}
         tables.append(trial_table({name: Prediction(replayed, left_out) for name, replayed in replays.items()}))

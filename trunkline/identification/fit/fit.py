@@ -1,13 +1,15 @@
 """What is fitted to trials, and how."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
 import mujoco
 from pydantic import Field
 
+from trunkline.identification.fit.considered import Earlier
 from trunkline.identification.fit.optimizers import Optimizer
 from trunkline.identification.fit.problem import Bounds, Problem
+from trunkline.identification.parameters.tolerances import Tolerances
 from trunkline.identification.simulate.experiment import Experiment
 from trunkline.identification.simulate.loss import LossWeights
 from trunkline.identification.simulate.resting import RestShape
@@ -58,6 +60,7 @@ class Fit:
     per_joint: what then gets a factor for each joint, "stiffness" or "damping".
     loss: "distances" (the paper's) or "positions".
     rest: the shape in which the arm hangs, whatever its stiffness; None where it is as the model says.
+    considered: what the model fixes, and by how much it may be off. earlier: what the stages before identified.
     """
 
     markers: tuple[str, ...]
@@ -67,6 +70,8 @@ class Fit:
     weights: LossWeights
     method: Method
     rest: RestShape | None = None
+    considered: Tolerances = field(default_factory=Tolerances)
+    earlier: list[Earlier] = field(default_factory=list)
 
     def problem(self, model: mujoco.MjModel, experiments: list[Experiment], step_factor: float = 1.0) -> Problem:
         """The search for the scalars, from those of `model`."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from trunkline.compute.progress import progress
 from trunkline.identification.evaluation.evaluation import marker_positions
+from trunkline.identification.fit.considered import Moves, considered
 from trunkline.identification.fit.fit import Fit, Refinement
 from trunkline.identification.fit.influence import Influence, influence
 from trunkline.identification.fit.intervals import Certainty, bootstrap, certainty
@@ -37,6 +38,7 @@ class Identification:
     certainty: of the scalars, on the axes of the search, before joints got factors. bootstrap: their 95 % intervals
         by resampling trials, lowest and highest z, shape (2, P).
     factor_certainty: of all factors, given the scalars; None without factors.
+    considered: how far the scalars move with what the model fixes, on the axes of the search; empty if nothing is.
     influence: of every trial on every scalar.
     at_bound: names of what ended on a bound.
     converged: which searches stopped for that reason; the coarse one, if its starts agree too.
@@ -49,6 +51,7 @@ class Identification:
     certainty: Certainty
     bootstrap: np.ndarray
     factor_certainty: Certainty | None
+    considered: Moves
     influence: Influence
     at_bound: list[str]
     converged: dict[str, bool]
@@ -91,6 +94,7 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
     coarse = with_parameters(model, values, rest=rest)
     at_bound = _at_bound(parameters, result.vector, *exact.bounds())
     linear = linearise(exact, result.vector, result.residuals)
+    moves = {} if fit.considered.none else considered(exact, linear, fit.considered, fit.earlier)
 
     factors: dict[str, np.ndarray] = {}
     factor_certainty = None
@@ -115,6 +119,7 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
         certainty=certainty(linear, around=around),
         bootstrap=bootstrap(linear, method.seed, around),
         factor_certainty=factor_certainty,
+        considered=moves,
         influence=influence(around, [e.name for e in fitted], list(parameters)),
         at_bound=at_bound,
         converged={name: search.converged for name, search in searches.items()},

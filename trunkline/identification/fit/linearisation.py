@@ -37,6 +37,14 @@ class Linearisation:
         weighted = (np.einsum("bt,tpq->bpq", weights, normals) + prior) * scaling
         return -np.einsum("bpq,bq->bp", np.linalg.pinv(weighted, hermitian=True) * scaling, weights @ scores)
 
+    def answers(self, changes: list[np.ndarray]) -> np.ndarray:
+        """By how much the minimum moves when every trial's residuals change by columns (R, C), to first order: the
+        sensitivity -(Σ JᵀJ + prior)⁻¹ Σ JᵀJ_c of consider parameters (Bierman 1977, VIII). Shape (C, P)."""
+        normal = self.normals().sum(axis=0) + (0 if self.prior is None else np.diag(self.prior**2))
+        scale = 1 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
+        scores = np.sum([columns.T @ j for j, columns in zip(self.jacobians, changes, strict=True)], axis=0)
+        return -scores @ (np.linalg.pinv(normal * np.outer(scale, scale), hermitian=True) * np.outer(scale, scale))
+
 
 def linearise(problem: Problem, vector: np.ndarray, residuals: list[np.ndarray] | None = None) -> Linearisation:
     """Derivatives of all residuals by differences towards the inside of the bounds, all columns in one batch.

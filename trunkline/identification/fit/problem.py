@@ -1,6 +1,7 @@
 """What is searched for: parameters with bounds, a model, experiments and a loss; candidates in, losses out."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated
@@ -11,8 +12,10 @@ from pydantic import Field
 
 from trunkline.identification.parameters.parameters import candidate_fields, parameter_named
 from trunkline.identification.parameters.per_session import values_in
+from trunkline.identification.parameters.tolerances import Perturbation
 from trunkline.identification.simulate.experiment import Experiment, weights_for
 from trunkline.identification.simulate.loss import LOSSES, LossWeights, loss_of
+from trunkline.identification.simulate.population import Simulated
 from trunkline.identification.simulate.resting import RestShape, hang_in
 from trunkline.identification.simulate.simulated_sessions import Sessions
 from trunkline.model.arm_model import ArmModel
@@ -76,16 +79,26 @@ class Problem:
         return rubbing and any(not is_static(e.kind) and not e.slack(self.model) for e in self.experiments)
 
     def fields(
-        self, vectors: np.ndarray, session: str = "", model: mujoco.MjModel | None = None
+        self,
+        vectors: np.ndarray,
+        session: str = "",
+        model: mujoco.MjModel | None = None,
+        changes: Sequence[Perturbation] = (),
     ) -> dict[str, np.ndarray]:
-        """Model fields of candidates (C, P), of a session and the model as it was in that, or of the whole."""
-        model = model or self.model
+        """Model fields of candidates (C, P), of a session and the model as it was in that, or of the whole; `changes`,
+        if there are any, one a candidate."""
+        model = self.model if model is None else model
         scalars = len(self.parameters)
         values = {name: parameter_named(name).value(vectors[:, i]) for i, name in enumerate(self.parameters)}
         blocks = vectors[:, scalars:].reshape(len(vectors), len(self.per_joint), self.units)
         fields = candidate_fields(
             model, values_in(session, values), {name: blocks[:, i] for i, name in enumerate(self.per_joint)}
         )
+        for name in sorted({name for change in changes for name in change.fields} - fields.keys()):
+            if self.model.ntendon or not name.startswith("tendon_"):
+                fields[name] = np.repeat(np.array(getattr(model, name))[None], len(vectors), axis=0)
+        for candidate, change in enumerate(changes):
+            change.write(fields, candidate, model)
         if self.rest is not None:
             hang_in(fields, model, self.rest)
         return fields
@@ -98,25 +111,43 @@ class Problem:
             rough: as `batch_of` has it. Never where residuals are subtracted, as for derivatives: 32-bit floats leave
                 too little of such differences.
         """
+        simulated = self.simulate(vectors, near, rough)
+        blocks = self.compare(simulated.positions)
+        for block in blocks:
+            # a diverged candidate: every residual the same, and in sum the penalty
+            block[simulated.diverged] = np.sqrt(2 * DIVERGED_LOSS / len(self.experiments) / block.shape[1])
+        return blocks
+
+    def simulate(
+        self,
+        vectors: np.ndarray,
+        near: np.ndarray | None = None,
+        rough: bool = False,
+        changes: Sequence[Perturbation] = (),
+    ) -> Simulated:
+        """Candidates (C, P) in every trial. Args as `residuals`; changes: of the model, one a candidate."""
         rests = None if near is None or not any(is_static(e.kind) for e in self.experiments) else self._rests_at(near)
         begun = time.perf_counter()
-        simulated = self._sessions.simulate(partial(self.fields, vectors), rests, rough)
-        if len(vectors) == 1:
+        fields = partial(self.fields, vectors, changes=changes)
+        simulated = self._sessions.simulate(fields, rests, rough)
+        if len(vectors) == 1 and not changes:
             self._last = vectors[0].copy(), simulated.rests
         self.seconds += time.perf_counter() - begun
         self.evaluations += len(vectors)
         self.diverged += int(simulated.diverged.sum())
         self.steps += simulated.steps
-        shares = np.sqrt(self.trial_weights / len(self.experiments))
-        blocks = []
-        for positions, experiment, share in zip(simulated.positions, self.experiments, shares, strict=True):
+        return simulated
+
+    def compare(self, positions: list[np.ndarray]) -> list[np.ndarray]:
+        """Residuals per trial, as `residuals`, of candidates that have the markers at `positions`, each (C, T, S, 3) m;
+        not finite where those are not."""
+        shares, blocks = np.sqrt(self.trial_weights / len(self.experiments)), []
+        for places, experiment, share in zip(positions, self.experiments, shares, strict=True):
             with np.errstate(invalid="ignore", over="ignore"):
-                block = share * LOSSES[self.loss](
-                    positions, experiment.positions, experiment.measured, weights_for(experiment, self.weights)
+                block = LOSSES[self.loss](
+                    places, experiment.positions, experiment.measured, weights_for(experiment, self.weights)
                 )
-            # a diverged candidate: every residual the same, and in sum the penalty
-            block[simulated.diverged] = np.sqrt(2 * DIVERGED_LOSS / len(self.experiments) / block.shape[1])
-            blocks.append(block)
+            blocks.append(share * block)
         return blocks
 
     def _rests_at(self, vector: np.ndarray) -> list[np.ndarray]:

@@ -1,5 +1,6 @@
 """What the three identification stages are set by: the method, and what is fitted to which trials."""
 
+from dataclasses import field
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -7,6 +8,7 @@ from pydantic import Field
 from trunkline.identification.fit.fit import Method
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.parameters.parameters import ParameterName, PerJointName, parameter_named
+from trunkline.identification.parameters.tolerances import Tolerances
 from trunkline.identification.simulate.loss import Loss
 from trunkline.recordings.trials.experiments import EXPERIMENTS, ExperimentName
 from trunkline.settings import settings
@@ -22,6 +24,7 @@ class IdentificationSettings(Method):
     frames: compared of each trial, at most. command_delay: s from a logged command to the motor.
     experiments: to fit. reported: to score, those and others; of the last stage, whose model is shipped, all kinds.
     per_session: which of the parameters each of several sessions of the arm has for itself.
+    considered: what the model fixes, by how much it may be off.
     """
 
     frames: Annotated[int, Field(ge=1, le=100000)]
@@ -35,6 +38,7 @@ class IdentificationSettings(Method):
     per_joint: list[PerJointName]
     per_session: list[ParameterName] = Field(default_factory=lambda: list(MOUNT))
     cross_validation_folds: Annotated[int, Field(ge=0, le=100)]
+    considered: Tolerances = field(default_factory=Tolerances)
 
     def __post_init__(self):
         if not set(self.experiments) <= set(self.reported):

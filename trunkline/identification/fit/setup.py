@@ -64,8 +64,9 @@ def set_up(
 def fit_of(config: IdentificationSettings, markers: tuple[str, ...]) -> Fit:
     """What a stage's settings ask for, with the shape at rest that the model has."""
     return Fit(
-        markers, config.parameters, tuple(config.per_joint), config.loss.kind, weights=config.loss, method=config
-    )
+        markers, config.parameters, tuple(config.per_joint), config.loss.kind, weights=config.loss, method=config,
+        considered=config.considered,
+    )  # fmt: skip
 
 
 def with_every(config: IdentificationSettings, model: mujoco.MjModel) -> IdentificationSettings:

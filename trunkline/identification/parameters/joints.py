@@ -69,7 +69,7 @@ def section_stiffness(number: int) -> Parameter:
     return Parameter("", STIFFNESS_FIELDS, read, write, part=part)
 
 
-def _unit_ends(model: mujoco.MjModel) -> np.ndarray:
+def unit_ends(model: mujoco.MjModel) -> np.ndarray:
     """Where each hinge's unit ends, m, in the frame of the unit's body, whose origin is its upper end: in the origin of
     the next unit, or at the tip, of the arm as it was drawn. Shape (n, 3).
 
@@ -99,7 +99,7 @@ def _places(model: mujoco.MjModel, ends: np.ndarray) -> np.ndarray:
 
 def _write_place(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
     """Move every hinge along its unit, and no other way: one that lies beside the unit's line stays as far from it."""
-    ends = _unit_ends(model)
+    ends = unit_ends(model)
     moves = values[:, None] - _places(model, ends)
     fields["jnt_pos"][:, : len(ends)] += moves[..., None] * ends
 
@@ -215,7 +215,7 @@ JOINT_PARAMETERS: dict[str, Parameter] = {
     # where a unit bends, as a share of its length: 0 at its upper end, 0.5 if all along; 1 - γ, γ the characteristic
     # radius factor of pseudo-rigid-body models (L. L. Howell, Compliant Mechanisms, 2001)
     "joint_place": Parameter(
-        "", ("jnt_pos",), lambda m: float(_places(m, _unit_ends(m))[0]), _write_place, signed=True,
+        "", ("jnt_pos",), lambda m: float(_places(m, unit_ends(m))[0]), _write_place, signed=True,
         identifiable_from=_start_measured,
     ),
     "hardening": Parameter("1/rad²", STIFFNESS_FIELDS, _read_hardening, _write_hardening),

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from trunkline.identification.fit.considered import half_widths
 from trunkline.identification.fit.identify import Identification
 from trunkline.identification.fit.intervals import weakest_in_words
 from trunkline.identification.fit.problem import Bounds
@@ -16,10 +17,13 @@ def parameter_table(result: Identification, bounds: dict[str, Bounds]) -> dict:
     A value is the scalar of the scaling law; the model's joint i has that times α^{3(i-1)} times its factor.
     Intervals are given what earlier stages found, and those of factors given the scalars; they end where the range
     does. `bootstrap_95_given_model` cross-checks `interval_95_given_model` by resampling trials. "Given model": they
-    hold the truth if the model is right; what biases every trial alike shows in none of them.
+    hold the truth if the model is right; what biases every trial alike shows in none of them. `interval_95` has what
+    the model fixes beside, where it is considered, and `considered` by how much a standard deviation of each quantity
+    moves each parameter, on the axis of the search.
     """
     names, certainty = list(result.values), result.certainty
     place = {name: i for i, name in enumerate(names)}
+    wide = half_widths(certainty.half_width, result.considered)
     initial, vague = result.models["initial"], undetermined(result, bounds)
     scalars = {
         name: {
@@ -28,6 +32,11 @@ def parameter_table(result: Identification, bounds: dict[str, Bounds]) -> dict:
             "initial": parameter_named(name).read(initial),
             "interval_95_given_model": _within(
                 name, bounds, parameter_named(name).coordinate(value) + ENDS * certainty.half_width[i]
+            ),
+            **(
+                {"interval_95": _within(name, bounds, parameter_named(name).coordinate(value) + ENDS * wide[i])}
+                if result.considered
+                else {}
             ),
             "bootstrap_95_given_model": _within(name, bounds, result.bootstrap[:, i]),
             "range": [bounds[name].low, bounds[name].high],
@@ -45,10 +54,19 @@ def parameter_table(result: Identification, bounds: dict[str, Bounds]) -> dict:
         "condition": certainty.condition,
         "weakest_direction": weakest_in_words(list(result.values), certainty.weakest),
         "per_joint": _factor_table(result),
+        **({"considered": _considered_table(result)} if result.considered else {}),
         "at_bound": result.at_bound,
         "influence": result.influence.table(),
         "trial_weights": dict(zip(result.influence.trials, result.influence.weights.tolist(), strict=True)),
     }
+
+
+def _considered_table(result: Identification) -> dict:
+    """By source and label of a quantity, by how much a standard deviation of it moves each parameter."""
+    table: dict[str, dict] = {}
+    for (source, label), move in result.considered.items():
+        table.setdefault(source, {})[label] = dict(zip(result.values, move.tolist(), strict=True))
+    return table
 
 
 def undetermined(result: Identification, bounds: dict[str, Bounds]) -> list[str]:
