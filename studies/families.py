@@ -133,7 +133,7 @@ def family_table(rows: list[dict]) -> str:
     return "\n".join([
         *lines,
         *([f"Sessions that are refused, and shall not be: {', '.join(refused)}."] if refused else []),
-        f"95 % intervals of parameters, given the model, that hold the truth: {holding} of {intervals}{worst}.",
+        f"95 % intervals of parameters that hold the truth: {holding} of {intervals}{worst}.",
         f"{(every['sealed'] == 'yes').sum()} of {len(every)} arms sealed; {seconds / 60 / len(every):.0f} min an arm.",
     ])  # fmt: skip
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from trunkline.identification.evaluation.error_tables import number
-from trunkline.identification.stages import STAGES, last_stages, read_tables
+from trunkline.identification.stages import STAGES, interval_words, last_stages, read_tables, stated_interval
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.recordings.trials.splits import TEST, VALIDATE
 
@@ -91,14 +91,14 @@ def truth_table(root: Path) -> str:
     """
     truth, rows = _json(root / TRUTH), identified(root)
     lines = [
-        "| parameter | truth | expected | found | 95 % interval, given the model | holds it | the model lacks |",
+        f"| parameter | truth | expected | found | {interval_words(rows.values())} | holds it | the model lacks |",
         "|---|---:|---:|---:|---:|---|---|",
     ]
     for name, row in rows.items():
         expected = expectation(truth, name)
         unit = f", {row['unit']}" if row["unit"] else ""
         cells = [f"`{name}`{unit}", _number(truth.get("parameters", {}).get(name)), _number(expected)]
-        low, high = row.get("interval_95_given_model", (None, None))
+        low, high = stated_interval(row) or (None, None)
         interval = "undetermined" if row["undetermined"] else f"{_number(low)} … {_number(high)}"
         verdict = {True: "yes", False: "**no**", None: ""}[holds(row, expected)]
         effects = [effect for effect in LACKING.get(truth.get("plant", ""), ()) if name in effect.on]
@@ -122,7 +122,7 @@ def expectation(truth: dict, name: str) -> float | None:
 
 def holds(row: dict, expected: float | None) -> bool | None:
     """Whether a parameter's interval holds what is expected; None where one of them is not there."""
-    interval = row.get("interval_95_given_model")
+    interval = stated_interval(row)
     if row["undetermined"] or expected is None or interval is None:
         return None
     return bool(interval[0] <= expected <= interval[1])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.support.matched_plant import markers_of, release, small_model
+from trunkline.identification.fit.considered import LEVEL
 from trunkline.identification.fit.identify import BOUND_TOLERANCE, _at_bound, _factors_at_bound
 from trunkline.identification.fit.intervals import ALONE, bootstrap, certainty
 from trunkline.identification.fit.linearisation import Linearisation
@@ -58,13 +59,16 @@ def test_a_factor_at_a_bound_is_named_with_its_unit(factor, at_bound):
 
 
 @pytest.mark.parametrize(
-    ("half", "is_open"), [(0.0, False), (0.999, False), (1.0, False), (1.001, True), (np.inf, True)]
-)
-def test_what_has_an_interval_wider_than_its_range_is_open(half, is_open):
-    """A range of 2 on the axis of the search; beside a parameter that is told."""
+    ("half", "considered", "is_open"),
+    [(0.0, 0, False), (0.999, 0, False), (1.0, 0, False), (1.001, 0, True), (np.inf, 0, True), (0.8, 0.59, False),
+     (0.8, 0.61, True), (0.0, 1.01, True)],
+)  # fmt: skip
+def test_what_has_an_interval_wider_than_its_range_is_open(half, considered, is_open):
+    """A range of 2 on the axis of the search; beside a parameter that is told. considered: half width of what is."""
     result = SimpleNamespace(
         values={"mount_tilt_x": 0.0, "mount_tilt_y": 0.0},
         certainty=SimpleNamespace(half_width=np.array([half, 1e-6])),
+        considered={("mass", ""): np.array([considered / LEVEL, 0.0])} if considered else {},
     )
     scale = PARAMETERS["mount_tilt_x"].scale
     bounds = {name: Bounds(-scale, scale) for name in result.values}

@@ -81,6 +81,11 @@ def test_a_row_has_the_last_model_s_errors_and_counts_intervals_that_have_a_trut
     assert (row["curl_position"], row["curl_tip"], row["curl_null_tip"]) == (0.5, 2.0, 2.0)
     assert (row["every_position"], row["every_tip"]) == (0.25, 1.0)
     assert (row["held"], row["intervals"]) == (1, 2)
+    path = tmp_path / f"artifacts/{STAGES[-1]}/parameters.json"
+    table = json.loads(path.read_text())
+    table["parameters"]["kv"]["interval_95"] = [1.0, 5.0]
+    path.write_text(json.dumps(table))
+    assert cells(tmp_path)["held"] == 2, "with what the model fixes"
 
 
 @pytest.mark.parametrize("with_rows", [False, True])

@@ -38,6 +38,13 @@ def test_intervals_become_standard_uncertainties_and_later_stages_win():
     assert alone.interval("mount_tilt_x") == pytest.approx((0.008, 0.012))
 
 
+def test_it_is_of_the_intervals_given_the_model_whatever_is_considered():
+    """What the model fixes moves all parameters together; drawn of each alone, it would count twice."""
+    narrow = table(mount_tilt_x=(0.01, 0.002, (-0.1, 0.1)))
+    narrow["parameters"]["mount_tilt_x"]["interval_95"] = [-0.01, 0.03]
+    assert Posterior.from_tables({"one": narrow}).interval("mount_tilt_x") == pytest.approx((0.008, 0.012))
+
+
 def test_the_interval_of_the_draws_is_the_stated_one_where_the_range_cuts_it():
     """The longer side is the half width, and what lies beyond the range counts as at its end."""
     cut = table(mount_tilt_x=(0.01, 0.002, (-0.1, 0.1)))

@@ -138,6 +138,17 @@ def test_the_truth_is_held_against_the_intervals(judged):
     assert "own scatter 1.00; 2 of 3\n" in truth_table(judged)
 
 
+def test_the_truth_is_held_against_what_the_model_fixes_where_that_is_considered(judged):
+    path = judged / "artifacts/identify_damping/parameters.json"
+    assert "| 95 % interval, given the model |" in truth_table(judged)
+    table = json.loads(path.read_text())
+    for row in table["parameters"].values():
+        row["interval_95"] = [0.8 * row["interval_95_given_model"][0], 1.2 * row["interval_95_given_model"][1]]
+    path.write_text(json.dumps(table))
+    assert "| 95 % interval, with the model's tolerances |" in truth_table(judged)
+    assert "| 0.5 | 0.6 | 0.44 … 0.78 | yes |" in truth_table(judged)
+
+
 def test_the_truth_table_says_what_the_model_lacks(judged):
     """What a parameter that is identified stands for is lacking no more, or is so many of the lab's."""
 

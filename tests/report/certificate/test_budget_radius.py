@@ -199,6 +199,8 @@ ROW = {"at_bound": False, "undetermined": False, "interval_95_given_model": [-0.
         ({"interval_95_given_model": [-0.1, 0.03]}, "to one side alone"),
         ({"interval_95_given_model": [-0.02, 0.1]}, "to one side alone"),
         ({"interval_95_given_model": [-0.0999, 0.0999]}, None),
+        ({"interval_95": [-0.1, 0.03]}, "to one side alone"),
+        ({"interval_95_given_model": [-0.1, 0.03], "interval_95": [-0.09, 0.09]}, None),
         ({"undetermined": True}, "is not determined"),
         ({"undetermined": True, "interval_95_given_model": [-0.1, 0.1]}, "is not determined"),
         ({"at_bound": True}, "ended on a bound"),

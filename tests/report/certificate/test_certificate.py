@@ -207,6 +207,26 @@ def test_the_page_stands_by_itself(html):
     assert len(html) < 15e6
 
 
+def test_the_page_shows_an_interval_a_parameter_and_calls_it_what_it_is(certificate):
+    """Of the first stage with what the model fixes, of the second given the model."""
+    narrow = table(sample_trials(small_model(4))[:1])
+    wide = {name: row | {"interval_95": [-0.0123, 0.0123]} for name, row in narrow["parameters"].items()}
+    tables = {"identify_stiffness": narrow | {"parameters": wide}, "identify_damping": table_of("damping", narrow)}
+    facts = certificate.facts | {"files": {}, "code": "", "parameters": parameter_facts(tables)}
+    first, second = page(facts, {}, dict.fromkeys(("uncertainty", "poses"), b"")).split("<h3>identify_")[1:3]
+    assert "95 % interval, with the model&#x27;s tolerances" in first
+    assert "-0.0123 … 0.0123" in first
+    assert "given the model" not in first
+    assert "95 % interval, given the model" in second
+
+
+def table_of(name: str, like: dict) -> dict:
+    """A stage's table of one parameter."""
+    return like | {"parameters": {name: like["parameters"]["mount_tilt_x"] | {"value": 0.01,
+                   "interval_95_given_model": [0.005, 0.02], "range": [0.001, 1.0]}},
+                   "correlation": {name: {name: 1.0}}}  # fmt: skip
+
+
 def test_recorded_poses_move_the_tip_that_it_is_about_and_the_page_says_so():
     """Sixteen pulls in which the tip is seen 5 mm beside the twin's."""
     model, rng = small_model(4), np.random.default_rng(0)

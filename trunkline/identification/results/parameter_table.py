@@ -70,11 +70,11 @@ def _considered_table(result: Identification) -> dict:
 
 
 def undetermined(result: Identification, bounds: dict[str, Bounds]) -> list[str]:
-    """Which scalars the data leave open: a 95 % interval as wide as the range that was searched."""
+    """Which scalars are left open: a 95 % interval, with what is considered, as wide as the range that was searched."""
     searched = {
         name: np.diff(parameter_named(name).coordinate([span.low, span.high]))[0] for name, span in bounds.items()
     }
-    halves = zip(result.values, result.certainty.half_width, strict=True)
+    halves = zip(result.values, half_widths(result.certainty.half_width, result.considered), strict=True)
     return [name for name, half in halves if 2 * half > searched[name]]
 
 

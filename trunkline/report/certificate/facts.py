@@ -63,7 +63,8 @@ def parameter_facts(tables: dict[str, dict]) -> dict[str, dict]:
 
 def _parameter_fact(name: str, row: dict) -> dict:
     keys = ("value", "unit", "interval_95_given_model", "range", "at_bound", "undetermined")
-    return {key: row[key] for key in keys} | {"words": certainty_words(name, row), "told_by": telling(name)}
+    wide = {"interval_95": row["interval_95"]} if "interval_95" in row else {}
+    return {key: row[key] for key in keys} | wide | {"words": certainty_words(name, row), "told_by": telling(name)}
 
 
 def uncertainty_facts(budget: Budget, conditions: Conditions, length: float, draws: int) -> dict:

@@ -10,6 +10,7 @@ from html import escape
 from pathlib import Path
 
 from trunkline.identification.evaluation.error_tables import LABELS, TABLED, number
+from trunkline.identification.stages import interval_words, stated_interval
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 
 ASSETS = Path(__file__).parent / "page"
@@ -118,18 +119,19 @@ simulated.</figcaption></figure>
 def _parameters(facts: dict) -> str:
     parts = [
         "<h2>Parameters</h2>\n<p>Of a parameter that several stages identify, this is the last value, which the model "
-        "has. Intervals are given the model: they are right if the arm is as the model has it. What the model lacks is "
-        "not in them.</p>\n"
+        "has. Intervals given the model are right if the arm is as the model has it; those with the model's "
+        "tolerances, if it is off by no more than is stated of its making and its laws. What else the model lacks is "
+        "in neither.</p>\n"
     ]
     for stage, section in facts["parameters"].items():
-        rows = []
-        for name, row in (section["parameters"] | section.get("per_session", {})).items():
-            low, high = row["interval_95_given_model"]
+        rows, every = [], section["parameters"] | section.get("per_session", {})
+        for name, row in every.items():
+            low, high = stated_interval(row)
             state = "on a bound" if row["at_bound"] else "undetermined" if row["undetermined"] else ""
             rows.append((False, [name, f"{row['value']:.4g}", f"{low:.4g} … {high:.4g}", row["unit"] or "–",
                                  f"{row['words']}{f'; {state}' if state else ''}"]))  # fmt: skip
-        caption = f"From {section['trials']} trials; intervals are given the model"
-        table = _table(caption, ["parameter", "value", "95 % interval, given the model", "unit", "in words"], rows)
+        heads = ["parameter", "value", interval_words(every.values()), "unit", "in words"]
+        table = _table(f"From {section['trials']} trials", heads, rows)
         parts.append(f"<h3>{stage}</h3>\n{table}")
         sentences = [f"What the trials tell least: {section['weakest_direction']}."]
         sentences += [f"Hardly told apart: {pair}." for pair in section["hardly_told_apart"]]

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from trunkline.identification.diagnostics.identifiability import Identifiability
 from trunkline.identification.parameters.parameters import parameter_named
+from trunkline.identification.stages import stated_interval
 from trunkline.recordings.trials.conditions import Conditions
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.report.certificate.budget import FRICTION, NOISE
@@ -92,7 +93,7 @@ def limits_of(conditions: Conditions, loads: list[float]) -> list[str]:
 def certainty_words(name: str, row: dict) -> str:
     """How well a parameter of `parameters.json` is told, in the words of `trunkline.tools.check`."""
     axis = parameter_named(name).coordinate
-    low, high = axis(row["interval_95_given_model"])
+    low, high = axis(stated_interval(row))
     searched = np.diff(axis(row["range"]))[0]
     half = float(high - low) / 2
     return Identifiability(name, half, 1.0 if row["undetermined"] else min(2 * half / searched, 0.999)).words()
@@ -112,7 +113,7 @@ def _open(row: dict) -> str:
         return "ended on a bound of its range"
     if row["undetermined"]:
         return "is not determined"
-    (low, high), (least, most) = row["interval_95_given_model"], row["range"]
+    (low, high), (least, most) = stated_interval(row), row["range"]
     return "is told to one side alone: its interval ends with its range" if low <= least or high >= most else ""
 
 

@@ -8,6 +8,7 @@ from matplotlib.ticker import MaxNLocator
 
 from trunkline.identification.evaluation.error_tables import LABELS
 from trunkline.identification.evaluation.evaluation import Prediction
+from trunkline.identification.fit.considered import half_widths
 from trunkline.identification.fit.identify import Identification
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.parameters.parameters import parameter_named
@@ -151,11 +152,13 @@ def shape_figure(table: pd.DataFrame) -> Figure:
 def parameter_figure(identification: Identification, bounds: dict[str, Bounds], undetermined: list[str]) -> Figure:
     """Each scalar with its 95 % interval within its range, grey if that is open or a bound, and per-joint factors."""
     panels, count = 1 + bool(identification.factors), len(identification.values)
+    widths = half_widths(identification.certainty.half_width, identification.considered)
+    promise = "with the model's tolerances" if identification.considered else "given the model"
     figure, axes = plt.subplots(1, panels, figsize=(6.5 * panels, max(1.4 + 0.42 * count, 2.4)), squeeze=False)
     for row, (name, value) in enumerate(identification.values.items()):
         low, high, place = parameter_named(name).coordinate([bounds[name].low, bounds[name].high, value])
         place = (place - low) / (high - low)
-        width = identification.certainty.half_width[row] / (high - low)
+        width = widths[row] / (high - low)
         doubt = "not determined" if name in undetermined else "on a bound" if name in identification.at_bound else ""
         axes[0, 0].errorbar(place, row, xerr=width, fmt="o", color=DOUBTFUL if doubt else IDENTIFIED, capsize=4)
         side = "left" if place < 0.2 else "right" if place > 0.8 else "center"
@@ -173,7 +176,7 @@ def parameter_figure(identification: Identification, bounds: dict[str, Bounds], 
         xlabel="place in the range searched",
         yticks=range(count),
         yticklabels=list(identification.values),
-        title="Parameters, 95 % intervals given the model",
+        title=f"Parameters, 95 % intervals {promise}",
     )
     for name, factors in identification.factors.items():
         axes[0, 1].bar(np.arange(1, len(factors) + 1), (factors - 1) * 100, color=IDENTIFIED)
