@@ -249,3 +249,16 @@ def test_joints_lie_further_along_towards_the_tip():
     ends = unit_ends(model)
     moved = np.sum((fields["jnt_pos"][0] - model.jnt_pos) * ends, axis=1) / np.sum(ends**2, axis=1)
     np.testing.assert_allclose(moved[::2], np.linspace(-0.03, 0.03, len(moved) // 2), atol=1e-12)
+
+
+def test_what_a_quantity_moves_is_the_same_whatever_was_simulated_before_it(monkeypatch):
+    """Batches of simulations are used again: what another quantity changed in them is there no more."""
+    model = small_model()
+    problem = problem_of([release(model, 0.2, frames=20)], model, LINE, frames=20)
+    sizes = Tolerances(place_taper=0.1, unit_end=3e-4)
+    together = considered(problem, at_truth(problem), sizes, [])
+    monkeypatch.setattr("trunkline.identification.fit.considered.AT_ONCE", 1)
+    alone = considered(problem, at_truth(problem), sizes, [])
+    assert alone.keys() == together.keys()
+    for key, move in alone.items():
+        np.testing.assert_allclose(move, together[key], rtol=1e-6, atol=1e-12)

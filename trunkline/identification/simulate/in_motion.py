@@ -39,7 +39,7 @@ class InMotion:
         self._ends = sorted({1, *(e.frames for e in every)})  # frames
         self._loaded = any(e.load for e in every)
         self._step_factor = step_factor
-        self._batches: dict[tuple[int, ...], Batch] = {}
+        self._batches: dict[tuple[int, ...], tuple[set[str], Batch]] = {}  # with the fields that its simulations have
 
     def __getstate__(self) -> dict:
         return self.__dict__ | {"_batches": {}}  # a worker makes its own
@@ -89,12 +89,13 @@ class InMotion:
     def _batch(self, fields: Fields, numbers: list[int], rough: bool = False) -> Batch:
         """A batch whose simulation t·C + c is candidate c in trial t, at the trial's start, motors yet to be set."""
         experiments, count = [self.trials[i] for i in numbers], len(next(iter(fields.values())))
-        batch = self._batches.get((*numbers, rough))
-        if batch is None or batch.nsim != count * len(experiments):
+        names, batch = self._batches.get((*numbers, rough), (set(), None))
+        if batch is None or batch.nsim != count * len(experiments) or names != fields.keys():
             whole = by_warp(count * len(experiments), rough)  # Warp fails with cables that are cut down
             model = _without_idle(self._model, self._slack, fields, whole)
             self._batches.pop((*numbers, not rough), None)
-            batch = self._batches[*numbers, rough] = batch_of(model, count * len(experiments), rough)
+            batch = batch_of(model, count * len(experiments), rough)
+            self._batches[*numbers, rough] = set(fields), batch
         if self._slack:  # cables do not rub, winches do not wind
             fields = {name: values for name, values in fields.items() if name != "numeric_data"}
         batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
