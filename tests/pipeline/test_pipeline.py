@@ -92,6 +92,8 @@ def _settings(conf: str, name: str, section: dict) -> dict[str, list]:
     the options on which these build."""
     chosen = []
     for group, options in group_options(ROOT / conf / name).items():
+        if group not in section:  # of which config.yaml chooses one
+            continue
         bases = OmegaConf.load(options[section[group]]).get("defaults", [])
         chosen += [options[option] for option in (section[group], *bases) if option != "_self_"]
     return {f"{conf}/{name}/config.yaml": []} | {file.relative_to(ROOT).as_posix(): [] for file in chosen}
