@@ -33,6 +33,8 @@ from trunkline.recordings.trials.experiments import is_static
 Moves = dict[tuple[str, str], np.ndarray]  # by source and label of a quantity: S_c, on the axes of the search, (P,)
 Effect = tuple[tuple[str, str], list[np.ndarray]]  # source and label, and per trial the residuals' change (R,)
 EARLIER = "earlier"  # source of what the trials of an earlier stage left open
+# times the time step: what a step itself changes is in both of two simulations, and goes as they are subtracted
+COARSER = 2.0
 AT_ONCE = 12  # candidates, as the positions of all of them are kept until they are compared
 LEVEL = ndtri(0.975)  # of what is considered: its deviations are stated, not estimated (JCGM 100, G.4)
 
@@ -81,8 +83,11 @@ def considered(problem: Problem, linear: Linearisation, sizes: Tolerances, earli
     Args:
         linear: of the residuals, at the minimum.
     """
-    vector = linear.vector
+    vector, fine = linear.vector, problem
+    problem = replace(fine, step_factor=COARSER * fine.step_factor)
     base = problem.simulate(vector[None])
+    if base.diverged.any():  # a stiff arm
+        problem, base = fine, fine.simulate(vector[None])
     blocks = problem.compare(base.positions)
     if problem.rubs:  # the arm sticks and slips as a parameter changes, and only long differences mean something
         jacobians = _differences(problem, vector, reaches(problem))

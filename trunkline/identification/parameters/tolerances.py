@@ -19,7 +19,9 @@ from trunkline.identification.parameters.parameter import Fields
 from trunkline.identification.parameters.parameters import ParameterName, parameter_named
 from trunkline.model.arm_model import SLIP_LENGTH, ArmModel
 
-WAVES = 6  # cosines along the arm for what scatters from unit to unit
+# cosines along the arm for what scatters from unit to unit: many at rest, where simulations cost little and rest shapes
+# are identified, few in motion, which faster ones do not change
+WAVES, WAVES_MOVING = 6, 3
 MASS_FIELDS = ("body_mass", "body_inertia")
 MOTOR_FIELDS = ("actuator_gainprm", "actuator_biasprm")
 ONE_SIDED = ("joint_friction", "tendon_friction")  # parameters that a model without them has at 0, and which only grow
@@ -89,8 +91,9 @@ def changes(model: mujoco.MjModel, sizes: Tolerances, moving: bool, pulled: bool
     arm = ArmModel(model)
     units = len(arm.unit_bodies)
     along = np.linspace(-1, 1, units)
+    slowest = waves(units, WAVES_MOVING if moving else WAVES)
     listed = [
-        *_scaled("stiffness_scatter", sizes.stiffness_scatter, STIFFNESS_FIELDS, waves(units), _scale_joints),
+        *_scaled("stiffness_scatter", sizes.stiffness_scatter, STIFFNESS_FIELDS, slowest, _scale_joints),
         *_scaled("diameter", sizes.diameter, STIFFNESS_FIELDS, [_bending(model)], _scale_joints),
         *_scaled("clamp", sizes.clamp, STIFFNESS_FIELDS, [np.eye(units)[0]], _scale_joints),
         *_scaled("mass", sizes.mass, MASS_FIELDS, [np.ones(units)], _scale_masses),
@@ -101,7 +104,7 @@ def changes(model: mujoco.MjModel, sizes: Tolerances, moving: bool, pulled: bool
     if sizes.place_taper:
         listed.append(Perturbation("place_taper", "", ("jnt_pos",), _places(sizes.place_taper * along)))
     if sizes.unit_end:
-        listed += list(_bent(model, sizes.unit_end))
+        listed += list(_bent(model, sizes.unit_end, slowest))
     for cable in range(model.nu if sizes.hole_place and pulled else 0):
         listed += [Perturbation("hole_place", f"{cable + 1} {way}", ("site_pos",), _holes(cable, way, sizes.hole_place))
                    for way in ("out", "round")]  # fmt: skip
@@ -129,11 +132,11 @@ def of_parameter(name: str, value: float, source: str) -> Perturbation:
     return Perturbation(source, name, fields, write)
 
 
-def waves(units: int) -> list[np.ndarray]:
-    """The slowest of the cosines that make up independent scatter of unit size, one a unit. Each (units,)."""
+def waves(units: int, count: int = WAVES) -> list[np.ndarray]:
+    """The slowest `count` cosines of those that make up independent scatter of unit size, one a unit. Each (units,)."""
     middles = (np.arange(units) + 0.5) / units
     sizes = np.sqrt(np.where(np.arange(units) > 0, 2.0, 1.0) / units)
-    return [sizes[k] * np.cos(np.pi * k * middles) for k in range(min(WAVES, units))]
+    return [sizes[k] * np.cos(np.pi * k * middles) for k in range(min(count, units))]
 
 
 def _row(fields: Fields, candidate: int) -> Fields:
@@ -187,14 +190,14 @@ def _places(shares: np.ndarray):
     return write
 
 
-def _bent(model: mujoco.MjModel, size: float) -> Iterator[Perturbation]:
-    """Rest shapes of units whose ends are off to a side: about each of their two hinges."""
+def _bent(model: mujoco.MjModel, size: float, shapes: list[np.ndarray]) -> Iterator[Perturbation]:
+    """Rest shapes of units whose ends are off to a side: about each of their two hinges, along the arm by `shapes`."""
     arm = ArmModel(model)
     first = np.searchsorted(arm.unit_of_hinge, np.arange(len(arm.unit_bodies)))
     angles = size / np.linalg.norm(unit_ends(model)[first], axis=1)
     about_x = np.abs(model.jnt_axis[: arm.hinge_count, 0]) > np.sqrt(0.5)
     for axis, hinges in (("x", about_x), ("y", ~about_x)):
-        for number, wave in enumerate(waves(len(angles))):
+        for number, wave in enumerate(shapes):
             bends = np.where(hinges, (angles * wave)[arm.unit_of_hinge], 0.0)
 
             def write(fields: Fields, candidate: int, model: mujoco.MjModel, bends: np.ndarray = bends) -> None:
