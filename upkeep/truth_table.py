@@ -123,7 +123,7 @@ def expectation(truth: dict, name: str) -> float | None:
 def holds(row: dict, expected: float | None) -> bool | None:
     """Whether a parameter's interval holds what is expected; None where one of them is not there."""
     interval = stated_interval(row)
-    if row["undetermined"] or expected is None or interval is None:
+    if row["undetermined"] or expected is None or not interval:
         return None
     return bool(interval[0] <= expected <= interval[1])
 

@@ -38,17 +38,17 @@ def last_stages(tables: dict[str, dict], *keys: str) -> dict[str, str]:
     return {name: stage for stage, table in tables.items() for key in keys for name in table.get(key, {})}
 
 
-def stated_interval(row: dict) -> list[float] | None:
+def stated_interval(row: dict) -> list[float]:
     """The 95 % interval of a parameter's row in a table: with what the model fixes, where that was considered, else
-    given the model. None where the row has neither."""
-    return row.get("interval_95", row.get("interval_95_given_model"))
+    given the model. Empty where the row has neither."""
+    return row.get("interval_95", row.get("interval_95_given_model", []))
 
 
 def interval_words(rows: Iterable[dict]) -> str:
     """What the `stated_interval` of rows is called; of stages that differ in what they consider, no more than that."""
     wide = {"interval_95" in row for row in rows}
-    promises = {(True,): ", with the model's tolerances", (False,): ", given the model"}
-    return f"95 % interval{promises.get(tuple(wide), '')}"
+    promise = ", with the model's tolerances" if wide == {True} else ", given the model" if wide == {False} else ""
+    return f"95 % interval{promise}"
 
 
 def read_table(file: Path) -> dict:
