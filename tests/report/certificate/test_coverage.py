@@ -138,6 +138,9 @@ def test_with_a_rig_the_share_is_a_metric_and_stands_beside_the_stated_one(certi
     assert coverage["stated"] == certificate.facts["uncertainty"]["coverage"] == COVERAGE
     words = _measured(certificate.facts["uncertainty"])
     assert "100.0 % of 12 poses" in words
+    assert "not come to rest" not in words
+    moving = {"measured": coverage | {"unrested": 3}}
+    assert "In 3 more poses the arm did not come to rest." in _measured(certificate.facts["uncertainty"] | moving)
     assert f"of {coverage['pulled']['poses']} poses with a pull" in words
     assert "stated 95 %" in words
 

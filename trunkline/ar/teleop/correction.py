@@ -45,12 +45,12 @@ def corrected(
         return _corrected(chain, first, np.array(tip), gravity)
     bent, pull = first, STANDARD_GRAVITY * np.array([gravity])
     for _ in range(ROUNDS):
-        shift = learnt.mean(RestingPoses(chain.straight_lengths - bent.commands[None], pull))[0]
+        shift = learnt.mean(RestingPoses.of_commands(chain, bent.commands[None], pull))[0]
         nearer = _corrected(chain, first._replace(tip=first.tip - shift), np.array(tip) - shift, gravity)
         if nearer is None:
             return None
         bent = nearer
-    shift = learnt.mean(RestingPoses(chain.straight_lengths - bent.commands[None], pull))[0]
+    shift = learnt.mean(RestingPoses.of_commands(chain, bent.commands[None], pull))[0]
     return bent._replace(tip=bent.tip + shift)
 
 

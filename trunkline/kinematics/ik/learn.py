@@ -214,7 +214,7 @@ def moved_errors(
     """Errors of a network with the residual map `learnt`, as the twin's tip moves by it, for samples moved by it."""
     inputs = targets[inputs_of(targets)].to_numpy()
     sent, gravity = targets[command_columns(chain.tendons)].to_numpy(), gravity_of(inputs)
-    position_of(inputs)[:] += learnt.mean(RestingPoses(chain.straight_lengths - sent, gravity))
+    position_of(inputs)[:] += learnt.mean(RestingPoses.of_commands(chain, sent, gravity))
     return tip_errors(chain, inputs, ask(runtime, inputs)["commands"].astype(float), learnt)
 
 

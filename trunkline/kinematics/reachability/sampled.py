@@ -35,8 +35,9 @@ def read_tips(
         tendon_lengths = held_by(chain, rows[lengths].to_numpy(float), tensions)
         positions = rows[["x", "y", "z"]].to_numpy(float)
         if learnt is not None:
-            pulls = chain.straight_lengths - rows[command_columns(chain.tendons)].to_numpy(float)
-            positions = positions + learnt.mean(RestingPoses(pulls, STANDARD_GRAVITY * rows[DOWN].to_numpy(float)))
+            commands = rows[command_columns(chain.tendons)].to_numpy(float)
+            gravity = STANDARD_GRAVITY * rows[DOWN].to_numpy(float)
+            positions = positions + learnt.mean(RestingPoses.of_commands(chain, commands, gravity))
         return Tips(positions, tendon_lengths)
 
     if weightless(table):

@@ -51,7 +51,12 @@ class RestingPoses:
     @classmethod
     def of(cls, chain: Chain, rest: Equilibrium, gravity: np.ndarray) -> "RestingPoses":
         """Those of the twin's `rest`, so that it is the same pose however far slack tendons are let out."""
-        return cls(chain.straight_lengths - rest.commands, gravity)
+        return cls.of_commands(chain, rest.commands, gravity)
+
+    @classmethod
+    def of_commands(cls, chain: Chain, commands: np.ndarray, gravity: np.ndarray) -> "RestingPoses":
+        """Those of motors at `commands`, m (N, K), that let no tendon out further than its path."""
+        return cls(chain.straight_lengths - commands, gravity)
 
     def __len__(self) -> int:
         return len(self.pulls)

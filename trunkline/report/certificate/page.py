@@ -214,7 +214,8 @@ def _measured(uncertainty: dict) -> str:
         f"{100 * part['high']:.0f} %)"
         for words, part in parts.items()
     ]
-    return f"Measured on the arm itself, beside the stated {stated}: its tip was within it {', '.join(shares)}."
+    moving = f" In {measured['unrested']} more poses the arm did not come to rest." if measured["unrested"] else ""
+    return f"Measured on the arm itself, beside the stated {stated}: its tip was within it {', '.join(shares)}.{moving}"
 
 
 def _data(facts: dict) -> str:
