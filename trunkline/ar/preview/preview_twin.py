@@ -16,11 +16,11 @@ from trunkline.ar.hybrid.uncertainty import Contact, GraspUncertainty
 from trunkline.ar.hybrid.worlds import SupportSurface
 from trunkline.ar.hybrid.worlds import WorldGeometry as Room
 from trunkline.ar.preview.settings import Previewing
+from trunkline.ar.teleop.base_frames import base_frames
 from trunkline.ar.teleop.messages import Obstacle, World, WorldObject
 from trunkline.ar.teleop.vectors import Quaternion, unit
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY, tilt_of_gravity, wxyz_from_rotation
-from trunkline.kinematics.panda.kinematics import mount_pose
 from trunkline.kinematics.panda.mounts import PandaRobot
 from trunkline.kinematics.residual.residual_map import ResidualMap
 from trunkline.model.arm_model import ArmModel
@@ -63,7 +63,7 @@ class RobotModel:
         hangs: where the straight arm's tip was seen where the trajectory begins, in the base frame, (3,), m."""
         if self.lacking is None:
             return "no trial at rest was held out, or the package is of an earlier release"
-        places, bases = _base_frames(trajectory.joints[[0, -1]], self.robot.mount_offset)
+        places, bases = base_frames(trajectory.joints[[0, -1]], self.robot.mount_offset)
         base, commands = bases[-1], trajectory.commands[-1]
         gravity = base.T @ GRAVITY[0]
         arm = arm_of(self.arm.copy().compile())
@@ -93,7 +93,7 @@ class RobotModel:
         times = np.linspace(0, trajectory.duration, max(round(trajectory.duration / SHIFTED), 1) + 1)
         rows = trajectory.at(times)
         joints, commands = np.split(rows, [trajectory.joints.shape[1]], axis=1)
-        bases = _base_frames(joints, self.robot.mount_offset)[1]
+        bases = base_frames(joints, self.robot.mount_offset)[1]
         poses = StaticPoses(np.einsum("nji,j->ni", bases, GRAVITY[0]), commands[:, order])
         shifts = np.einsum("nij,nj->ni", bases, arm.shift(learnt, poses))
         rested = np.isfinite(shifts).all(axis=1)
@@ -179,7 +179,7 @@ def _start(
     lean: Rotation,
 ) -> np.ndarray:
     """The composed model's pose (nq,) with the arm at rest."""
-    base = _base_frames(joints[None], mount_offset)[1][0]
+    base = base_frames(joints, mount_offset)[1]
     gravity = lean.inv().apply(base.T @ GRAVITY[0])
     rest = settle(arm, commands[None], gravity).qpos[0]
     pose = model.qpos0.copy()
@@ -189,13 +189,6 @@ def _start(
         if name:
             pose[model.joint(name).qposadr[0]] = rest[arm.jnt_qposadr[number]]
     return pose
-
-
-def _base_frames(joints: np.ndarray, mount_offset: float) -> tuple[np.ndarray, np.ndarray]:
-    """Origins (N, 3), m, and rotations (N, 3, 3) of the arm's base frame at `joints` (N, 7), rad: its y and z are
-    opposite to the flange's."""
-    places, flanges = mount_pose(joints, mount_offset)
-    return places, flanges @ np.diag([1.0, -1.0, -1.0])
 
 
 def _upright(quaternion: Quaternion) -> Quaternion:
