@@ -168,7 +168,7 @@ def test_before_a_later_step_that_would_go_beyond_the_best_commands_come_back():
     words = iter(["", "beyond"])  # of the first step, and of the second
     steps = CorrectionSteps(PLANNER, SimpleNamespace(beyond=lambda pulls, tilt_deg: next(words)))
     there = steps.answer(order(0, commands, tip, target)).plan.commands[-1]
-    back = steps.answer(order(1, there, target + [0.0, 8e-3, 0.0], target))
+    back = steps.answer(order(1, there, tip + 0.1 * (tip - target), target))
     assert back.ended == "beyond"
     np.testing.assert_allclose(back.plan.commands[-1], commands, atol=1e-12)
 
