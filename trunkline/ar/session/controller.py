@@ -133,8 +133,9 @@ class SessionController:
         self._moved = -math.inf  # s, when anything moved
         self._written = -math.inf  # s, of the newest of what cameras saw in the log
         self.correction = CorrectionControl(
-            correction or CorrectionSettings(), previewer.submit, robot.start, robot.stop, self.log_writer.event
-        )
+            correction or CorrectionSettings(), previewer.submit, robot.start, robot.stop, self.log_writer.event,
+            core.mount_offset,
+        )  # fmt: skip
         self._bounds: CorrectionBounds | None = None  # of the plan that is asked for
 
     def begin(self, rate: float, version: str = "") -> None:
