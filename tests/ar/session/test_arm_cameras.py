@@ -109,8 +109,8 @@ def test_which_streams_have_a_body_at_the_mount(bodies, mount, expected):
     named = replace(live().cameras, bodies=bodies, apart=(0.2,) * (len(bodies) - 1), mount=mount)
     cameras = natnet_cameras(named)
     cameras._tracker = ToldTracker(np.zeros((len(bodies), 3)), np.tile([1.0, 0, 0, 0], (len(bodies), 1)))
-    told = cameras.latest().mount
-    assert (None if told is None else tuple(told)) == expected
+    place = cameras.latest().mount
+    assert (None if place is None else tuple(place)) == expected
 
 
 @pytest.mark.parametrize("more", [["--robot", "panda"], ["--motors", "gm6020", "--bus", "can0"]])

@@ -210,12 +210,12 @@ class CorrectionControl:
     def _misplaced(self, plan: Plan) -> str:
         """Why the cameras' frame is not where it is set, by the mount as they see it; "" where it may be, as where they
         see none. A frame that is turned about the mount itself does not show."""
-        seen = [place for place in self._mounts if np.isfinite(place).all()]
+        visible = [place for place in self._mounts if np.isfinite(place).all()]
         if not self._mounts:
             return ""
-        if not seen:
+        if not visible:
             return "no camera has seen the body at the mount"
-        apart = float(np.linalg.norm(np.median(seen, axis=0) - base_frames(plan.joints[-1], self._mount_offset)[0]))
+        apart = float(np.linalg.norm(np.median(visible, axis=0) - base_frames(plan.joints[-1], self._mount_offset)[0]))
         most = self._settings.misplaced
         self._event("mount", apart=apart, expected=most)
         words = f"cameras see the mount {1e3 * apart:.1f} mm from where the joints have it"

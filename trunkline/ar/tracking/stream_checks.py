@@ -112,8 +112,8 @@ class StreamChecks:
         silent = now - self._received
         if silent > self._limits.silence:
             self._late_at = now
-            said = f"found no frame for {silent:.2f} s, expected one within {self._limits.silence:g} s"
-            self._late = self._late or said
+            line = f"found no frame for {silent:.2f} s, expected one within {self._limits.silence:g} s"
+            self._late = self._late or line
 
     def _object(self, now: float, rule: str, sentences: dict[str, str], ends: bool = True) -> None:
         """What a rule objects to now, by body; where it `ends`, it objects to no others any more."""
