@@ -331,6 +331,14 @@ def test_a_stream_that_is_not_sound_ends_it_where_it_is(session, phase):
     assert len(session.planning.orders) == (0 if phase in ("arrives", "rests") else 1)
 
 
+def test_without_cameras_it_ends(session):
+    session.corrects("rests")
+    session.controller.cameras = session.controller.arm = None
+    session.until(lambda intent: intent.mode == "aim")
+    assert session.words == "not corrected: there are no cameras"
+    session.assert_nothing_follows()
+
+
 def test_a_tip_far_off_ends_it_before_a_step_and_within_one(session):
     session.corrects()
     session.cameras.shift = np.array([0.0, 0.04, 0.0])

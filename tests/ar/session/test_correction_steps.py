@@ -104,7 +104,9 @@ def test_the_soft_base_is_the_one_by_which_plans_are_made():
 
 
 def test_the_way_back_is_taken_where_the_last_step_led_away_and_is_no_longer_than_a_step():
-    steps, commands = CorrectionSteps(PLANNER, BEYOND), pulled(0.02, 0, 0)
+    once = iter([""])  # of the way back it is not asked
+    steps = CorrectionSteps(PLANNER, SimpleNamespace(beyond=lambda pulls, tilt_deg: next(once)))
+    commands = pulled(0.02, 0, 0)
     tip = tip_of(CHAIN, commands)
     target = tip + np.array([5e-3, 0, 0])
     first = steps.answer(order(0, commands, tip, target, settings=replace(SETTINGS, steps=1)))
@@ -183,6 +185,20 @@ def test_what_it_does_not_know_of_is_no_step(changes):
     )
 
 
+def test_a_package_without_statics_has_no_step():
+    commands = pulled(0.02, 0, 0)
+    tip = tip_of(CHAIN, commands)
+    answer = CorrectionSteps(replace(PLANNER, chain=None), BEYOND).answer(order(0, commands, tip, tip + 5e-3))
+    assert (answer.plan, answer.ended) == (None, "the process that plans has lost it")
+
+
+def test_a_step_that_changes_nothing_is_none():
+    steps, commands = CorrectionSteps(PLANNER, BEYOND), pulled(0.02, 0, 0)
+    steps._measured = lambda order: SimpleNamespace(commands=order.commands, ended="")
+    answer = steps.answer(order(0, commands, np.zeros(3), np.zeros(3)))
+    assert (answer.plan, answer.ended) == (None, "no motor brings the tip nearer")
+
+
 @pytest.mark.parametrize("number", [1, 3])
 def test_an_answer_is_to_the_next_step_alone(number):
     steps, commands = CorrectionSteps(PLANNER, BEYOND), pulled(0.02, 0, 0)
@@ -191,6 +207,7 @@ def test_an_answer_is_to_the_next_step_alone(number):
     for later in (first, replace(first, number=1)):
         assert steps.answer(later).plan is not None
     assert steps.answer(replace(first, number=number)).ended == "the process that plans has lost it"
+    assert steps.answer(replace(first, number=2, serial=8)).ended == "the process that plans has lost it"
 
 
 # --- whether a plan may correct itself

@@ -155,7 +155,7 @@ class CorrectionControl:
         if arm.fault:
             return f"cameras: {arm.fault}"
         bounds, visible = self._bounds, bool(np.isfinite(arm.tip).all())
-        off = float(np.linalg.norm(arm.tip - bounds.target)) if visible else 0.0
+        off = float(np.linalg.norm(arm.tip - bounds.target))  # NaN, which is beyond nothing, while it is invisible
         self._invisible = 0.0 if visible else self._invisible + dt
         begun = bool(self._errors)  # before, an arm may still swing from its way there
         self._strayed = self._strayed + dt if begun and off > bounds.astray else 0.0
