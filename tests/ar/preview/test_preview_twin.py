@@ -12,7 +12,7 @@ from tests.support.residual import everywhere
 from tests.support.small_arm import small_spec
 from trunkline.ar.hybrid.rollout_batch import preview
 from trunkline.ar.hybrid.rollouts import CommandTrajectory
-from trunkline.ar.hybrid.tip_uncertainty import BaseAlignment, TipShift, TipUncertainty
+from trunkline.ar.hybrid.tip_uncertainty import BaseAlignment, TipShift, TipUncertainty, TipUnknown
 from trunkline.ar.hybrid.uncertainty import GraspUncertainty
 from trunkline.ar.preview.preview_twin import RobotModel, compose_twin
 from trunkline.ar.session.settings import SessionConfig
@@ -76,10 +76,11 @@ def test_poses_of_the_arm_move_the_tip_that_is_stated_and_not_its_radius():
     twin = compose_twin(made, World("w"), None, trajectory.joints[0], trajectory.commands[0], SETTINGS)
     shift = np.array([0.004, 0.002, -0.001])
     knows = replace(made, lacking=replace(LACKING, residual_map=everywhere(list(shift))))
+    beyond = replace(knows, lacking=replace(knows.lacking, pull=0.0))  # plans take the shift there as well
     stated = []
-    for robot in (made, knows):
+    for robot in (made, knows, beyond):
         tip = robot.tip_uncertainty(trajectory, None)
-        assert isinstance(tip, TipUncertainty)
+        assert isinstance(tip, TipUnknown if robot is beyond else TipUncertainty)
         foreseen = preview(twin, trajectory, made.uncertainty, None, 2, tip=tip)
         stated.append(foreseen.stated)
         np.testing.assert_allclose(foreseen.shown[-1] - foreseen.nominal.tip[0, -1],
@@ -88,6 +89,8 @@ def test_poses_of_the_arm_move_the_tip_that_is_stated_and_not_its_radius():
     expected = flange @ (shift * [1, -1, -1])
     np.testing.assert_allclose(stated[1].tips - stated[0].tips, np.tile(expected, (len(stated[0].tips), 1)), atol=1e-6)
     np.testing.assert_array_equal(stated[1].radii, stated[0].radii)
+    np.testing.assert_array_equal(stated[2].tips, stated[1].tips)
+    assert len(stated[2].radii) == 0
 
 
 def test_a_shift_is_taken_where_the_plan_is():

@@ -182,7 +182,7 @@ class Cameras:
         self.poses = bodies[[first + row for row in self.rows]] + np.pad(OFF, (0, 4))
 
     def latest(self) -> MeasuredArm:
-        return MeasuredArm(time.monotonic(), self.poses, self.poses[-1, :3], 0.01, 120.0, 0.0, self.fault)
+        return MeasuredArm(time.monotonic(), self.poses, self.poses[-1, :3], 0.01, 120.0, 0.0, self.fault, None)
 
 
 class Planning:

@@ -14,6 +14,7 @@ from trunkline.ar.session.__main__ import parsed
 from trunkline.ar.session.arm_cameras import ArmCameras, SimulatedArmCameras, natnet_cameras
 from trunkline.ar.session.bodies import BodyPoses
 from trunkline.ar.session.composition import subject_of
+from trunkline.ar.teleop.base_frames import base_frames
 from trunkline.ar.teleop.messages import Pose
 from trunkline.ar.tracking.tracker import TrackedPoses
 from trunkline.errors import InputError
@@ -38,10 +39,11 @@ def test_what_cameras_see_is_in_the_robots_frame_and_its_tip_is_beside_the_last_
     positions, turns = rng.standard_normal((2, 3)), Rotation.random(2, rng=rng)
     pose = Pose(tuple(origin), tuple(wxyz_from_rotation(turn)))
     tracker = ToldTracker(positions, wxyz_from_rotation(turns), "found no frame")
-    arm = ArmCameras(tracker, ("base", "tip"), pose, place).latest()
+    arm = ArmCameras(tracker, ("base", "tip"), pose, place, -2 * place).latest()
     np.testing.assert_allclose(arm.poses[:, :3], turn.apply(positions) + origin)
     np.testing.assert_allclose(arm.poses[:, 3:], wxyz_from_rotation(turn * turns))
     np.testing.assert_allclose(arm.tip, turn.apply(positions[1] + turns[1].apply(place)) + origin)
+    np.testing.assert_allclose(arm.mount, turn.apply(positions[0] + turns[0].apply(-2 * place)) + origin)
     assert (arm.stamp, arm.age, arm.rate, arm.loss, arm.fault) == (5.0, 0.01, 120.0, 0.02, "found no frame")
 
 
@@ -49,9 +51,12 @@ def test_what_cameras_see_is_in_the_robots_frame_and_its_tip_is_beside_the_last_
 def test_a_body_that_is_not_seen_has_no_pose_and_without_the_last_there_is_no_tip(body):
     positions, quaternions = np.zeros((2, 3)), np.tile([1.0, 0, 0, 0], (2, 1))
     positions[body] = quaternions[body] = np.nan
-    arm = ArmCameras(ToldTracker(positions, quaternions), ("base", "tip"), Pose((0, 0, 0), (1, 0, 0, 0)), np.zeros(3))
+    arm = ArmCameras(
+        ToldTracker(positions, quaternions), ("base", "tip"), Pose((0, 0, 0), (1, 0, 0, 0)), *np.zeros((2, 3))
+    )
     assert np.isnan(arm.latest().poses).all(axis=1).tolist() == [body == 0, body == 1]
     assert np.isnan(arm.latest().tip).all() == (body == 1)
+    assert np.isnan(arm.latest().mount).all() == (body == 0)
 
 
 @pytest.mark.realtime
@@ -76,6 +81,7 @@ def test_simulated_cameras_see_the_simulated_robots_arm_and_name_exchanged_label
             until(lambda: cameras.latest().stamp > began + 0.05)  # noqa: B023
             arm = cameras.latest()
             assert np.linalg.norm(arm.tip - tip - [shift, 0, 0]) < 3e-3
+            assert np.linalg.norm(arm.mount - base_frames(s.joints, s.mount_offset)[0] - [shift, 0, 0]) < 3e-3
             np.testing.assert_allclose(
                 arm.poses[:, :3], moved[[s.bodies.index(n) for n in cameras.names], :3], atol=3e-3
             )
@@ -93,6 +99,18 @@ def test_settings_of_cameras_say_what_is_missing():
         replace(live().cameras, quaternion=(2.0, 0.0, 0.0, 0.0))
     named = replace(live().cameras, bodies=("mount", "mid", "tip"), apart=(0.2, 0.1), tip=(0.0, 0.0, -0.01))
     assert natnet_cameras(named).names == ("mount", "mid", "tip")
+
+
+@pytest.mark.parametrize(
+    ("bodies", "mount", "expected"),
+    [(("a", "b"), (0.0, 0.1, 0.0), (0.0, 0.1, 0.0)), (("a", "b"), None, None), (("a",), (0.0, 0.1, 0.0), None)],
+)
+def test_which_streams_have_a_body_at_the_mount(bodies, mount, expected):
+    named = replace(live().cameras, bodies=bodies, apart=(0.2,) * (len(bodies) - 1), mount=mount)
+    cameras = natnet_cameras(named)
+    cameras._tracker = ToldTracker(np.zeros((len(bodies), 3)), np.tile([1.0, 0, 0, 0], (len(bodies), 1)))
+    place = cameras.latest().mount
+    assert (None if place is None else tuple(place)) == expected
 
 
 @pytest.mark.parametrize("more", [["--robot", "panda"], ["--motors", "gm6020", "--bus", "can0"]])

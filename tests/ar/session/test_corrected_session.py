@@ -27,16 +27,16 @@ from trunkline.ar.session.binary import HAND, Received
 from trunkline.ar.session.composition import subject_of
 from trunkline.ar.session.controller import SessionController
 from trunkline.ar.session.controller_input import controllers
-from trunkline.ar.session.correction_steps import soft_base
 from trunkline.ar.session.previewer import InlinePreviewer, PreviewPlanner
 from trunkline.ar.session.robot_process import RobotProcess
+from trunkline.ar.teleop.base_frames import base_frames
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.vibration import shaper_for
 from trunkline.frames import rotation_from_wxyz
 
 BENT = -0.015  # rad, of each joint of the arm at rest: what its twin does not know
 LATE = 5.0  # s
-TARGET = np.array(MOUNT) + tip_of(CHAIN, pulled(0.02, 0, 0)) - soft_base(START, OFFSET)[0]
+TARGET = np.array(MOUNT) + tip_of(CHAIN, pulled(0.02, 0, 0)) - base_frames(START, OFFSET)[0]
 
 
 def unlike():

@@ -30,10 +30,11 @@ from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import correction_control
 from trunkline.ar.session.arm_cameras import MeasuredArm
 from trunkline.ar.session.controller import SessionController
-from trunkline.ar.session.correction_control import ANSWERS, beyond_bounds
+from trunkline.ar.session.correction_control import ANSWERS, UNCHECKED, beyond_bounds
 from trunkline.ar.session.correction_steps import CorrectionAnswer, CorrectionOrder
 from trunkline.ar.session.log_writer import LogWriter
 from trunkline.ar.session.previewer import Order, PlanAnswer, PredictionAnswer, PreviewBegun
+from trunkline.ar.teleop.base_frames import base_frames
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.messages import ExecutorReport, Target, Targets, WorldObject
 from trunkline.ar.teleop.plan import CorrectionBounds, Plan
@@ -96,6 +97,7 @@ class Cameras:
 
     def __init__(self, session):
         self.session, self.fault, self.moves, self.shift = session, "", 0.0, np.zeros(3)
+        self.mounted, self.mount = True, np.zeros(3)  # whether a body is at the mount, and by how far it is seen off
 
     def show(self, bodies):
         pass
@@ -106,7 +108,8 @@ class Cameras:
         end = plans[-1].commands[-1] if plans else STRAIGHT
         tip = np.array(TIP) + OFF + self.shift + np.array([1.0, 0, 0]) * (session.robot.commands - end)[0]
         tip += self.moves * np.sin(7 * now) * np.ones(3)
-        return MeasuredArm(now, np.full((2, 7), np.nan), tip, 0.01, 120.0, 0.0, self.fault)
+        mount = base_frames(session.robot.joints, OFFSET)[0] + self.mount if self.mounted else None
+        return MeasuredArm(now, np.full((2, 7), np.nan), tip, 0.01, 120.0, 0.0, self.fault, mount)
 
 
 class Correcting(Played):
@@ -328,6 +331,14 @@ def test_a_stream_that_is_not_sound_ends_it_where_it_is(session, phase):
     assert len(session.planning.orders) == (0 if phase in ("arrives", "rests") else 1)
 
 
+def test_without_cameras_it_ends(session):
+    session.corrects("rests")
+    session.controller.cameras = session.controller.arm = None
+    session.until(lambda intent: intent.mode == "aim")
+    assert session.words == "not corrected: there are no cameras"
+    session.assert_nothing_follows()
+
+
 def test_a_tip_far_off_ends_it_before_a_step_and_within_one(session):
     session.corrects()
     session.cameras.shift = np.array([0.0, 0.04, 0.0])
@@ -340,6 +351,55 @@ def test_a_tip_far_off_ends_it_before_a_step_and_within_one(session):
     other.executing().until(lambda intent: intent.mode == "aim")
     assert other.words == "not corrected, 40.3 mm off: the tip is 40 mm off, expected at most 30 mm"
     assert other.planning.orders == []
+
+
+@pytest.mark.parametrize("off", [(0.0, 0.0051, 0.0), (0.004, 0.0, -0.004)])
+def test_cameras_that_see_the_mount_elsewhere_than_the_joints_have_it_correct_nothing(session, off):
+    session.cameras.mount, session.cameras.shift = np.array(off), np.array([0.0, 0.04, 0.0])  # as of the whole frame
+    session.executing().until(lambda intent: intent.mode == "aim")
+    apart = f"{1e3 * np.linalg.norm(off):.1f}"
+    words = f": cameras see the mount {apart} mm from where the joints have it, expected at most 5 mm"
+    assert session.words == f"not corrected, 40.3 mm off{words}"
+    assert session.planning.orders == []
+    session.assert_nothing_follows()
+
+
+def test_a_mount_that_is_seen_about_where_it_is_or_seldom_elsewhere_is_corrected_by(session):
+    session.cameras.mount = np.array([0.0, 0.0049, 0.0])
+    session.corrects("rests")
+    session.cameras.mount = np.array([0.0, 0.04, 0.0])  # an outlier
+    session.wait(3 * DT)
+    session.cameras.mount = np.full(3, np.nan)
+    session.wait(3 * DT)
+    session.cameras.mount = np.array([0.0, 0.0049, 0.0])
+    session.until(lambda intent: intent.mode == "aim")
+    assert session.words == "corrected from 5.1 to 1.1 mm in 2 steps: arrived"
+    (mount,) = [fields for kind, fields in session.log.events if kind == "mount"]
+    assert mount == {"apart": pytest.approx(4.9e-3), "expected": 5e-3}
+
+
+def test_a_mount_that_is_never_seen_is_not_corrected_by(session):
+    session.cameras.mount = np.full(3, np.nan)
+    session.executing().until(lambda intent: intent.mode == "aim")
+    assert session.words == "not corrected, 5.1 mm off: no camera has seen the body at the mount"
+    assert session.planning.orders == []
+
+
+def test_without_a_body_at_the_mount_it_is_told_once(session):
+    session.cameras.mounted = False
+    session.executing().until(lambda intent: intent.mode == "aim")
+    assert session.words == f"corrected from 5.1 to 1.1 mm in 2 steps: arrived; {UNCHECKED}"
+    correction = session.controller.correction
+    correction.begin(9, replace(some_plan(), correction=BOUNDS), session.controller.world)
+    correction._errors.append(1e-3)
+    correction.end("the end")
+    assert correction.words == "not corrected, 1.0 mm off: the end"
+
+
+def test_a_tip_that_ended_farther_off_is_told_plainly(session):
+    session.planning.change = -2e-3
+    session.executing().until(lambda intent: intent.mode == "aim")
+    assert session.words == "the tip ended farther off than before, from 5.1 to 9.1 mm in 2 steps: arrived"
 
 
 def test_an_outlier_ends_nothing(session):

@@ -1,6 +1,8 @@
 """Steps of a correction as the process that plans makes them: of a small arm that is not as its twin."""
 
+import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,11 +19,11 @@ from trunkline.ar.session.correction_steps import (
     CorrectionAnswer,
     CorrectionOrder,
     CorrectionSteps,
-    soft_base,
     why_uncorrected,
 )
 from trunkline.ar.session.previewer import PlanAnswer, PreviewBegun, PreviewPlanner
 from trunkline.ar.teleop.alignment import base_quaternion
+from trunkline.ar.teleop.base_frames import base_frames
 from trunkline.ar.teleop.messages import Obstacle
 from trunkline.ar.teleop.plan import CorrectionBounds
 from trunkline.frames import rotation_from_wxyz
@@ -33,12 +35,13 @@ SETTINGS = CorrectionSettings(astray=30e-3)
 WORLD = make_world(())
 CHAIN = read_chain(small_spec().compile()).smooth
 PLANNER = replace(made().planner, chain=CHAIN)
+assert np.allclose(PLANNER.straight, CHAIN.straight_lengths)
 BEYOND = Lacking("", Discrepancy(np.array([[0.01, 0.0, 0.0]]), 16), 180.0, 180.0, 1.0, 4.0)
 
 
 def tip_of(chain, commands):
     """In the base frame."""
-    place, turn = soft_base(START, OFFSET)
+    place, turn = base_frames(START, OFFSET)
     return place + turn @ actuated(chain, commands[None], DOWN @ turn).position[0]
 
 
@@ -65,7 +68,7 @@ ARMS = {
 
 @pytest.mark.parametrize("name", ARMS)
 def test_steps_bring_an_arm_that_is_not_as_its_twin_to_the_target_within_their_bounds(name):
-    arm, steps, commands = ARMS[name], CorrectionSteps(PLANNER), pulled(0.02, 0, 0)
+    arm, steps, commands = ARMS[name], CorrectionSteps(PLANNER, BEYOND), pulled(0.02, 0, 0)
     target, errors = tip_of(CHAIN, commands), []
     begin = commands
     for number in range(SETTINGS.steps + 2):
@@ -91,9 +94,9 @@ def test_steps_bring_an_arm_that_is_not_as_its_twin_to_the_target_within_their_b
 
 
 def test_the_soft_base_is_the_one_by_which_plans_are_made():
-    plan = PLANNER.plan(request((0.5, 0.1, 0.5), tuple(tip_of(CHAIN, pulled(0.02, 0, 0)) - soft_base(START, OFFSET)[0]
+    plan = PLANNER.plan(request((0.5, 0.1, 0.5), tuple(tip_of(CHAIN, pulled(0.02, 0, 0)) - base_frames(START, OFFSET)[0]
                                                        + (0.5, 0.1, 0.5))), WORLD, START, PLANNER.straight)  # fmt: skip
-    place, turn = soft_base(plan.joints[-1], OFFSET)
+    place, turn = base_frames(plan.joints[-1], OFFSET)
     np.testing.assert_allclose(
         turn, rotation_from_wxyz(np.array(base_quaternion((0, 0, -1), 0.0))).as_matrix(), atol=1e-3
     )
@@ -101,7 +104,9 @@ def test_the_soft_base_is_the_one_by_which_plans_are_made():
 
 
 def test_the_way_back_is_taken_where_the_last_step_led_away_and_is_no_longer_than_a_step():
-    steps, commands = CorrectionSteps(PLANNER), pulled(0.02, 0, 0)
+    once = iter([""])  # of the way back it is not asked
+    steps = CorrectionSteps(PLANNER, SimpleNamespace(beyond=lambda pulls, tilt_deg: next(once)))
+    commands = pulled(0.02, 0, 0)
     tip = tip_of(CHAIN, commands)
     target = tip + np.array([5e-3, 0, 0])
     first = steps.answer(order(0, commands, tip, target, settings=replace(SETTINGS, steps=1)))
@@ -110,7 +115,7 @@ def test_the_way_back_is_taken_where_the_last_step_led_away_and_is_no_longer_tha
     back = steps.answer(worse)
     assert back.ended == "1 steps are done"
     np.testing.assert_allclose(back.plan.commands[-1], commands, atol=1e-12)
-    again = CorrectionSteps(PLANNER)
+    again = CorrectionSteps(PLANNER, BEYOND)
     again.answer(order(0, commands, tip, target, settings=replace(SETTINGS, steps=1)))
     short = again.answer(replace(worse, bounds=replace(worse.bounds, longest=1e-4)))
     assert np.linalg.norm(short.plan.commands[-1] - there) == pytest.approx(1e-4)
@@ -120,7 +125,7 @@ def test_a_loose_cable_that_lies_farther_than_a_step_ends_it():
     loose = pulled(0.02, 0, 0) + np.array([0, 0.02, 0.02])
     tip = tip_of(CHAIN, loose)
     for aside in (5e-3, -5e-3):
-        answer = CorrectionSteps(PLANNER).answer(order(0, loose, tip, tip + np.array([0, aside, 0])))
+        answer = CorrectionSteps(PLANNER, BEYOND).answer(order(0, loose, tip, tip + np.array([0, aside, 0])))
         assert answer.plan is None
         assert answer.ended.startswith("a loose cable lies")
 
@@ -130,16 +135,49 @@ def test_a_step_into_an_obstacle_is_none():
     tip = tip_of(CHAIN, commands)
     low, high = tip - 0.05, tip + 0.05
     wall = Obstacle("the wall", tuple(map(float, low)), tuple(map(float, high)))
-    answer = CorrectionSteps(PLANNER).answer(
+    answer = CorrectionSteps(PLANNER, BEYOND).answer(
         order(0, commands, tip, tip + np.array([5e-3, 0, 0]), world=make_world((wall,)))
     )
     assert answer.plan is None
     assert answer.ended.startswith("world: the arm")
 
 
+@pytest.mark.parametrize(
+    ("bounds", "reason"),
+    [
+        ({"pull": 0.0201}, "a motor pulls 2.* mm, in trials up to 20.1 mm"),
+        ({"pulls": 0.0201}, "motors pull 2.* mm together, in trials up to 20.1 mm"),
+        ({"pulled_tilt_deg": -1.0}, "mount tilted by 0°, trials with pulls up to -1°"),
+    ],
+)
+def test_a_step_beyond_what_trials_went_up_to_is_not_sent(bounds, reason):
+    commands = pulled(0.02, 0, 0)
+    tip = tip_of(CHAIN, commands)
+    further = order(0, commands, tip, tip_of(CHAIN, pulled(0.023, 0, 0)))
+    sent = CorrectionSteps(PLANNER, BEYOND).answer(further)
+    assert (PLANNER.straight - sent.plan.commands[-1]).max() > 0.0201
+    answer = CorrectionSteps(PLANNER, replace(BEYOND, **bounds)).answer(further)
+    assert answer.plan is None
+    assert re.fullmatch(reason, answer.ended), answer.ended
+    unsaid = CorrectionSteps(PLANNER, None).answer(further)
+    assert (unsaid.plan, unsaid.ended) == (None, MAY[6][-1])
+
+
+def test_before_a_later_step_that_would_go_beyond_the_best_commands_come_back():
+    commands = pulled(0.02, 0, 0)
+    tip = tip_of(CHAIN, commands)
+    target = tip_of(CHAIN, pulled(0.023, 0, 0))
+    words = iter(["", "beyond"])  # of the first step, and of the second
+    steps = CorrectionSteps(PLANNER, SimpleNamespace(beyond=lambda pulls, tilt_deg: next(words)))
+    there = steps.answer(order(0, commands, tip, target)).plan.commands[-1]
+    back = steps.answer(order(1, there, tip + 0.1 * (tip - target), target))
+    assert back.ended == "beyond"
+    np.testing.assert_allclose(back.plan.commands[-1], commands, atol=1e-12)
+
+
 @pytest.mark.parametrize("changes", [{"serial": 8}, {"number": 2}, {"number": 1}])
 def test_what_it_does_not_know_of_is_no_step(changes):
-    steps, commands = CorrectionSteps(PLANNER), pulled(0.02, 0, 0)
+    steps, commands = CorrectionSteps(PLANNER, BEYOND), pulled(0.02, 0, 0)
     tip = tip_of(CHAIN, commands)
     later = replace(order(1, commands, tip, tip + np.array([5e-3, 0, 0])), **changes)
     assert steps.answer(later) == CorrectionAnswer(
@@ -147,14 +185,29 @@ def test_what_it_does_not_know_of_is_no_step(changes):
     )
 
 
+def test_a_package_without_statics_has_no_step():
+    commands = pulled(0.02, 0, 0)
+    tip = tip_of(CHAIN, commands)
+    answer = CorrectionSteps(replace(PLANNER, chain=None), BEYOND).answer(order(0, commands, tip, tip + 5e-3))
+    assert (answer.plan, answer.ended) == (None, "the process that plans has lost it")
+
+
+def test_a_step_that_changes_nothing_is_none():
+    steps, commands = CorrectionSteps(PLANNER, BEYOND), pulled(0.02, 0, 0)
+    steps._measured = lambda order: SimpleNamespace(commands=order.commands, ended="")
+    answer = steps.answer(order(0, commands, np.zeros(3), np.zeros(3)))
+    assert (answer.plan, answer.ended) == (None, "no motor brings the tip nearer")
+
+
 @pytest.mark.parametrize("number", [1, 3])
 def test_an_answer_is_to_the_next_step_alone(number):
-    steps, commands = CorrectionSteps(PLANNER), pulled(0.02, 0, 0)
+    steps, commands = CorrectionSteps(PLANNER, BEYOND), pulled(0.02, 0, 0)
     tip = tip_of(CHAIN, commands)
     first = order(0, commands, tip, tip + np.array([5e-3, 0, 0]))
     for later in (first, replace(first, number=1)):
         assert steps.answer(later).plan is not None
     assert steps.answer(replace(first, number=number)).ended == "the process that plans has lost it"
+    assert steps.answer(replace(first, number=2, serial=8)).ended == "the process that plans has lost it"
 
 
 # --- whether a plan may correct itself
@@ -191,7 +244,7 @@ def test_which_plans_may_correct_themselves(object, obstacles, planner, lacking,
 def test_the_digest_that_is_previewed_has_the_bounds_or_the_reason_why_there_are_none(lacking, unasked):
     robot_model = replace(made().robot_model, lacking=lacking)
     planning = PreviewPlanner(PLANNER, replace(made().foresight, robot_model=robot_model), ())
-    tip = soft_base(START, OFFSET)[0]
+    tip = base_frames(START, OFFSET)[0]
     tip = np.array((0.5, 0.1, 0.5)) + tip_of(CHAIN, pulled(0.02, 0, 0)) - tip
     asked = plain(tip=tuple(map(float, tip)))
     bounds = replace(BOUNDS, target=asked.request.targets.tip.position)

@@ -2,14 +2,17 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from tests.support.bent_chain import hardening_stump
+from tests.support.bent_chain import hardening_stump, stump
 from tests.support.residual import everywhere
-from trunkline.ar.teleop.correction import Bent, corrected
-from trunkline.ar.teleop.tendons import Network, bend
+from trunkline.ar.teleop.correction import ROUNDS, Bent, corrected
+from trunkline.ar.teleop.tendons import Network, _at_tilt, bend
+from trunkline.ar.teleop.tilt_reach import SYMMETRY
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY, downwards
-from trunkline.kinematics.ik.inputs import DIRECTION
+from trunkline.kinematics.ik.inputs import DIRECTION, TILT
+from trunkline.kinematics.residual.residual_map import RestingPoses
 from trunkline.model.simulation.rest import settle
 from trunkline.model.statics.chain import read_chain
 from trunkline.model.statics.equilibria import actuated, equilibrium
@@ -60,6 +63,50 @@ def test_with_a_residual_map_the_arm_s_tip_comes_to_the_target_and_the_twin_s_be
     np.testing.assert_allclose(bent.tip, target, atol=1e-4)
     rest = actuated(chain, bent.commands[None], STANDARD_GRAVITY * down)
     np.testing.assert_allclose(rest.position[0], on_twin, atol=1e-4)
+
+
+class Lopsided:
+    """A residual map of an arm that is not the same in all planes: of pulls, m, and gravity, m/s²."""
+
+    def __init__(self):
+        self.asked = []
+
+    def mean(self, poses):
+        self.asked.append((poses.pulls[0], poses.gravity[0]))
+        return np.array([[0.004, 0.0, 0.0]]) + 5e-4 * poses.gravity + 0.1 * poses.pulls[:, :3]
+
+
+@pytest.mark.parametrize("turns", [0, 1, -1])
+def test_a_network_of_tilts_foresees_the_tip_by_the_map_of_the_arm_as_it_is_held(turns):
+    plain = read_chain(stump())
+    tilt, turn = 0.6, Rotation.from_euler("z", turns * SYMMETRY)
+    plane, down = downwards(tilt, 0.0), downwards(tilt, turns * SYMMETRY)
+    tensions = np.zeros((1, plain.tendons))
+    tensions[0, 0] = 0.1 * plain.max_tension[0]
+    rest, learnt = equilibrium(plain, tensions, STANDARD_GRAVITY * plane), Lopsided()
+
+    def shift(commands, gravity):
+        return learnt.mean(RestingPoses(plain.straight_lengths - commands[None], STANDARD_GRAVITY * gravity[None]))[0]
+
+    def ask(poses):
+        tip = rest.position + shift(rest.commands[0], plane)  # in the network's plane
+        answer = {"commands": rest.commands, "lengths": rest.lengths, "tip": tip}
+        return {name: np.tile(part, (len(poses), 1)) for name, part in answer.items()}
+
+    commands = np.roll(rest.commands[0], turns)
+    expected = turn.apply(rest.position[0]) + shift(commands, down)
+    network, gravity = Network(ask, len(TILT)), tuple(map(float, down))
+    first = _at_tilt(network, tuple(expected), gravity, plain, learnt)
+    np.testing.assert_array_equal(first.commands, commands)
+    np.testing.assert_allclose(first.tip, expected, atol=1e-12)
+    learnt.asked.clear()
+    bent = corrected(plain, first, tuple(expected), gravity, learnt)
+    assert len(learnt.asked) == ROUNDS + 1
+    np.testing.assert_allclose([pull for _, pull in learnt.asked], [STANDARD_GRAVITY * down] * (ROUNDS + 1))
+    at_rest = actuated(plain, bent.commands[None], STANDARD_GRAVITY * down).position[0]
+    np.testing.assert_allclose(bent.tip, at_rest + shift(bent.commands, down), atol=1e-5)
+    np.testing.assert_allclose(bent.tip, expected, atol=5e-4)
+    np.testing.assert_array_equal(bend(network, tuple(expected), gravity, 0.02, plain, learnt).tip, bent.tip)
 
 
 @pytest.mark.parametrize("beyond", [0.0, 0.01, 0.02])

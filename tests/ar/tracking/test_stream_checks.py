@@ -192,6 +192,62 @@ def test_silence_is_named():
     assert checks.fault == "found no frame for 0.16 s, expected one within 0.15 s"
 
 
+def late_stream(late, then=lambda frame: frame, seconds=4.5):
+    """Faults of a stream by the times at which frames come, s from frame BEGINS on; from there on one waits for `late`
+    s of its time, and those behind it as long as it does. `then` spoils a frame."""
+    checks, faults, times = StreamChecks(EXPECTED, StreamLimits()), [], [-np.inf]
+    for frame in frames(BEGINS + round(seconds / STEP)):
+        since = (frame.number - BEGINS) * STEP
+        times.append(max(times[-1], since + (late(since) if since >= 0 else 0.0)))
+        checks.take(7.0 + times[-1], then(frame))
+        faults.append(checks.fault)
+    return np.array(faults[BEGINS:]), np.array(times[1 + BEGINS :])
+
+
+def busy(since):
+    """For 0.3 s, and 0.6 s later for one frame."""
+    return 0.2 if since < 0.3 or abs(since - 0.9) < STEP / 2 else 0.0
+
+
+def test_a_stream_that_was_late_is_sound_again_once_it_has_been_on_time_for_a_while():
+    faults, times = late_stream(busy)
+    ill = np.char.startswith(faults, "found poses that are 0.20 s old when they come")
+    assert not ill[times < 0.2 + LASTS - STEP].any()
+    assert ill[(times > 0.2 + LASTS + STEP) & (times < 3.09)].all()  # 2 s after the last frame that was late
+    assert not (faults[times > 3.12] != "").any()
+
+
+def test_a_stream_that_is_late_again_and_again_stays_a_fault():
+    faults, times = late_stream(lambda since: 0.2 if since < 0.3 or since % 1.9 < STEP else 0.0, seconds=6.0)
+    assert (faults[times > 0.4] != "").all()
+
+
+def test_a_late_stream_that_lies_as_well_does_not_recover():
+    def nan(frame):
+        return with_body(frame, 3, np.nan) if BEGINS + 12 < frame.number < BEGINS + 36 else frame
+
+    faults, times = late_stream(busy, nan)
+    assert np.char.startswith(faults[times > 3.0], "'marker_3': found a position that is not finite").all()
+
+
+@pytest.mark.parametrize("waits", [True, False])
+def test_a_silent_stream_is_sound_again_once_frames_have_come_for_a_while(waits):
+    checks, faults = StreamChecks(EXPECTED, StreamLimits(recovers=1.0)), []
+    for frame in frames(BEGINS + 260):
+        now = 5.0 + frame.number * STEP
+        if frame.number == BEGINS:
+            checks._late = "found no frame"  # as of a gap before
+        if BEGINS <= frame.number < BEGINS + 60:  # 0.5 s
+            if waits:
+                checks.wait(now)
+            continue
+        checks.take(now, frame)
+        faults.append(checks.fault)
+    again = np.array(faults[BEGINS:])
+    assert (again[: round(0.99 / STEP)] != "").all()
+    assert (again[round(1.02 / STEP) :] == "").all()
+
+
 def test_before_the_first_frame_there_is_no_silence():
     checks = StreamChecks(EXPECTED, StreamLimits())
     checks.wait(100.0)

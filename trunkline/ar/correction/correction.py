@@ -39,13 +39,15 @@ Metres = Annotated[float, Field(gt=0, le=0.1)]
 class CorrectionSettings:
     """tolerance: m from the target, within which the tip has arrived. steps: at most. longest: m, change of commands
     in a step. steepest: m of the tip's way for 1 m of one motor's, from which on the arm is near snapping through.
-    astray: m that the tip may be off: beyond, the twin or the cameras are wrong, which no step mends."""
+    astray: m that the tip may be off: beyond, the twin or the cameras are wrong, which no step mends. misplaced: m that
+    the cameras may see the arm's mount from where the joints have it: beyond, the pose of their frame is wrong."""
 
     tolerance: Metres = 0.8e-3
     steps: Annotated[int, Field(ge=1, le=20)] = 5
     longest: Metres = 5e-3
     steepest: Annotated[float, Field(gt=0, le=1000)] = 15.0
     astray: Metres = 60e-3
+    misplaced: Metres = 5e-3
 
 
 class TipCorrection:

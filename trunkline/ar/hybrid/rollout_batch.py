@@ -14,12 +14,13 @@ import numpy as np
 from trunkline.ar.hybrid.outcomes import Criterion
 from trunkline.ar.hybrid.rates import wilson
 from trunkline.ar.hybrid.rollouts import FRAME, CommandTrajectory, ComposedTwin, Piece, rollouts
-from trunkline.ar.hybrid.tip_uncertainty import TipUncertainty
+from trunkline.ar.hybrid.tip_uncertainty import TipUncertainty, TipUnknown
 from trunkline.ar.hybrid.uncertainty import GraspUncertainty, PosteriorSamples, nominal_sample, sample
 
 WITHIN = 0.9  # share of futures whose tips are within the spread
 OFFSETS = 100  # draws of where the tip rests for each future: a quantile of a dozen is none
 CONTACT = "the arm touches something, and in no trial did it"
+TOUCHES = TipUnknown(CONTACT)
 EVERY = 0.1  # s between the times at which a spread is stated
 
 
@@ -113,7 +114,7 @@ def preview(
     seed: int = 0,
     show: Callable[[Piece], None] = lambda piece: None,
     go_on: Callable[[], None] = lambda: None,
-    tip: TipUncertainty | str = CONTACT,
+    tip: TipUncertainty | TipUnknown = TOUCHES,
 ) -> PlanPreview:
     """Try a plan in `count` futures.
 
@@ -129,9 +130,9 @@ def preview(
         begun.append(piece)
     motion = joined(list(interruptible(rollouts(twin, trajectory, samples), go_on)))
     success, believed = holding.holds(motion) if holding is not None else None, joined(begun)
-    if isinstance(tip, str):
-        return PlanPreview(believed, motion, samples, success, None, tip)
     shift = None if tip.shift is None else tip.shift.at(believed.time)
+    if isinstance(tip, TipUnknown):
+        return PlanPreview(believed, motion, samples, success, None, tip.reason, shift)
     return PlanPreview(believed, motion, samples, success, offsets_of(tip, believed, count, seed), "", shift)
 
 

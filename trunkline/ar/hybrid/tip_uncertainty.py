@@ -52,6 +52,15 @@ class TipShift:
 
 
 @dataclass(frozen=True)
+class TipUnknown:
+    """Of a tip of which nobody knows by how far it may be elsewhere: the `reason` why. shift: as of `TipUncertainty`,
+    as plans are made with it there too."""
+
+    reason: str
+    shift: TipShift | None = None
+
+
+@dataclass(frozen=True)
 class TipUncertainty:
     """Of a tip at rest, where futures alone do not say it.
 

@@ -11,16 +11,16 @@ from trunkline.ar.hybrid.compose import Placed, compose, panda_joints
 from trunkline.ar.hybrid.objects import GraspObject
 from trunkline.ar.hybrid.rollouts import CommandTrajectory, ComposedTwin
 from trunkline.ar.hybrid.string import hang
-from trunkline.ar.hybrid.tip_uncertainty import BaseAlignment, Hanging, TipShift, TipUncertainty
+from trunkline.ar.hybrid.tip_uncertainty import BaseAlignment, Hanging, TipShift, TipUncertainty, TipUnknown
 from trunkline.ar.hybrid.uncertainty import Contact, GraspUncertainty
 from trunkline.ar.hybrid.worlds import SupportSurface
 from trunkline.ar.hybrid.worlds import WorldGeometry as Room
 from trunkline.ar.preview.settings import Previewing
+from trunkline.ar.teleop.base_frames import base_frames
 from trunkline.ar.teleop.messages import Obstacle, World, WorldObject
 from trunkline.ar.teleop.vectors import Quaternion, unit
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY, tilt_of_gravity, wxyz_from_rotation
-from trunkline.kinematics.panda.kinematics import mount_pose
 from trunkline.kinematics.panda.mounts import PandaRobot
 from trunkline.kinematics.residual.residual_map import ResidualMap
 from trunkline.model.arm_model import ArmModel
@@ -57,43 +57,41 @@ class RobotModel:
                  for part in ArmModel(model).branches]  # fmt: skip
         return float(-np.log(CREEP) * np.max([time.max(initial=0.0) for time in times], initial=0.0))
 
-    def tip_uncertainty(self, trajectory: CommandTrajectory, hangs: np.ndarray | None) -> TipUncertainty | str:
+    def tip_uncertainty(self, trajectory: CommandTrajectory, hangs: np.ndarray | None) -> TipUncertainty | TipUnknown:
         """By how far its tip may be elsewhere, at rest without a load where a trajectory ends; or why that is unknown.
         Cables that rub hold a future's tip where its way leaves it, within the friction band: it counts only without.
         hangs: where the straight arm's tip was seen where the trajectory begins, in the base frame, (3,), m."""
         if self.lacking is None:
-            return "no trial at rest was held out, or the package is of an earlier release"
-        places, bases = _base_frames(trajectory.joints[[0, -1]], self.robot.mount_offset)
+            return TipUnknown("no trial at rest was held out, or the package is of an earlier release")
+        places, bases = base_frames(trajectory.joints[[0, -1]], self.robot.mount_offset)
         base, commands = bases[-1], trajectory.commands[-1]
         gravity = base.T @ GRAVITY[0]
         arm = arm_of(self.arm.copy().compile())
         model = ArmModel(arm.model)
         order = model.actuators
         pulls = np.maximum(arm.chain.straight_lengths - commands[order], 0)
-        beyond = self.lacking.beyond(pulls, float(np.degrees(tilt_of_gravity(gravity))))
-        if beyond:
-            return beyond
+        learnt = self.lacking.residual_map
+        shift = None if learnt is None else self._shift(trajectory, arm, order, learnt)
+        if beyond := self.lacking.beyond(pulls, float(np.degrees(tilt_of_gravity(gravity)))):
+            return TipUnknown(beyond, shift)
         pose = StaticPoses(gravity[None], commands[None][:, order])
         ways, friction = arm.ways(pose)[0], np.zeros(3) if model.rubs else base @ arm.friction(pose)[0]
         if not np.isfinite(ways).all():
-            return "the twin does not come to rest there"
+            return TipUnknown("the twin does not come to rest there", shift)
         hanging = None if hangs is None else Hanging(hangs, places[0], bases[0])
         uncertainty = TipUncertainty(self.lacking.discrepancy, ways, friction, self.alignment, base, hanging)
-        if self.lacking.residual_map is None:
+        if learnt is None:
             return uncertainty
-        unknown = float(self.lacking.residual_map.unknown(arm.resting(pose))[0])
-        shift = self._shift(trajectory, arm, order, self.lacking.residual_map)
+        unknown = float(learnt.unknown(arm.resting(pose))[0])
         return replace(uncertainty, shift=shift, unknown=unknown, left=self.lacking.left)
 
-    def _shift(
-        self, trajectory: CommandTrajectory, arm: StaticArm, order: np.ndarray, learnt: ResidualMap
-    ) -> TipShift:
+    def _shift(self, trajectory: CommandTrajectory, arm: StaticArm, order: np.ndarray, learnt: ResidualMap) -> TipShift:
         """By how far the tip rests beside that of `arm` along a trajectory, its cables in that `order` (K,). Where the
         twin finds no rest, as before and after."""
         times = np.linspace(0, trajectory.duration, max(round(trajectory.duration / SHIFTED), 1) + 1)
         rows = trajectory.at(times)
         joints, commands = np.split(rows, [trajectory.joints.shape[1]], axis=1)
-        bases = _base_frames(joints, self.robot.mount_offset)[1]
+        bases = base_frames(joints, self.robot.mount_offset)[1]
         poses = StaticPoses(np.einsum("nji,j->ni", bases, GRAVITY[0]), commands[:, order])
         shifts = np.einsum("nij,nj->ni", bases, arm.shift(learnt, poses))
         rested = np.isfinite(shifts).all(axis=1)
@@ -179,7 +177,7 @@ def _start(
     lean: Rotation,
 ) -> np.ndarray:
     """The composed model's pose (nq,) with the arm at rest."""
-    base = _base_frames(joints[None], mount_offset)[1][0]
+    base = base_frames(joints, mount_offset)[1]
     gravity = lean.inv().apply(base.T @ GRAVITY[0])
     rest = settle(arm, commands[None], gravity).qpos[0]
     pose = model.qpos0.copy()
@@ -189,13 +187,6 @@ def _start(
         if name:
             pose[model.joint(name).qposadr[0]] = rest[arm.jnt_qposadr[number]]
     return pose
-
-
-def _base_frames(joints: np.ndarray, mount_offset: float) -> tuple[np.ndarray, np.ndarray]:
-    """Origins (N, 3), m, and rotations (N, 3, 3) of the arm's base frame at `joints` (N, 7), rad: its y and z are
-    opposite to the flange's."""
-    places, flanges = mount_pose(joints, mount_offset)
-    return places, flanges @ np.diag([1.0, -1.0, -1.0])
 
 
 def _upright(quaternion: Quaternion) -> Quaternion:

@@ -35,7 +35,8 @@ class ArmCameraSettings:
     next. tip: of the arm in the frame of the last, m. position, m, and quaternion, wxyz: of the cameras' frame in the
     robot's base frame. limits: of the stream, `distance` as a share of the first of `apart`: an arm that curls brings
     only neighbors no nearer to each other. natnet: where Motive is. simulated: of the simulated robot's cameras, which
-    need none of these but limits.
+    need none of these but limits. mount: the arm's in the frame of the first body, m; None where no body is at the
+    mount, as of a single one, and nothing shows then that the cameras' frame is elsewhere.
     """
 
     bodies: Annotated[tuple[Annotated[str, Field(min_length=1, max_length=64)], ...], Field(max_length=100)]
@@ -46,6 +47,7 @@ class ArmCameraSettings:
     limits: StreamLimits
     natnet: NatNetSettings
     simulated: CameraSettings
+    mount: Place | None = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         if len(self.apart) != max(len(self.bodies) - 1, 0):
@@ -60,7 +62,7 @@ class ArmCameraSettings:
 class MeasuredArm:
     """The newest that is measured, in the base frame. stamp: s of this machine's monotonic clock. poses: of the bodies,
     m and wxyz, NaN where one is not tracked. Shape (B, 7). tip: m. Shape (3,). age, s, rate, Hz, loss, fault: as of
-    `TrackedPoses`."""
+    `TrackedPoses`. mount: m, NaN where its body is not tracked, None where there is none. Shape (3,)."""
 
     stamp: float
     poses: np.ndarray
@@ -69,14 +71,17 @@ class MeasuredArm:
     rate: float
     loss: float
     fault: str
+    mount: np.ndarray | None
 
 
 class ArmCameras:
     """A tracker of the arm's bodies, from the mount to the tip. pose: of the cameras' frame in the base. tip: m, in the
-    frame of the last body. Shape (3,)."""
+    frame of the last body, mount: in that of the first, None where that is not there. Shapes (3,)."""
 
-    def __init__(self, tracker: Tracker, names: Sequence[str], pose: Pose, tip: np.ndarray) -> None:
-        self.names, self._tracker, self._tip = tuple(names), tracker, tip
+    def __init__(
+        self, tracker: Tracker, names: Sequence[str], pose: Pose, tip: np.ndarray, mount: np.ndarray | None
+    ) -> None:
+        self.names, self._tracker, self._tip, self._mount = tuple(names), tracker, tip, mount
         self._turn, self._origin = rotation_from_wxyz(np.array(pose.quaternion)), np.array(pose.position)
 
     def connect(self) -> None:
@@ -94,10 +99,8 @@ class ArmCameras:
             turns = self._turn * rotation_from_wxyz(tracked.quaternions[visible])
             poses[visible, :3] = self._turn.apply(tracked.positions[visible]) + self._origin
             poses[visible, 3:] = wxyz_from_rotation(turns)
-        tip = poses[-1, :3].copy()
-        if np.isfinite(tip).all():
-            tip += rotation_from_wxyz(poses[-1, 3:]).apply(self._tip)
-        return MeasuredArm(tracked.stamp, poses, tip, tracked.age, tracked.rate, tracked.loss, tracked.fault)
+        tip, mount = _place(poses[-1], self._tip), None if self._mount is None else _place(poses[0], self._mount)
+        return MeasuredArm(tracked.stamp, poses, tip, tracked.age, tracked.rate, tracked.loss, tracked.fault, mount)
 
     def close(self) -> None:
         self._tracker.stop()
@@ -118,7 +121,7 @@ class SimulatedArmCameras(ArmCameras):
         turn = rotation_from_wxyz(np.array(cameras.quaternion)).inv()
         pose = _pose(turn, -turn.apply(np.array(cameras.origin)))
         self._simulated = SimulatedTracker(cameras, _expected(names, apart), settings.limits)
-        super().__init__(self._simulated, names, pose, np.array(tip[1], float))
+        super().__init__(self._simulated, names, pose, np.array(tip[1], float), np.zeros(3))
         self.show(poses)
 
     def show(self, bodies: np.ndarray) -> None:
@@ -136,7 +139,9 @@ def natnet_cameras(settings: ArmCameraSettings) -> ArmCameras:
         raise InputError("cameras.bodies: found none, expected the names of the arm's rigid bodies in Motive")
     expected = _expected(settings.bodies, np.array(settings.apart))
     tracker = NatNetTracker(settings.natnet, expected, settings.limits)
-    return ArmCameras(tracker, settings.bodies, Pose(settings.position, settings.quaternion), np.array(settings.tip))
+    alone = settings.mount is None or len(settings.bodies) == 1
+    pose, mount = Pose(settings.position, settings.quaternion), None if alone else np.array(settings.mount)
+    return ArmCameras(tracker, settings.bodies, pose, np.array(settings.tip), mount)
 
 
 def _expected(names: Sequence[str], apart: np.ndarray) -> ExpectedBodies:
@@ -144,6 +149,13 @@ def _expected(names: Sequence[str], apart: np.ndarray) -> ExpectedBodies:
     distances, rows = np.full((len(names), len(names)), np.nan), np.arange(len(apart))
     distances[rows, rows + 1] = distances[rows + 1, rows] = apart
     return ExpectedBodies(tuple(names), True, None, distances)
+
+
+def _place(pose: np.ndarray, within: np.ndarray) -> np.ndarray:
+    """m, of what is `within` (3,), m, the frame of a body at `pose` (7,); NaN where that is. Shape (3,)."""
+    if not np.isfinite(pose).all():
+        return np.full(3, np.nan)
+    return pose[:3] + rotation_from_wxyz(pose[3:]).apply(within)
 
 
 def _start(simulation: Simulation) -> np.ndarray:

@@ -1,5 +1,6 @@
 """A session made of a package: core, processes, scene. Everything comes out of the package's file."""
 
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -65,7 +66,8 @@ def make(
     hardware: Hardware | None = None,
     cameras: str = "",
 ) -> SessionParts:
-    """Of the package at `path`, the robot simulated, or as `hardware` has it. cameras: of CAMERAS, "" for none.
+    """Of the package at `path`, the robot simulated, or as `hardware` has it. cameras: of CAMERAS, "" for none. Where
+    it raises, no process is left.
 
     Raises:
         InputError: there is no package, or it cannot be previewed with, or cameras do not answer.
@@ -75,25 +77,32 @@ def make(
     simulation, maps = simulation_of(package, teleop, config, joints), unpacked.maps_of(package.files)
     world = make_world(obstacles(config), () if config.object is None else (config.object,))
     setup = path.resolve(), teleop, config.preview, simulation.bodies, world
-    previewer = PreviewProcess(preview_process.run, setup)  # first: it takes longest until it is ready
-    drawing = scene(simulation.twin.model, simulation.bodies, maps, package.geometry.length)
-    subject = subject_of(simulation, hardware)
-    arm_cameras = cameras_of(cameras, simulation, subject, config.cameras)
-    if arm_cameras is not None:
-        subject = replace(subject, measured=arm_cameras.names)
-    log_writer = LogWriterProcess(new_path(Path(config.journal.folder)), subject, config.journal.period)
-    robot = robot_of(simulation, hardware)
-    core = Teleoperation(teleop.core, package.reach, package.digest, teleop.mount_offset)
-    lift = teleop.handling.least_lift
-    controller = SessionController(
-        core, robot, previewer, world, lift, log_writer, package.period, arm_cameras, config.correction
-    )
-    controller.begin(config.rate, __version__)
-    log_writer.await_begun()
-    certificate = certificate_of(path, package.files)
-    return SessionParts(
-        controller, package.digest, drawing, Shells.of(maps), robot, previewer, log_writer, certificate, arm_cameras
-    )
+    with ExitStack() as begun:  # what closes where something fails
+        previewer = PreviewProcess(preview_process.run, setup)  # first: it takes longest until it is ready
+        begun.callback(previewer.close)
+        drawing = scene(simulation.twin.model, simulation.bodies, maps, package.geometry.length)
+        subject = subject_of(simulation, hardware)
+        arm_cameras = cameras_of(cameras, simulation, subject, config.cameras)
+        if arm_cameras is not None:
+            begun.callback(arm_cameras.close)
+            subject = replace(subject, measured=arm_cameras.names)
+        log_writer = LogWriterProcess(new_path(Path(config.journal.folder)), subject, config.journal.period)
+        begun.callback(log_writer.close)
+        robot = robot_of(simulation, hardware)
+        begun.callback(robot.close)
+        core = Teleoperation(teleop.core, package.reach, package.digest, teleop.mount_offset)
+        lift = teleop.handling.least_lift
+        controller = SessionController(
+            core, robot, previewer, world, lift, log_writer, package.period, arm_cameras, config.correction
+        )
+        controller.begin(config.rate, __version__)
+        log_writer.await_begun()
+        certificate = certificate_of(path, package.files)
+        parts = SessionParts(
+            controller, package.digest, drawing, Shells.of(maps), robot, previewer, log_writer, certificate, arm_cameras
+        )
+        begun.pop_all()
+    return parts
 
 
 def cameras_of(kind: str, simulation: Simulation, subject: Subject, settings: ArmCameraSettings) -> ArmCameras | None:
@@ -106,7 +115,11 @@ def cameras_of(kind: str, simulation: Simulation, subject: Subject, settings: Ar
         return None
     simulated_arm = kind == "simulated"
     cameras = SimulatedArmCameras(simulation, subject.tip, settings) if simulated_arm else natnet_cameras(settings)
-    cameras.connect()
+    try:
+        cameras.connect()
+    except BaseException:
+        cameras.close()
+        raise
     return cameras
 
 

@@ -130,12 +130,12 @@ class SessionController:
         self._logged: tuple = ()
         self._follow = FollowControl(previewer.submit, robot.hear)
         self.cameras, self.arm = cameras, None
-        self._moved = (
-            self._written
-        ) = -math.inf  # s, when anything moved, and of the newest of what cameras saw in the log
+        self._moved = -math.inf  # s, when anything moved
+        self._written = -math.inf  # s, of the newest of what cameras saw in the log
         self.correction = CorrectionControl(
-            correction or CorrectionSettings(), previewer.submit, robot.start, robot.stop, self.log_writer.event
-        )
+            correction or CorrectionSettings(), previewer.submit, robot.start, robot.stop, self.log_writer.event,
+            core.mount_offset,
+        )  # fmt: skip
         self._bounds: CorrectionBounds | None = None  # of the plan that is asked for
 
     def begin(self, rate: float, version: str = "") -> None:

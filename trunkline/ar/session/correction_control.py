@@ -14,17 +14,20 @@ from trunkline.ar.correction.rest import RestWatch
 from trunkline.ar.session.arm_cameras import MeasuredArm
 from trunkline.ar.session.correction_steps import CorrectionAnswer, CorrectionOrder
 from trunkline.ar.session.robot_process import RobotState
+from trunkline.ar.teleop.base_frames import base_frames
 from trunkline.ar.teleop.messages import ExecutorReport, World
 from trunkline.ar.teleop.plan import CorrectionBounds, Plan
 
 PATIENCE = 20.0  # s in which the tip has to rest
 ANSWERS, STARTS = 5.0, 2.0  # s for the process that plans to answer, and for the robot to start a step
+UNCHECKED = "no body is at the mount: the pose of the cameras' frame was not checked"
 BLIND, STRAYS = 0.5, 0.1  # s in which the tip may be invisible as it moves, and too far from its target
 ROUNDING = 1e-9  # m
 
 
 class CorrectionControl:
     """submit: asks for a step. start: has the robot run it, as `Executor.start`. stop: the robot. event: into the log.
+    mount_offset: from the flange to the arm's mount, m.
 
     Attributes:
         words: of the last correction or the one that goes on, in one line; "" where there is none.
@@ -37,8 +40,10 @@ class CorrectionControl:
         start: Callable[[Plan, str], str],
         stop: Callable[[], None],
         event: Callable[..., None],
+        mount_offset: float,
     ) -> None:
-        self._settings = settings
+        self._settings, self._mount_offset = settings, mount_offset
+        self._unchecked = False  # that no body is at the mount has been told
         self._submit, self._start, self._stop, self._event = submit, start, stop, event
         self._serial = 0
         self.forget()
@@ -54,6 +59,7 @@ class CorrectionControl:
         self._digests: set[str] = set()  # of its steps
         self._errors: list[float] = []
         self._answer: CorrectionAnswer | None = None
+        self._mounts: list[np.ndarray] = []  # as cameras see it at rest
         self._steps = 0  # after which the tip was measured
         self._ending = ""  # the reason, while its last step still moves
 
@@ -109,9 +115,12 @@ class CorrectionControl:
             self._stop()
         self._phase, self._answer = "", None
         off, steps = [1e3 * error for error in self._errors], self._steps
+        if off and not self._mounts and not self._unchecked:
+            self._unchecked, reason = True, f"{reason}; {UNCHECKED}"
         if steps > 0:
             many = f"{steps} step{'' if steps == 1 else 's'}" + (", and back" if self._ending else "")
-            self.words = f"corrected from {off[0]:.1f} to {off[-1]:.1f} mm in {many}: {reason}"
+            how = "the tip ended farther off than before," if off[-1] > off[0] else "corrected"
+            self.words = f"{how} from {off[0]:.1f} to {off[-1]:.1f} mm in {many}: {reason}"
         else:
             self.words = f"not corrected{f', {off[0]:.1f} mm off' if off else ''}: {reason}"
         self._event("corrected", digest=self._digest, errors=self._errors, reason=reason)
@@ -146,7 +155,7 @@ class CorrectionControl:
         if arm.fault:
             return f"cameras: {arm.fault}"
         bounds, visible = self._bounds, bool(np.isfinite(arm.tip).all())
-        off = float(np.linalg.norm(arm.tip - bounds.target)) if visible else 0.0
+        off = float(np.linalg.norm(arm.tip - bounds.target))  # NaN, which is beyond nothing, while it is invisible
         self._invisible = 0.0 if visible else self._invisible + dt
         begun = bool(self._errors)  # before, an arm may still swing from its way there
         self._strayed = self._strayed + dt if begun and off > bounds.astray else 0.0
@@ -174,6 +183,8 @@ class CorrectionControl:
         if arm.stamp <= max(self._since, self._stamp):
             return None
         self._stamp = arm.stamp
+        if arm.mount is not None:
+            self._mounts.append(arm.mount)
         if not self._watch.observe(arm.stamp, arm.tip):
             return None
         assert self._plan is not None
@@ -184,6 +195,8 @@ class CorrectionControl:
         if self._ending:
             return self.end(self._ending)
         self._steps = len(self._errors) - 1
+        if self._steps == 0 and (reason := self._misplaced(self._plan)):
+            return self.end(reason)
         if self._errors[-1] > bounds.astray:
             return self.end(self._too_far(self._errors[-1]))
         self._phase, self._waited, self._answer = "asks", 0.0, None
@@ -193,6 +206,20 @@ class CorrectionControl:
             self._world, self._plan.package,
         ))  # fmt: skip
         return None
+
+    def _misplaced(self, plan: Plan) -> str:
+        """Why the cameras' frame is not where it is set, by the mount as they see it; "" where it may be, as where they
+        see none. A frame that is turned about the mount itself does not show."""
+        visible = [place for place in self._mounts if np.isfinite(place).all()]
+        if not self._mounts:
+            return ""
+        if not visible:
+            return "no camera has seen the body at the mount"
+        apart = float(np.linalg.norm(np.median(visible, axis=0) - base_frames(plan.joints[-1], self._mount_offset)[0]))
+        most = self._settings.misplaced
+        self._event("mount", apart=apart, expected=most)
+        words = f"cameras see the mount {1e3 * apart:.1f} mm from where the joints have it"
+        return f"{words}, expected at most {1e3 * most:g} mm" if apart > most else ""
 
     def _take_answer(self, robot: ExecutorReport) -> None:
         answer = self._answer

@@ -1,7 +1,7 @@
 """Steps by which a plan that has arrived corrects itself: made by the process that plans, one at a time.
 
-A step changes the motors' commands alone, within their limits, and is a plan of its own, checked as any other. What may
-be executed of it is decided elsewhere (`correction_control.py`).
+A step changes the motors' commands alone, within their limits and the certificate's conditions, and is a plan of its
+own, checked as any other. What may be executed of it is decided elsewhere (`correction_control.py`).
 """
 
 from dataclasses import dataclass
@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trunkline.ar.correction.correction import CorrectionSettings, TipCorrection
+from trunkline.ar.teleop.base_frames import base_frames
 from trunkline.ar.teleop.messages import Obstacle, Targets, Vector, World
 from trunkline.ar.teleop.plan import CorrectionBounds, Plan
 from trunkline.ar.teleop.plan_checks import check_plan
@@ -16,7 +17,6 @@ from trunkline.ar.teleop.planner import Planner
 from trunkline.ar.teleop.trajectory import JOINTS, MotionLimits, point_to_point
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY, tilt_of_gravity
-from trunkline.kinematics.panda.kinematics import mount_pose
 from trunkline.twin.discrepancy import Lacking
 
 PHASE = "correction"
@@ -53,10 +53,10 @@ class CorrectionAnswer:
 
 
 class CorrectionSteps:
-    """Of one plan at a time."""
+    """Of one plan at a time. lacking: beyond whose conditions no step goes; None where there are none, and no step."""
 
-    def __init__(self, planner: Planner) -> None:
-        self._planner = planner
+    def __init__(self, planner: Planner, lacking: Lacking | None) -> None:
+        self._planner, self._lacking = planner, lacking
         self._serial, self._loop = -1, None
 
     def answer(self, order: CorrectionOrder) -> CorrectionAnswer:
@@ -64,6 +64,8 @@ class CorrectionSteps:
         loop = self._measured(order)
         if loop is None:
             return CorrectionAnswer(order.serial, order.number, None, "the process that plans has lost it")
+        if not loop.ended and (beyond := beyond_trials(self._lacking, order.joints, loop.commands, self._planner)):
+            loop.refuse(beyond)
         here, there, ended = order.commands, loop.commands, loop.ended
         change = float(np.linalg.norm(there - here))
         if change <= SAME:
@@ -81,7 +83,7 @@ class CorrectionSteps:
 
     def _measured(self, order: CorrectionOrder) -> TipCorrection | None:
         planner, settings = self._planner, order.settings
-        place, turn = soft_base(order.joints, planner.mount_offset)
+        place, turn = base_frames(order.joints, planner.mount_offset)
         if order.number == 0:
             if planner.chain is None:
                 return None
@@ -120,18 +122,17 @@ def why_uncorrected(plan: Plan, targets: Targets, world: World, bounds: Correcti
             return (
                 f"{obstacle.name} is {1e3 * away:.0f} mm from the tip's target, expected {1e3 * bounds.astray:.0f} mm"
             )
+    return beyond_trials(lacking, plan.joints[-1], plan.commands[-1], planner)
+
+
+def beyond_trials(lacking: Lacking | None, joints: np.ndarray, commands: np.ndarray, planner: Planner) -> str:
+    """What of the arm at rest at `joints` (7,), rad, and `commands` (K,), m, no trial went up to, "" where trials did.
+    On the straight way between two commands nothing is beyond that is within at both."""
     if lacking is None:
         return "no trial at rest was held out, or the package is of an earlier release"
-    gravity = DOWN @ soft_base(plan.joints[-1], planner.mount_offset)[1]
-    pulls = np.maximum(planner.straight - plan.commands[-1], 0.0)
+    gravity = DOWN @ base_frames(joints, planner.mount_offset)[1]
+    pulls = np.maximum(planner.straight - commands, 0.0)
     return lacking.beyond(pulls, float(np.degrees(tilt_of_gravity(gravity))))
-
-
-def soft_base(joints: np.ndarray, mount_offset: float) -> tuple[np.ndarray, np.ndarray]:
-    """Origin (3,), m, and rotation (3, 3) of the arm's base frame at `joints` (7,), rad: its y and z are opposite to
-    the flange's."""
-    places, flanges = mount_pose(joints[None], mount_offset)
-    return places[0], flanges[0] @ np.diag([1.0, -1.0, -1.0])
 
 
 def _away(point: Vector, obstacle: Obstacle) -> float:

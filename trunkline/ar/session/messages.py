@@ -229,7 +229,7 @@ Point = tuple[float, float, float]
 class MeasuredMessage:
     """The arm as cameras see it, ten times a second where a session has any. markers: m, from the mount to the tip,
     null where one is not seen; tip: m. apart: from there to the drawn robot's tip, m; null where it is not seen. age:
-    s; rate: Hz; loss: share of the frames that did not come. fault: why nothing is corrected by them any more, ""
+    s; rate: Hz; loss: share of the frames that did not come. fault: why nothing is corrected by them now, ""
     while they are sound."""
 
     markers: tuple[Point | None, ...]

@@ -130,7 +130,7 @@ class PreviewPlanner:
         self.planner, self.foresight, self.bodies = planner, foresight, bodies
         self.robot_model, self.previewing = foresight.robot_model, foresight.settings
         self.prediction: PlanPrediction | None = None
-        self._corrections = CorrectionSteps(planner)
+        self._corrections = CorrectionSteps(planner, self.robot_model.lacking)
         self._composed: tuple[tuple, ComposedTwin | None, Rotation | None] = ((), None, None)
         self._grasped: PlanPrediction | None = None  # the last grasp: of an object that is held, the one that was run
 

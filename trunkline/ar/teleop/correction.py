@@ -43,15 +43,21 @@ def corrected(
     """
     if learnt is None:
         return _corrected(chain, first, np.array(tip), gravity)
-    bent, pull = first, STANDARD_GRAVITY * np.array([gravity])
+    bent = first
     for _ in range(ROUNDS):
-        shift = learnt.mean(RestingPoses.of_commands(chain, bent.commands[None], pull))[0]
+        shift = shift_of(learnt, chain, bent.commands, gravity)
         nearer = _corrected(chain, first._replace(tip=first.tip - shift), np.array(tip) - shift, gravity)
         if nearer is None:
             return None
         bent = nearer
-    shift = learnt.mean(RestingPoses.of_commands(chain, bent.commands[None], pull))[0]
-    return bent._replace(tip=bent.tip + shift)
+    return bent._replace(tip=bent.tip + shift_of(learnt, chain, bent.commands, gravity))
+
+
+def shift_of(learnt: ResidualMap, chain: Chain, commands: np.ndarray, gravity: Vector) -> np.ndarray:
+    """By how far the tip rests beside that of the twin `chain` under `commands` (K,), m, and `gravity`, a unit vector,
+    in the soft arm's base frame. Shape (3,), m."""
+    pull = STANDARD_GRAVITY * np.array([gravity])
+    return learnt.mean(RestingPoses.of_commands(chain, commands[None], pull))[0]
 
 
 def _corrected(chain: Chain, first: Bent, tip: np.ndarray, gravity: Vector) -> Bent | None:

@@ -15,7 +15,7 @@ import numpy as np
 import onnxruntime
 from onnxruntime.capi.onnxruntime_pybind11_state import Fail, InvalidGraph, InvalidProtobuf
 
-from trunkline.ar.teleop.correction import Bent, corrected
+from trunkline.ar.teleop.correction import Bent, corrected, shift_of
 from trunkline.ar.teleop.tilt_reach import AZIMUTH, STRAIGHT_DOWN, SYMMETRY
 from trunkline.ar.teleop.vectors import Vector
 from trunkline.errors import InputError
@@ -57,7 +57,10 @@ def bend(
     Raises:
         InputError: no bend comes so near, or a network of one tilt is asked about gravity out of its plane.
     """
-    bent = _at_tilt(network, tip, gravity) if network.inputs == len(TILT) else _best_bend(network, tip, gravity)
+    if network.inputs == len(TILT):
+        bent = _at_tilt(network, tip, gravity, chain, learnt)
+    else:
+        bent = _best_bend(network, tip, gravity)
     if chain is not None:
         better = corrected(chain, bent, tip, gravity, learnt)
         if better is None:
@@ -81,8 +84,11 @@ def _best_bend(network: Network, tip: Vector, gravity_inputs: tuple[float, ...])
     return Bent(*(answer[name][best].astype(float) for name in ("commands", "lengths", "tip")))
 
 
-def _at_tilt(network: Network, tip: Vector, gravity: Vector) -> Bent:
-    """Of a network that knows tilts about +y alone: gravity in another tendon's plane is the same arm, turned."""
+def _at_tilt(
+    network: Network, tip: Vector, gravity: Vector, chain: Chain | None = None, learnt: ResidualMap | None = None
+) -> Bent:
+    """Of a network that knows tilts about +y alone: gravity in another tendon's plane is the same twin, turned. What is
+    `learnt` of the arm is not the same in both planes: the network's is of its own, and the arm's takes its place."""
     level = math.hypot(gravity[0], gravity[1])
     angle, turns = math.atan2(level, -gravity[2]), 0
     if angle > STRAIGHT_DOWN:
@@ -94,7 +100,11 @@ def _at_tilt(network: Network, tip: Vector, gravity: Vector) -> Bent:
                              "not know")  # fmt: skip
     cos, sin = math.cos(turns * SYMMETRY), math.sin(turns * SYMMETRY)
     bent = _best_bend(network, (cos * tip[0] + sin * tip[1], -sin * tip[0] + cos * tip[1], tip[2]), (angle,))
-    x, y, z = bent.tip
     # A tendon that stands where another one did does what that one did.
     commands, lengths = np.roll(bent.commands, turns), np.roll(bent.lengths, turns)
-    return Bent(commands, lengths, np.array([cos * x - sin * y, sin * x + cos * y, z]))
+    in_plane, here = np.zeros(3), np.zeros(3)
+    if turns and chain is not None and learnt is not None:
+        in_plane = shift_of(learnt, chain, bent.commands, (math.sin(angle), 0.0, -math.cos(angle)))
+        here = shift_of(learnt, chain, commands, gravity)
+    x, y, z = bent.tip - in_plane
+    return Bent(commands, lengths, np.array([cos * x - sin * y, sin * x + cos * y, z]) + here)

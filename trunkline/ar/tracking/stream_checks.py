@@ -1,8 +1,13 @@
 """Whether a live stream of poses can be true: what stalls, lies or is no measurement is named, and its poses go.
 
 A pose to which a check objects is NaN at once, or at the next look at the last frames, LOOKS s later. If the objection
-lasts for LASTS s, it is a fault of the stream: outliers and short occlusions are none. A fault persists. Rules of
-positions are those by which `ingest` reads logs (`trunkline/recordings/cleaning/`):
+lasts for LASTS s, it is a fault of the stream: outliers and short occlusions are none.
+
+Faults are of two kinds. A stream that is late, silent or its frames old, as on a machine that does other work, says
+nothing that is untrue: that fault ends once no frame has been late for `recovers` s. Whatever else is objected to means
+that a stream says what is untrue (it is frozen, labels are exchanged, a body is elsewhere, a number is none, its frames
+do not count up), or what nobody can read: such a fault persists until the stream is connected anew. Rules of positions
+are those by which `ingest` reads logs (`trunkline/recordings/cleaning/`):
 
 - no measurement: at the origin, at another body's place, farther than cameras see or the arm reaches (`unmeasured`);
 - stale: the same to the last bit as in the frame before (`stale_samples`);
@@ -37,24 +42,28 @@ SEARCHES = (
 )
 LASTS = 0.1  # s after which an objection is a fault; outliers last for a frame or two
 DRIFT = 2e-4  # by which clocks may differ in rate; quartzes differ by less
+AGE = "age"  # the rule that objects to frames that come late
 STREAM = ""  # in place of a body, for objections to the stream as a whole
 
 
 @dataclass(frozen=True)
 class StreamLimits:
     """silence: s without a frame. age: s that a frame may be old when it comes. distance: share of the arm's length by
-    which a body's distances to its neighbors may differ, as `plausible.distance` of conf/ingest."""
+    which a body's distances to its neighbors may differ, as `plausible.distance` of conf/ingest. recovers: s without a
+    late frame after which a fault of lateness ends."""
 
     silence: Annotated[float, Field(gt=0, le=10)] = 0.15
     age: Annotated[float, Field(gt=0, le=10)] = 0.1
     distance: Annotated[float, Field(gt=0, le=0.5)] = 0.1
+    recovers: Annotated[float, Field(gt=0, le=60)] = 2.0
 
 
 class StreamChecks:
-    """Of the frames of one stream. `fault`: its first, in one line; "" while there is none."""
+    """Of the frames of one stream."""
 
     def __init__(self, expected: ExpectedBodies, limits: StreamLimits) -> None:
-        self.fault = ""
+        self._untrue = self._late = ""  # the first fault that persists, and the one of lateness that there is
+        self._late_at = -math.inf  # s, when a frame was late last, or none came
         self._expected, self._limits = expected, limits
         self._since: dict[tuple[str, str], float] = {}  # of objections, by rule and body
         self._dropped: dict[str, set[str]] = {}  # by rule, as of the last look at the window
@@ -67,6 +76,11 @@ class StreamChecks:
         self._least = math.inf if usual is None else limits.distance * float(np.nanmax(usual[0]))
         self._names = expected.names if expected.marked_base else ("base", *expected.names)  # as in `distances`
 
+    @property
+    def fault(self) -> str:
+        """In one line; "" while there is none."""
+        return self._untrue or self._late
+
     def take(self, now: float, frame: CameraFrame) -> TrackedPoses | None:
         """The poses of a frame that came at `now`, s of the monotonic clock; None for one that comes after a later."""
         last, behind = self._last, ""
@@ -78,7 +92,11 @@ class StreamChecks:
         self._object(now, "order", {STREAM: behind} if behind else {})
         if behind:
             return None
+        if now - self._received > self._limits.silence:
+            self._late_at = now
         age = self._age(now, frame)
+        if now - self._late_at >= self._limits.recovers:
+            self._late = ""
         self._last, self._received = frame, now
         self._since.pop(("unreadable", STREAM), None)
         rate, loss = self._count(now, frame.number)
@@ -92,16 +110,23 @@ class StreamChecks:
     def wait(self, now: float) -> None:
         """That nothing came until `now`, s."""
         silent = now - self._received
-        if silent > self._limits.silence and not self.fault:
-            self.fault = f"found no frame for {silent:.2f} s, expected one within {self._limits.silence:g} s"
+        if silent > self._limits.silence:
+            self._late_at = now
+            line = f"found no frame for {silent:.2f} s, expected one within {self._limits.silence:g} s"
+            self._late = self._late or line
 
     def _object(self, now: float, rule: str, sentences: dict[str, str], ends: bool = True) -> None:
         """What a rule objects to now, by body; where it `ends`, it objects to no others any more."""
         if ends:
             self._since = {key: at for key, at in self._since.items() if key[0] != rule or key[1] in sentences}
         for body, sentence in sentences.items():
-            if now - self._since.setdefault((rule, body), now) >= LASTS and not self.fault:
-                self.fault = " ".join(sentence.split())
+            if now - self._since.setdefault((rule, body), now) < LASTS:
+                continue
+            line = " ".join(sentence.split())
+            if rule == AGE:
+                self._late = self._late or line
+            else:
+                self._untrue = self._untrue or line
 
     def _age(self, now: float, frame: CameraFrame) -> float:
         """s from the exposure until `now`, without the shortest way of a message."""
@@ -109,7 +134,9 @@ class StreamChecks:
         self._offset = min(self._offset + DRIFT * since, now - frame.sent)
         age = now - self._offset - frame.stamp
         old = f"found poses that are {age:.2f} s old when they come, expected at most {self._limits.age:g} s"
-        self._object(now, "age", {STREAM: old} if age > self._limits.age else {})
+        if age > self._limits.age:
+            self._late_at = now
+        self._object(now, AGE, {STREAM: old} if age > self._limits.age else {})
         return age
 
     def _count(self, now: float, number: int) -> tuple[float, float]:

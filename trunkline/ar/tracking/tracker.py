@@ -41,7 +41,8 @@ class TrackedPoses:
     exposed them. positions (B, 3), m, and quaternions (B, 4), wxyz: NaN where a body is not seen, or what was received
     is no measurement of it. age: s since then, without the shortest delay of the network, which nothing
     measures. rate: Hz of the frames that came within the last second. loss: share of that second's frames that did not
-    come. fault: the first that a check has objected to since `connect`, one line; "" while there is none.
+    come. fault: the first that a check has objected to since `connect`, one line; "" while there is none. One of a
+    stream that was late ends by itself (`stream_checks.py`), any other persists.
     """
 
     names: tuple[str, ...]
@@ -55,7 +56,8 @@ class TrackedPoses:
 
     @property
     def sound(self) -> bool:
-        """Whether these poses may be relied on. Once it is False it remains so, until `connect` is called anew."""
+        """Whether these poses may be relied on. Once it is False it remains so until `connect` is called anew, but for
+        a stream that was late and is on time again."""
         return not self.fault
 
 

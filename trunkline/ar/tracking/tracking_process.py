@@ -1,7 +1,7 @@
 """A source of poses in a process of its own, seen from who uses it: the three calls of a `Tracker`.
 
 The process receives, checks, and writes what is newest into shared memory. Where it hangs or is gone, `latest` says so,
-as where the stream does. It ends with the process that made it.
+as where the stream does. One that hung is as a stream that was late. It ends with the process that made it.
 """
 
 import multiprocessing
@@ -30,7 +30,8 @@ class TrackingProcess:
     def __init__(self, open_source: OpenSource, expected: ExpectedBodies, limits: StreamLimits | None = None) -> None:
         self._open, self._expected, self._limits = open_source, expected, limits or StreamLimits()
         self._context = multiprocessing.get_context("spawn")
-        self._process, self._channel, self._fault = None, None, ""
+        self._process, self._channel = None, None
+        self._silent, self._silent_at = "", 0.0  # that the process was, and when it was last, s
 
     def connect(self) -> None:
         self.stop()
@@ -60,16 +61,18 @@ class TrackingProcess:
             fault = fault or "its process has ended, expected it to run"
         elif now - numbers[TOLD_AT] > STALE:
             silent = f"its process is silent for {now - numbers[TOLD_AT]:.2f} s"
-            fault = fault or f"{silent}, expected a sign of it within {STALE:g} s"
-        self._fault = self._fault or fault
+            self._silent = self._silent or f"{silent}, expected a sign of it within {STALE:g} s"
+            self._silent_at = now
+        elif now - self._silent_at >= self._limits.recovers:
+            self._silent = ""
         positions, quaternions = np.split(numbers[HEAD:], [3 * len(self._expected.names)])
         return TrackedPoses(
             self._expected.names, numbers[STAMP], positions.reshape(-1, 3), quaternions.reshape(-1, 4),
-            now - numbers[STAMP], numbers[RATE], numbers[LOSS], self._fault,
+            now - numbers[STAMP], numbers[RATE], numbers[LOSS], fault or self._silent,
         )  # fmt: skip
 
     def stop(self) -> None:
-        process, self._process, self._fault = self._process, None, ""
+        process, self._process, self._silent = self._process, None, ""
         if process is None:
             return
         process.terminate()
