@@ -84,7 +84,8 @@ def considered(problem: Problem, linear: Linearisation, sizes: Tolerances, earli
         linear: of the residuals, at the minimum.
     """
     vector, fine = linear.vector, problem
-    problem = replace(fine, step_factor=COARSER * fine.step_factor)
+    if not fine.rubs:  # else the motors' damping answers otherwise
+        problem = replace(fine, step_factor=COARSER * fine.step_factor)
     base = problem.simulate(vector[None])
     if base.diverged.any():  # a stiff arm
         problem, base = fine, fine.simulate(vector[None])
