@@ -7,8 +7,10 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from scipy.special import ndtri
 
 from trunkline.identification.evaluation.error_tables import number
+from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.identification.stages import STAGES, interval_words, last_stages, read_tables, stated_interval
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.recordings.trials.splits import TEST, VALIDATE
@@ -105,7 +107,7 @@ def truth_table(root: Path) -> str:
         lacking = [words for effect in effects if (words := effect.lacking(truth, rows))]
         cells += [_number(row["value"]), interval, verdict, ", ".join(lacking)]
         lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join([*lines, "", _factors(root, truth), *_unanswered(truth)])
+    return "\n".join([*lines, "", _widths(rows, truth), _factors(root, truth), *_unanswered(truth)])
 
 
 def identified(root: Path) -> dict[str, dict]:
@@ -126,6 +128,21 @@ def holds(row: dict, expected: float | None) -> bool | None:
     if row["undetermined"] or expected is None or not interval:
         return None
     return bool(interval[0] <= expected <= interval[1])
+
+
+def _widths(rows: dict[str, dict], truth: dict) -> str:
+    """How many intervals hold the truth, and whether they are as wide as errors ask for, in a sentence."""
+    ratios = []
+    for name, row in rows.items():
+        expected = expectation(truth, name)
+        if expected is not None and holds(row, expected) is not None:
+            low, high, value, truly = parameter_named(name).coordinate([*stated_interval(row), row["value"], expected])
+            ratios.append((value - truly) / (high - low) * 2)
+    held, rms = sum(abs(ratio) <= 1 for ratio in ratios), np.sqrt(np.mean(np.square(ratios or [np.nan])))
+    return (
+        f"Intervals that hold what is expected: {held} of {len(ratios)}. Error over half width: {rms:.2f} (root mean\n"
+        f"square; {1 / ndtri(0.975):.2f} where they are as wide as they have to be, less where wider)."
+    )
 
 
 def _factors(root: Path, truth: dict) -> str:
