@@ -138,9 +138,9 @@ def _widths(rows: dict[str, dict], truth: dict) -> str:
         if expected is not None and holds(row, expected) is not None:
             low, high, value, truly = parameter_named(name).coordinate([*stated_interval(row), row["value"], expected])
             ratios.append((value - truly) / (high - low) * 2)
-    held, rms = sum(abs(ratio) <= 1 for ratio in ratios), np.sqrt(np.mean(np.square(ratios or [np.nan])))
+    inside, rms = sum(abs(ratio) <= 1 for ratio in ratios), np.sqrt(np.mean(np.square(ratios or [np.nan])))
     return (
-        f"Intervals that hold what is expected: {held} of {len(ratios)}. Error over half width: {rms:.2f} (root mean\n"
+        f"Intervals that hold what is expected: {inside} of {len(ratios)}. Error over half width: {rms:.2f} (root mean\n"
         f"square; {1 / ndtri(0.975):.2f} where they are as wide as they have to be, less where wider)."
     )
 
