@@ -140,8 +140,8 @@ def _widths(rows: dict[str, dict], truth: dict) -> str:
             ratios.append((value - truly) / (high - low) * 2)
     inside, rms = sum(abs(ratio) <= 1 for ratio in ratios), np.sqrt(np.mean(np.square(ratios or [np.nan])))
     return (
-        f"Intervals that hold what is expected: {inside} of {len(ratios)}. Error over half width: {rms:.2f} (root mean\n"
-        f"square; {1 / ndtri(0.975):.2f} where they are as wide as they have to be, less where wider)."
+        f"Intervals that hold what is expected: {inside} of {len(ratios)}. Error over half width: {rms:.2f} (root\n"
+        f"mean square; {1 / ndtri(0.975):.2f} where they are as wide as they have to be, less where wider)."
     )
 
 
