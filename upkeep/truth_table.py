@@ -132,13 +132,14 @@ def holds(row: dict, expected: float | None) -> bool | None:
 
 def _widths(rows: dict[str, dict], truth: dict) -> str:
     """How many intervals hold the truth, and whether they are as wide as errors ask for, in a sentence."""
-    ratios = []
+    ratios, verdicts = [], []
     for name, row in rows.items():
         expected = expectation(truth, name)
-        if expected is not None and holds(row, expected) is not None:
+        if (verdict := holds(row, expected)) is not None:
             low, high, value, truly = parameter_named(name).coordinate([*stated_interval(row), row["value"], expected])
             ratios.append((value - truly) / (high - low) * 2)
-    inside, rms = sum(abs(ratio) <= 1 for ratio in ratios), np.sqrt(np.mean(np.square(ratios or [np.nan])))
+            verdicts.append(verdict)
+    inside, rms = sum(verdicts), np.sqrt(np.mean(np.square(ratios or [np.nan])))
     return (
         f"Intervals that hold what is expected: {inside} of {len(ratios)}. Error over half width: {rms:.2f} (root\n"
         f"mean square; {1 / ndtri(0.975):.2f} where they are as wide as they have to be, less where wider)."
