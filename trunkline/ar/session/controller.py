@@ -137,6 +137,7 @@ class SessionController:
             core.mount_offset,
         )  # fmt: skip
         self._bounds: CorrectionBounds | None = None  # of the plan that is asked for
+        self.arrived: tuple[np.ndarray, float] | None = None  # as `_arrival` has it, of the plan that ran last
 
     def begin(self, rate: float, version: str = "") -> None:
         """The log's first line: all that a replay needs besides the package. rate: of ticks, Hz. version: of
@@ -400,7 +401,7 @@ class SessionController:
 
     def _begin(self, intent: Intent) -> None:
         """Start the plan that was confirmed, or to follow, once."""
-        self._started = intent.execute or FOLLOWS
+        self._started, self.arrived = intent.execute or FOLLOWS, None
         self.correction.forget()
         if intent.motion == "follow":
             following = Following(self.core.settings.follow_delay, self.period, self.core.mount_offset)
@@ -421,8 +422,16 @@ class SessionController:
         done = executor.mode == "done" and executor.digest != self._believed and self.plan is not None
         phases = tuple(name for name, _ in self.plan.phases) if done and self.plan is not None else ()
         if done:
-            self._believed = executor.digest
+            self._believed, self.arrived = executor.digest, self._arrival(executor.digest)
         self.world = update_world(self.world, robot_state.object, phases, self.lift)
+
+    def _arrival(self, digest: str) -> tuple[np.ndarray, float] | None:
+        """Where a plan's preview has the tip at its end (3,), m, and the radius about it that it states, m; None where
+        it states none, or where the plan has corrected itself since."""
+        foreseen, corrects = self.prediction, self.plan is None or self.plan.correction is not None
+        if corrects or foreseen is None or foreseen.digest != digest or not foreseen.spread:
+            return None
+        return np.array(foreseen.tip[-1]), foreseen.spread[-1]
 
     # --- what is told
 
