@@ -145,7 +145,7 @@ class SessionController:
         self.log_writer.event(
             "begin", version=version, package=core.package, rate=rate, settings=core.settings,
             mount_offset=core.mount_offset, tip={"body": subject.tip[0], "place": subject.tip[1]},
-            hardware=subject.hardware,
+            hardware=subject.hardware, measured=subject.measured, mount=subject.mount,
         )  # fmt: skip
 
     # --- what is heard
@@ -349,7 +349,10 @@ class SessionController:
             self._moved = now
         if self.arm.stamp > self._written + (0.0 if now - self._moved < SWINGS else RARELY):
             self._written = self.arm.stamp
-            self.log_writer.measured(self.arm.stamp, self.arm.poses)
+            poses = self.arm.poses.copy()
+            if self.arm.mount is not None:
+                poses[0, :3] = self.arm.mount  # as recordings have their base
+            self.log_writer.measured(self.arm.stamp, poses)
         if before is not None and self.arm.fault != before.fault:
             self.log_writer.event("cameras", fault=self.arm.fault)
 
