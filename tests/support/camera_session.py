@@ -34,6 +34,7 @@ from trunkline.ar.tracking.tracker import TrackedPoses
 
 RATE, BEGIN = 72.0, 100.0  # Hz, s
 DAMPED = 6.0  # times the small arm's damping, so that it soon comes to rest
+RESTS = 4.0  # s that it then takes
 
 
 @cache
@@ -120,14 +121,15 @@ class LabCameras(SimulatedArmCameras):
 class CameraSession:
     """An operator who points, confirms and lets the robot move. path: of the log."""
 
-    def __init__(self, path, s=None, cameras=True, off=(0.0, 0.0, 0.0), **settings):
+    def __init__(self, path, s=None, cameras=True, off=(0.0, 0.0, 0.0), **noise):
         s = s or damped()
         self.robot = PlantRobot(s)
-        self.cameras = LabCameras(s, self.robot, off, **settings) if cameras else None
+        self.cameras = LabCameras(s, self.robot, off, **noise) if cameras else None
         subject = measured_subject(subject_of(s), self.cameras, s) if cameras else subject_of(s)
         self.log = Written(path, subject)
         self.log.time = BEGIN
-        foresight = replace(made().foresight, robot_model=robot_model())
+        settings = replace(made().foresight.settings, hold=RESTS)
+        foresight = replace(made().foresight, robot_model=robot_model(), settings=settings)
         shaper = shaper_for(damped_spec().compile(), config().shaping)
         planning = PreviewPlanner(replace(PLANNER, shaper=shaper), foresight, s.bodies)
         core = Teleoperation(patient(silence=5.0), Everywhere(), PACKAGE, OFFSET)
