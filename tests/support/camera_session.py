@@ -67,7 +67,11 @@ class PlantRobot:
     def __init__(self, s):
         self.plant = TwinPlant(s)
         self.follower = PlanFollower(
-            s.joints, s.commands, s.limits, s.package, lambda joints, commands, _: self.plant.move(joints, commands, True)
+            s.joints,
+            s.commands,
+            s.limits,
+            s.package,
+            lambda joints, commands, _: self.plant.move(joints, commands, True),
         )
         self.start, self.stop, self.state = self.follower.start, self.follower.stop, self.follower.state
         self.now = BEGIN

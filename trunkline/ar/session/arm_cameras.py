@@ -89,6 +89,11 @@ class ArmCameras:
         self, tracker: Tracker, names: Sequence[str], pose: Pose, tip: np.ndarray, mount: np.ndarray | None
     ) -> None:
         self.names, self._tracker, self._tip, self._mount = tuple(names), tracker, tip, mount
+        self.align(pose)
+
+    def align(self, pose: Pose) -> None:
+        """The cameras' frame is there in the base from now on."""
+        self.pose = pose
         self._turn, self._origin = rotation_from_wxyz(np.array(pose.quaternion)), np.array(pose.position)
 
     @property

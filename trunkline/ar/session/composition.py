@@ -19,6 +19,7 @@ from trunkline.ar.session.arm_cameras import (
     natnet_cameras,
 )
 from trunkline.ar.session.bodies import drawn_bodies
+from trunkline.ar.session.camera_alignment import CameraAlignment
 from trunkline.ar.session.certificate import certificate_of
 from trunkline.ar.session.controller import SessionController
 from trunkline.ar.session.hardware import Hardware
@@ -99,8 +100,11 @@ def make(
         begun.callback(robot.close)
         core = Teleoperation(teleop.core, package.reach, package.digest, teleop.mount_offset)
         lift = teleop.handling.least_lift
+        alignment = None
+        if arm_cameras is not None and arm_cameras.sees_mount:
+            alignment = CameraAlignment(arm_cameras, teleop.mount_offset, config.correction.misplaced)
         controller = SessionController(
-            core, robot, previewer, world, lift, log_writer, package.period, arm_cameras, config.correction
+            core, robot, previewer, world, lift, log_writer, package.period, arm_cameras, config.correction, alignment
         )
         controller.begin(config.rate, __version__)
         log_writer.await_begun()

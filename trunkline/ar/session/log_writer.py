@@ -111,8 +111,8 @@ class LogWriter:
         self.keep(Record(STATIC, now, now, np.array([*pose.position, *pose.quaternion]), BASE))
 
     def piece(self, first: int, begins: float, poses: np.ndarray) -> None:
-        """Of a preview: the arm's last body in frames from the one numbered `first`, at `begins` s of the plan, and where
-        the last of them has what cameras see; of a real machine the rigid robot's last body too.
+        """Of a preview: the arm's last body in frames from the one numbered `first`, at `begins` s of the plan, and
+        where the last of them has what cameras see; of a real machine the rigid robot's last body too.
 
         Args:
             poses: of all bodies, (F, N, 7).

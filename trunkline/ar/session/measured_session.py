@@ -107,7 +107,7 @@ def _rests_of(
     request = next((e["request"]["targets"] for e in reversed(before) if e["event"] == "request"), {})
     if request.get("thing") or holds(before):
         raise ValueError("the arm grasps or holds something, whose weight nobody measured")
-    after = [e["time"] for e in later if e["event"] in ("execute", "follow") and not e["refused"]]
+    after = [e["time"] for e in later if e["event"] == "request" or not e.get("refused", True)]  # or execute, follow
     until = min([*after[:1], float(times[-1])])
     done = next((e["time"] for e in later if e["event"] == "robot" and e["robot"]["mode"] == "done"
                  and e["robot"]["digest"] == digest and e["time"] <= until), None)  # fmt: skip
@@ -115,12 +115,15 @@ def _rests_of(
         raise ValueError("it did not arrive")
     corrections = [e["time"] for e in later if e["event"] == "correction" and e["digest"] == digest]
     moved = changes[(changes > begun) & (changes < until)]
-    edges = np.concatenate([moved[moved <= done][-1:] if (moved <= done).any() else [done], moved[moved > done], [until]])
+    edges = [max(moved[moved <= done], default=done), *moved[moved > done], until]
     foreseen = _foreseen(before, digest, len(names))
     rests, reason = [], "the arm was not seen at rest"
+    if names[-1] not in poses.names:
+        raise ValueError(f"no camera saw {names[-1]!r}")
+    tips = poses.positions[:, poses.names.index(names[-1])]
     for since, end in zip(edges[:-1], edges[1:], strict=True):
         rows = np.flatnonzero((times > since) & (times < end))
-        span = _rest(times[rows], poses.positions[rows, poses.names.index(names[-1])]) if names[-1] in poses.names else None
+        span = _rest(times[rows], tips[rows])
         if span is None:
             continue
         rows = rows[(times[rows] >= span[0]) & (times[rows] <= span[1])]
@@ -201,7 +204,8 @@ def marker_validation(measured: PlanRests) -> dict:
         errors = 1e3 * np.linalg.norm(rest.positions - rest.foreseen, axis=1)
         finite = errors[1:][np.isfinite(errors[1:])]
         if len(finite):
-            rows.append({"plan": rest.number, "mean_mm": float(finite.mean()), "worst_mm": float(finite.max()),
+            rows.append({"plan": rest.number, "mean_mm": float(finite.mean()),
+                         "worst_mm": float(finite.max()),
                          "last_mm": float(errors[-1]) if np.isfinite(errors[-1]) else None,
                          "mount_mm": float(errors[0]) if np.isfinite(errors[0]) else None})  # fmt: skip
     table: dict = {"markers": list(measured.names[1:]), "plans": rows}
