@@ -246,7 +246,7 @@ class AlignmentProcedure:
         self.message = self.unfit or message
 
     def _by_cameras(self, pose: Pose, touched: np.ndarray) -> str:
-        """By how much the cameras have the base elsewhere than touches, which are in use; "" where they tell nothing."""
+        """By how much cameras have the base elsewhere than touches, which are in use; "" where they tell nothing."""
         marks = np.array(self._cameras)
         visible = np.isfinite(marks).all(axis=1)
         at = np.array(self.settings.at)

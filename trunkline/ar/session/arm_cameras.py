@@ -58,7 +58,7 @@ class ArmCameraSettings:
             counts = f"{len(self.bodies)} bodies and {len(self.apart)} distances"
             raise ValueError(f"bodies, apart: found {counts}, expected a distance from each to the next")
         if self.markers and (len(self.markers) != len(self.bodies) or len(set(self.markers)) < len(self.markers)):
-            raise ValueError(f"markers: found {', '.join(self.markers)}, expected a name for each of the bodies, or none")
+            raise ValueError(f"markers: found {', '.join(self.markers)}, expected a name for each body, or none")
         norm = float(np.linalg.norm(self.quaternion))
         if abs(norm - 1) > 1e-3:
             raise ValueError(f"quaternion: found a length of {norm:.3g}, expected 1")
@@ -166,8 +166,10 @@ def natnet_cameras(settings: ArmCameraSettings) -> ArmCameras:
     return ArmCameras(tracker, settings.markers or settings.bodies, pose, np.array(settings.tip), mount)
 
 
-def markers_of(model: mujoco.MjModel, names: Sequence[str]) -> tuple[tuple[str, tuple[float, float, float]] | None, ...]:
-    """Of each marker of an arm the body that it is on, and where in that, m; None where the model has no such one."""
+def markers_of(
+    model: mujoco.MjModel, names: Sequence[str]
+) -> tuple[tuple[str, tuple[float, float, float]] | None, ...]:
+    """Of each marker of an arm the body that it is on, and where in that, m; None where the model lacks it."""
     markers = []
     for name in names:
         site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, f"{name}{CENTER}")
