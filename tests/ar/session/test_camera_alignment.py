@@ -81,7 +81,7 @@ def test_six_places_of_the_mount_say_where_the_frame_is_and_how_the_body_is_turn
     assert (result.places, result.unused) == (PLACES, "")
     assert lab.off(result.pose, joints) < 3 * result.expected < 5e-3
     assert result.apart == pytest.approx(lab.off(SET, joints), abs=3 * result.expected)
-    assert result.apart > 5e-3
+    assert result.apart > 2e-3
     assert result.tilt_deg == pytest.approx(np.degrees(0.03), abs=4 * result.tilt_error_deg)
     assert result.tilt_error_deg < 0.2
     assert result.words.startswith("cameras aligned by 6 places of the mount, expected error ")
@@ -180,6 +180,7 @@ def test_a_session_uses_it_from_the_next_plan_on_and_its_log_has_it(tmp_path):
     )
     way = tip_of(CHAIN, pulled(0.02, 0, 0)) - base_frames(START, OFFSET)[0]
     session.places = np.array(MOUNT), np.array(MOUNT) + way
+    session.until(lambda intent: intent.mode == "aim")
     session.left, session.right = {"grip": 1.0}, {"grip": 1.0}
     session.wait(1.0)
     assert session.controller.aligned == result
