@@ -21,7 +21,7 @@ from trunkline.ar.teleop.messages import Pose
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.kinematics.panda.kinematics import Q_MAX, Q_MIN
 
-LIMIT, RATE, TILT = 5e-3, 24.0, Rotation.from_rotvec([0.03, 0.0, 0.0])  # m, Hz, of the mount's body to the arm
+LIMIT, RATE, TILT = 5e-3, 12.0, Rotation.from_rotvec([0.03, 0.0, 0.0])  # m, Hz, of the mount's body to the arm
 NOISE, TURNED = 3e-4, np.radians(0.3)  # m, rad: the simulated cameras'
 SET = pose_of(np.array([1.0, -2.0, 0.5]), Rotation.from_rotvec([1.2, 0.3, -0.4]))
 TRUE = pose_of(np.array([1.006, -2.0, 0.497]), Rotation.from_rotvec([1.2, 0.304, -0.4]))
@@ -95,9 +95,9 @@ def test_six_places_of_the_mount_say_where_the_frame_is_and_how_the_body_is_turn
 
 
 def test_the_errors_that_are_stated_are_those_that_are_made():
-    """Of 30 labs: at the tip, and of the tilt, root mean square over what was stated."""
+    """Of 12 labs: at the tip, and of the tilt, root mean square over what was stated."""
     off, expected, tilts, stated = [], [], [], []
-    for seed in range(30):
+    for seed in range(12):
         lab, results, joints = aligned_by(seed=seed)
         if results[-1] is None:  # too near to a plane, or two places near each other
             continue
@@ -106,7 +106,7 @@ def test_the_errors_that_are_stated_are_those_that_are_made():
         tilts.append(results[-1].tilt_deg - np.degrees(0.03))
         stated.append(results[-1].tilt_error_deg)
     rms = lambda values: float(np.sqrt(np.mean(np.square(values))))  # noqa: E731
-    assert len(off) >= 15
+    assert len(off) >= 6
     assert 0.6 < rms(off) / rms(expected) < 1.6
     assert rms(tilts) / rms(stated) < 1.6
 

@@ -155,7 +155,11 @@ def without_arrival(events):
 
 def overtaken(events):
     """Each plan followed at once by another, before the arm is at rest."""
-    at_once = [event | {"time": event["time"] + 0.8, "digest": "x"} for event in events if event["event"] == "execute"]
+    at_once = [
+        {"event": "execute", "time": event["time"] + 0.1, "digest": "x", "refused": ""}
+        for event in events
+        if event["event"] == "robot" and event["robot"]["mode"] == "done"
+    ]
     return sorted([*events, *at_once], key=lambda event: event["time"])
 
 
