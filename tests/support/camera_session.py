@@ -112,8 +112,8 @@ class LabCameras(SimulatedArmCameras):
 
     def latest(self):
         frame = self._lab._exposed(self._robot.now)
-        seen = frame.tracked[:, None]
-        positions, quaternions = (np.where(seen, part, np.nan) for part in (frame.positions, frame.quaternions))
+        visible = frame.tracked[:, None]
+        positions, quaternions = (np.where(visible, part, np.nan) for part in (frame.positions, frame.quaternions))
         tracked = TrackedPoses(self.names, frame.stamp - EPOCH, positions, quaternions, 0.01, RATE, 0.0, self.fault)
         self._tracker = type("Frame", (), {"latest": lambda _: tracked})()
         return super().latest()

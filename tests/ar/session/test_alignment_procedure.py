@@ -221,11 +221,11 @@ def test_touches_say_by_how_much_the_cameras_have_the_base_elsewhere(bad):
     person.align(bad)
     if bad is not None:
         person.touch(PLACES[bad])
-    said = re.fullmatch(
+    words = re.fullmatch(
         r"Aligned by touches; expected error [\d.]+ mm where the arm works\. "
         r"By the cameras the base is ([\d.]+) mm elsewhere there, expected error [\d.]+ mm\.", aligned.progress().said
     )  # fmt: skip
-    assert float(said[1]) == pytest.approx(20.0, abs=0.1)
+    assert float(words[1]) == pytest.approx(20.0, abs=0.1)
     np.testing.assert_allclose(in_base(aligned.alignment, in_base(inverse(TRUE), PLACES)), PLACES, atol=2e-3)
 
 

@@ -42,14 +42,14 @@ class Lab:
         place, frame = base_frames(joints, OFFSET)
         turn, rng = Rotation.from_matrix(frame), self.rng
         there = inverse(TRUE)
-        seen = in_base(self.cameras.pose, in_base(there, place + off) + NOISE * rng.standard_normal(3))
+        measured = in_base(self.cameras.pose, in_base(there, place + off) + NOISE * rng.standard_normal(3))
         turns = rotation_from_wxyz(np.array([self.cameras.pose.quaternion, there.quaternion]))
         body = turns[0] * turns[1] * turn * TILT * Rotation.from_rotvec(TURNED * rng.standard_normal(3))
-        poses = np.array([[*seen, *wxyz_from_rotation(body)], np.full(7, np.nan)])
+        poses = np.array([[*measured, *wxyz_from_rotation(body)], np.full(7, np.nan)])
         tip = in_base(self.cameras.pose, in_base(there, place + turn.apply([0.0, 0.0, -0.5])))
         if not visible:
-            poses, seen = np.full((2, 7), np.nan), np.full(3, np.nan)
-        return MeasuredArm(self.time, poses, tip, 0.01, 120.0, 0.0, fault, seen)
+            poses, measured = np.full((2, 7), np.nan), np.full(3, np.nan)
+        return MeasuredArm(self.time, poses, tip, 0.01, 120.0, 0.0, fault, measured)
 
     def rest(self, joints, seconds=2.5, measured=None, **changes):
         """What comes of a rest there."""

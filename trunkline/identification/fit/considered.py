@@ -72,10 +72,10 @@ class Earlier:
 
     def without(self, names) -> "Earlier":
         """But for parameters that a later stage identifies anew."""
-        kept = [i for i, name in enumerate(self.names) if name not in names]
+        staying = [i for i, name in enumerate(self.names) if name not in names]
         return Earlier(
-            self.stage, [self.names[i] for i in kept], self.estimate[kept], self.scatter[kept],
-            {key: move[kept] for key, move in self.moves.items()},
+            self.stage, [self.names[i] for i in staying], self.estimate[staying], self.scatter[staying],
+            {key: move[staying] for key, move in self.moves.items()},
         )  # fmt: skip
 
 
