@@ -24,6 +24,7 @@ from trunkline.ar.session.measured_session import (
     SPLITS,
     PlanRest,
     PlanRests,
+    how_to_identify,
     marker_validation,
     plan_rests,
     write_session,
@@ -105,6 +106,14 @@ def test_evaluate_and_monitor_read_it(run, tmp_path, capsys, monkeypatch):
     assert 1.0 < metrics["model"]["by_experiment"]["static_pull"]["e_tip_mm"] < 15.0  # its twin is straight at rest
     assert monitor(["arm.xml", str(run.folder), "--once", *settings]) == 0
     assert "learning: 2 of 15 static_pull" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("count", "words"), [
+    (1, "session: found 1 plan at rest and none to validate, expected at least 2 to identify from"),
+    (2, "session: to identify from it: trunkline batch run/identify.yaml --until identify_stiffness"),
+])  # fmt: skip
+def test_a_session_of_a_single_plan_names_no_command_that_would_fail(count, words):
+    assert how_to_identify(Path("run"), SPLITS[:count]) == words
 
 
 def test_one_command_identifies_from_it_and_live_prints_it(run, tmp_path):

@@ -11,7 +11,7 @@ with which `trunkline batch` identifies from it; and marker_validation.json.
 
 import argparse
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -248,7 +248,15 @@ def write_session(path: Path, out: Path | None = None) -> list[str]:
     if validation["plans"]:
         mean, count = validation["mean_mm"], len(validation["plans"])
         lines.append(f"session: markers at rest {mean:.1f} mm from their previews, median of {count} plans")
-    return [*lines, f"session: to identify from it: {COMMAND} batch {out / LIST} --until identify_stiffness"]
+    return [*lines, how_to_identify(out, [trial["split"] for trial in trials])]
+
+
+def how_to_identify(folder: Path, splits: Sequence[str]) -> str:
+    """The command that identifies from a session of such trials, or what they lack for it."""
+    if missing := [split for split in (IDENTIFY, VALIDATE) if split not in splits]:
+        count = f"{len(splits)} plan{'' if len(splits) == 1 else 's'} at rest"
+        return f"session: found {count} and none to {missing[0]}, expected at least 2 to identify from"
+    return f"session: to identify from it: {COMMAND} batch {folder / LIST} --until identify_stiffness"
 
 
 def _splits() -> Iterator[str]:
