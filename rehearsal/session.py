@@ -21,7 +21,7 @@ from trunkline.ar.teleop.config import TeleoperationConfig
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.executor import PlanFollower
 from trunkline.ar.teleop.following import Following
-from trunkline.ar.teleop.messages import ExecutorReport, Intent, Offer, Pose, World
+from trunkline.ar.teleop.messages import ExecutorReport, Intent, Offer, Pose, Targets, World
 from trunkline.ar.teleop.plan import Plan
 from trunkline.ar.teleop.trajectory import MotionLimits
 from trunkline.errors import InputError
@@ -134,6 +134,7 @@ class RehearsedSession:
         self.controller = SessionController(core, self.executor, self.previewer, world, lift, period=period)
         self.controller.control(REFERENCE)
         self.previewed: np.ndarray | None = None
+        self.targets: Targets | None = None  # of the newest plan
         self.now, self.rays = 0.0, (None, None)
         self._executed, self._began = "", 0.0
         self.tips: list[tuple[float, np.ndarray]] = []  # s since a plan began, and where its tip is seen, m
@@ -164,6 +165,7 @@ class RehearsedSession:
         self.rays = intent.rays
         if controller.plan is not before:
             self.previewed = self._end(controller.plan, intent)
+            self.targets = None if intent.request is None else intent.request.targets
         if intent.mode == "preview":
             controller.preview_shown(intent.preview, self.now)  # which counts once it has lasted long enough
         if intent.execute and intent.execute != self._executed:

@@ -302,6 +302,11 @@ def preview_table(preview: dict | None, goals: dict[str, Limit]) -> str:
     what += ", ".join(times.values())
     came = f"{' / '.join(inside)}; it is {' / '.join(off)} radii off, median"
     lines.append(f"| {what} | {came} | {_joined(stated)} |")
+    if cameras := lookup(preview, "cameras"):
+        reached = [f"{cameras[how]['inside']} of {cameras[how]['runs']}" for how in ("without", "with")]
+        goal = _goal(goals.get("preview.cameras.with.share"), cameras["with"]["share"])
+        what = "reach: the tip rests within 10 mm of its target, without / with a correction by cameras"
+        lines.append(f"| {what} | {' / '.join(reached)}; {cameras['farther']} led farther off by 2 mm | {goal} |")
     likelier, previews = lookup(preview, "agreed"), lookup(preview, "previews")
     goal = _goal(goals.get("preview.agreement"), lookup(preview, "agreement"))
     lines.append(f"| grasp, hand-over: whether it holds | {likelier} of {previews} as predicted | {goal} |")

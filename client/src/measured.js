@@ -1,10 +1,10 @@
 // The arm as cameras see it: its markers, a line through them, and how far the tips are apart; the bounds of a correction.
 
 import { BufferGeometry, Float32BufferAttribute, Group, Line, LineBasicMaterial, Mesh, MeshBasicMaterial, SphereGeometry } from "three";
-import { TIP } from "./colours.js";
+import { OFFER, TIP, WRONG } from "./colours.js";
 import { Label } from "./label.js";
 
-const MEASURED = 0xffffff; // white, on top of the robot
+const MEASURED = 0xffffff; // white, on top of the robot; where a plan has arrived, by whether its preview held
 const MOST = 100; // markers
 const OLD = 0.5; // s without a message, after which nothing is drawn
 
@@ -13,7 +13,8 @@ export class MeasuredArm {
   constructor(base) {
     const through = { color: MEASURED, depthTest: false, depthWrite: false, transparent: true, opacity: 0.9 };
     this.group = new Group();
-    this.line = new Line(new BufferGeometry(), new LineBasicMaterial(through));
+    this.stroke = new LineBasicMaterial(through);
+    this.line = new Line(new BufferGeometry(), this.stroke);
     this.line.geometry.setAttribute("position", new Float32BufferAttribute(new Float32Array(3 * (MOST + 1)), 3));
     this.line.frustumCulled = false;
     this.line.renderOrder = 7;
@@ -48,6 +49,7 @@ export class MeasuredArm {
       if (dot.visible) dot.position.fromArray(points[index]);
     });
     const { tip, apart } = message;
+    for (const material of [this.material, this.stroke]) material.color.set(colourOf(message));
     this.label.set(tip && apart !== null ? `${(1000 * apart).toFixed(1)} mm` : "");
     if (tip) this.label.sprite.position.fromArray(tip);
     this.label.sprite.visible = Boolean(tip) && apart !== null;
@@ -68,13 +70,25 @@ export class MeasuredArm {
   }
 }
 
+/** Of the measured arm: by whether its tip is within what the preview stated, where it stated anything. */
+export function colourOf({ from_preview: off, radius }) {
+  return radius === null ? MEASURED : off <= radius ? OFFER : WRONG;
+}
+
 /** What cameras see, in words; "" without any. */
 export function camerasText(message) {
   if (!message) return "";
   if (message.fault) return `not relied on: ${message.fault}`;
   const visible = message.markers.filter(Boolean).length;
   const apart = message.apart === null ? "tip not seen" : `tip ${(1000 * message.apart).toFixed(1)} mm from the twin’s`;
-  return `${visible} of ${message.markers.length} bodies, ${Math.round(message.rate)} Hz; ${apart}`;
+  return `${visible} of ${message.markers.length} bodies, ${Math.round(message.rate)} Hz; ${apart}${heldText(message)}`;
+}
+
+/** Whether the tip is where the preview of the plan that ran last stated it, in words; "" where it stated nothing. */
+function heldText({ from_preview: off, radius }) {
+  if (radius === null) return "";
+  const mm = (metres) => (1000 * metres).toFixed(1);
+  return `, ${mm(off)} mm from its preview’s end, ${off <= radius ? "within" : "beyond"} the ${mm(radius)} mm stated`;
 }
 
 /** By how much a plan may correct itself, as the message `preview` says; why not, where it was asked to; else "". */

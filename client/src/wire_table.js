@@ -251,6 +251,8 @@ export const SERVER_MESSAGES = {
     "rate": "required",
     "loss": "required",
     "fault": "required",
+    "from_preview": null,
+    "radius": null,
     "type": "measured"
   },
   "world": {

@@ -14,6 +14,8 @@ import { matrixOf } from "../src/geoms.js";
 import { Confirming } from "../src/confirming.js";
 import { freeArea } from "../src/views.js";
 import { predictionText, remedy, uiText } from "../src/panel.js";
+import { camerasText, colourOf } from "../src/measured.js";
+import { OFFER, WRONG } from "../src/colours.js";
 
 /** A message `robot` of one row. */
 function robot(sequence, time, x) {
@@ -253,4 +255,14 @@ test("in a small window the robot is viewed in what the panels leave free", () =
   assert.deepEqual(freeArea(1280, 720, rect(14, 14, 430, 150), rect(300, 650, 600, 56)), { left: 0, top: 0, width: 1280, height: 720 });
   assert.deepEqual(freeArea(400, 720, rect(7, 7, 386, 143), rect(7, 620, 386, 93)), { left: 0, top: 150, width: 400, height: 470 });
   assert.deepEqual(freeArea(640, 360, rect(7, 7, 243, 143), rect(7, 310, 500, 43)), { left: 250, top: 0, width: 390, height: 310 });
+});
+
+test("a measured tip within the radius that its plan's preview stated is green and says so, one beyond it is vermilion", () => {
+  const soon = { markers: [[0, 0, 0], null], tip: [0, 0, 0], apart: 0.0075, age: 0, rate: 120, loss: 0, fault: "", from_preview: null, radius: null };
+  assert.equal(camerasText(soon), "1 of 2 bodies, 120 Hz; tip 7.5 mm from the twin’s");
+  const within = { ...soon, from_preview: 0.0042, radius: 0.0081 }, beyond = { ...within, from_preview: 0.0082 };
+  assert.match(camerasText(within), /twin’s, 4.2 mm from its preview’s end, within the 8.1 mm stated$/);
+  assert.match(camerasText(beyond), /8.2 mm from its preview’s end, beyond the 8.1 mm stated$/);
+  assert.deepEqual([within, beyond].map(colourOf), [OFFER, WRONG]);
+  assert.ok(![OFFER, WRONG].includes(colourOf(soon)));
 });

@@ -2,12 +2,13 @@
 
 The first contact of the arm with anything decides. What previews state of the tip's end is of an arm that touches
 nothing, and no client here knows the object. So it is held against the same robot that runs the same plan once more
-with the object away. How far off the tip was beside the object is told as well.
+with the object away, and then corrects it by cameras. How far off the tip was beside the object is told as well.
 """
 
 import numpy as np
 
 from rehearsal.experiments.bench import SessionFrame, SharedRun, Staged, executed
+from rehearsal.experiments.corrected import tell_correction
 from rehearsal.experiments.result import LATER, Result
 from rehearsal.operator.scripts import Ending
 from rehearsal.session import RehearsedSession
@@ -37,7 +38,10 @@ def reach(bench: SharedRun, seed: int) -> Staged:
         plan, last = session.controller.plan, executed(frames)
         if foreseen is not None and plan is not None and last is not None:
             alone = bench.session(operator, None, seed, lambda now: object)
-            tell_end(result, foreseen, plan.duration, tips_after(alone, plan))
+            tips = tips_after(alone, plan)
+            tell_end(result, foreseen, plan.duration, tips)
+            assert session.targets is not None, "the plan was made for some"
+            tell_correction(result, alone, plan, session.targets, tips["after_10s"])
             result.touching_mm = 1e3 * _off(foreseen, plan.duration, session.in_client_frame(last.truth.tip))
 
     return Staged("reach", seed, session, operator.reach(), judge, watch=watch)

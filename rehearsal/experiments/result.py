@@ -27,8 +27,9 @@ class Result:
     path_pct: median distance between the robot's tip and the nominal preview's, % of the arm's length. radius_mm:
     within which the preview had stated that the tip ends; at_end_mm, after_2s_mm, after_10s_mm: of the robot's tip from
     where that has it then, when the execution had ended and so long after it, with nothing in the way; touching_mm:
-    likewise when it had ended, beside the object. seconds: of the whole run. object: what was
-    grasped, in words.
+    likewise when it had ended, beside the object. off_target_mm: of the tip from its target after_10s; corrected_mm:
+    likewise once the plan has corrected itself by cameras, and `correction` what that came to. seconds: of the whole
+    run. object: what was grasped, in words.
 
     variant: of an ablation, "" for none. package, code: digests of what the run was made of: `rehearsal.runs.Source`.
     """
@@ -53,6 +54,9 @@ class Result:
     after_2s_mm: float = float("nan")
     after_10s_mm: float = float("nan")
     touching_mm: float = float("nan")
+    off_target_mm: float = float("nan")
+    corrected_mm: float = float("nan")
+    correction: str = ""
     seconds: float = 0.0
     object: str = ""
     variant: str = ""

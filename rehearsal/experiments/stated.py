@@ -13,6 +13,7 @@ from trunkline.ar.hybrid.rates import wilson
 
 PROBABLE = ("grasp", "handle")  # whose previews state a probability
 REACH = "reach"  # whose previews state a radius
+NEAR, FARTHER = 10.0, 2.0  # mm from a target that is reached; by which a correction shall never lead away from it
 
 
 def scores(results: list[Result]) -> dict:
@@ -22,11 +23,13 @@ def scores(results: list[Result]) -> dict:
     `high`, Wilson's; path_pct_median: %; brier, brier_base. radius_mm: median and 95th percentile. coverage: for each
     of LATER, runs with a radius, those `inside`, their share, from `low` to `high`. tip_error_radii: likewise, median
     of the tip's distance over the radius. A tip that is nowhere is outside, and infinitely far. touching_mm: median
-    distance beside the object.
+    distance beside the object. cameras: of the runs that could correct themselves by them, those of which the tip then
+    is within NEAR of its target, `with` and `without`, as coverage; `farther`: of how many the correction led away.
     """
     plain = [result for result in results if not result.variant]
     probable = [row for row in plain if row.experiment in PROBABLE and np.isfinite(row.probability)]
-    return {**probabilities(probable), **_radii([row for row in plain if row.experiment == REACH])}
+    reached = [row for row in plain if row.experiment == REACH]
+    return {**probabilities(probable), **_radii(reached), **_corrections(reached)}
 
 
 def probabilities(rows: list[Result]) -> dict:
@@ -56,6 +59,18 @@ def _radii(rows: list[Result]) -> dict:
     table = {"radius_mm": {"median": median, "p95": p95}, "coverage": coverage, "tip_error_radii": errors}
     touching = [row.touching_mm for row in rows if np.isfinite(row.touching_mm)]
     return table | ({"touching_mm": {"median": float(np.median(touching))}} if touching else {})
+
+
+def _corrections(rows: list[Result]) -> dict:
+    rows = [row for row in rows if row.correction]
+    if not rows:
+        return {}
+    off, corrected = (np.array([getattr(row, name) for row in rows]) for name in ("off_target_mm", "corrected_mm"))
+    table: dict = {"farther": int((~(corrected <= off + FARTHER)).sum())}
+    for name, errors in (("without", off), ("with", corrected)):
+        inside, share, low, high = share_of(errors <= NEAR)
+        table[name] = {"runs": len(rows), "inside": inside, "share": share, "low": low, "high": high}
+    return {"cameras": table}
 
 
 def covered(off: np.ndarray, radius: np.ndarray) -> np.ndarray:

@@ -5,6 +5,7 @@ Interface. Between them the engine makes steps of 1/6000 s, as the stranger on t
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Annotated
 
 import numpy as np
@@ -198,10 +199,8 @@ class StandInRobot:
     def _rest(self, wound: np.ndarray):
         """The arm's state long after it was left alone, away from all contacts."""
         turn, _ = self.base()
-        arm, state, steps = self.arm, straight_state(self.arm, wound), round(LONGEST_REST / REST_STEP)
-        come_to_rest(arm.links, state, GRAVITY @ turn, 0.0, wound, arm.straight, REST_STEP, steps, CALM, STILL)
-        state.v[:] = 0.0
-        return state
+        rest = _rest(self.arm, tuple(map(float, GRAVITY @ turn)), tuple(map(float, wound)))
+        return LinkState(*(part.copy() for part in rest))
 
     def _refuse_touch(self) -> None:
         """The arm's rest was found without contacts, so it must begin free of them."""
@@ -231,6 +230,16 @@ class StandInRobot:
             if not low <= angle <= high:
                 raise InputError(f"{name}: joint_{j}: found {angle} rad, expected {low} to {high} rad")
         return angles
+
+
+@lru_cache(maxsize=16)  # runs of a rehearsal begin alike, and to come to rest is a fifth of what they cost
+def _rest(arm: Stranger, gravity: tuple[float, ...], wound: tuple[float, ...]) -> LinkState:
+    """Of an arm under `gravity`, m/s² in its base, whose motors are at `wound`, m."""
+    pulled, steps = np.array(wound), round(LONGEST_REST / REST_STEP)
+    state = straight_state(arm, pulled)
+    come_to_rest(arm.links, state, np.array(gravity), 0.0, pulled, arm.straight, REST_STEP, steps, CALM, STILL)
+    state.v[:] = 0.0
+    return state
 
 
 def straight_state(arm: Stranger, wound: np.ndarray) -> LinkState:

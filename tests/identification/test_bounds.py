@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.support.matched_plant import markers_of, release, small_model
-from trunkline.identification.fit.considered import LEVEL
+from trunkline.identification.fit.considered import LEVEL, half_widths
 from trunkline.identification.fit.identify import BOUND_TOLERANCE, _at_bound, _factors_at_bound
 from trunkline.identification.fit.intervals import ALONE, bootstrap, certainty
 from trunkline.identification.fit.linearisation import Linearisation
@@ -65,10 +65,10 @@ def test_a_factor_at_a_bound_is_named_with_its_unit(factor, at_bound):
 )  # fmt: skip
 def test_what_has_an_interval_wider_than_its_range_is_open(half, considered, is_open):
     """A range of 2 on the axis of the search; beside a parameter that is told. considered: half width of what is."""
+    given_model = np.array([half, 1e-6])
+    moves = {("mass", ""): np.array([considered / LEVEL, 0.0])} if considered else {}
     result = SimpleNamespace(
-        values={"mount_tilt_x": 0.0, "mount_tilt_y": 0.0},
-        certainty=SimpleNamespace(half_width=np.array([half, 1e-6])),
-        considered={("mass", ""): np.array([considered / LEVEL, 0.0])} if considered else {},
+        values={"mount_tilt_x": 0.0, "mount_tilt_y": 0.0}, half_width=half_widths(given_model, moves)
     )
     scale = PARAMETERS["mount_tilt_x"].scale
     bounds = {name: Bounds(-scale, scale) for name in result.values}

@@ -8,7 +8,7 @@ import pytest
 
 from tests.support.matched_plant import curl, markers_of, release, small_model, static_pull, tilt
 from tests.support.noisy_trials import WEIGHTS, with_values
-from trunkline.identification.fit.considered import EARLIER, Earlier, considered, half_widths
+from trunkline.identification.fit.considered import EARLIER, SCALES, Earlier, Moves, considered, half_widths
 from trunkline.identification.fit.intervals import certainty
 from trunkline.identification.fit.linearisation import Linearisation, linearise
 from trunkline.identification.fit.problem import Bounds, Problem
@@ -26,6 +26,13 @@ LINE = {"stiffness": Bounds(0.2, 20.0)}
 def problem_of(trials, model: mujoco.MjModel, parameters: dict[str, Bounds], frames: int = 60) -> Problem:
     experiments = [prepare(trial, model, frames) for trial in trials]
     return Problem(model, experiments, markers_of(model), parameters, "positions", WEIGHTS)
+
+
+def moves_of(problem: Problem, linear: Linearisation, sizes: Tolerances, earlier: list[Earlier]) -> Moves:
+    """Where the arm bears all of them."""
+    moves, lines = considered(problem, linear, sizes, earlier)
+    assert lines == []
+    return moves
 
 
 def at_truth(problem: Problem) -> Linearisation:
@@ -84,7 +91,7 @@ def test_a_heavier_arm_is_as_much_stiffer():
     """Weight bends it, so the same shapes follow from a mass and a stiffness that are both larger."""
     model = small_model()
     problem = problem_of(tilts(model), model, LINE)
-    moves = considered(problem, at_truth(problem), Tolerances(mass=0.03), [])
+    moves = moves_of(problem, at_truth(problem), Tolerances(mass=0.03), [])
     assert moves["mass", ""][0] == pytest.approx(np.log(1.03), rel=0.02)
 
 
@@ -93,7 +100,7 @@ def test_a_move_is_that_of_the_fit_by_the_changed_model(source):
     model = small_model()
     problem = problem_of(tilts(model), model, {**LINE, "mount_tilt_x": Bounds(-0.1, 0.1)})
     sizes = Tolerances(**{source: 3e-4 if source == "unit_end" else 0.02})
-    moves = considered(problem, at_truth(problem), sizes, [])
+    moves = moves_of(problem, at_truth(problem), sizes, [])
     for change in changes(model, sizes, moving=False, pulled=False):
         fields = problem.fields(problem.start()[None], changes=[change])
         changed = model.__copy__()
@@ -115,15 +122,15 @@ def test_what_moved_an_earlier_stage_moves_the_next_by_both_ways():
     model.tendon_frictionloss[:] = 0
     sizes = Tolerances(mass=0.03)
     first = problem_of(tilts(model), model, LINE)
-    stiffness = considered(first, at_truth(first), sizes, [])
+    stiffness = moves_of(first, at_truth(first), sizes, [])
     second = problem_of(
         [release(model, 0.3, frames=60), release(model, -0.2, frames=60)], model, {"damping": Bounds(0.001, 1)}
     )
-    scatter = np.array([[0.01**2]])
+    scatter = np.array([[0.01]])
     earlier = Earlier("identify_stiffness", ["stiffness"], first.start(), scatter, stiffness)
-    moves = considered(second, at_truth(second), sizes, [earlier])
+    moves = moves_of(second, at_truth(second), sizes, [earlier])
     assert moves["mass", ""][0] == pytest.approx(np.log(1.03), rel=0.1)
-    alone = considered(second, at_truth(second), sizes, [])["mass", ""][0]
+    alone = moves_of(second, at_truth(second), sizes, [])["mass", ""][0]
     assert abs(alone - np.log(1.03)) > 0.3 * np.log(1.03)
     stiffer = with_values(model, {"stiffness": 1.01 * parameter_named("stiffness").read(model)})
     exact = descend(replace(second, model=stiffer), second.start(), 30, 1e-12, lambda best: None).vector[0]
@@ -134,15 +141,15 @@ def test_what_moved_an_earlier_stage_moves_the_next_by_both_ways():
 def test_a_parameter_that_is_identified_anew_is_not_considered():
     model = small_model()
     problem = problem_of(tilts(model), model, LINE)
-    earlier = Earlier("identify_stiffness", ["stiffness"], problem.start(), np.array([[0.01]]), {})
-    assert considered(problem, at_truth(problem), Tolerances(), [earlier]) == {}
+    earlier = Earlier("identify_stiffness", ["stiffness"], problem.start(), np.array([[0.1]]), {})
+    assert moves_of(problem, at_truth(problem), Tolerances(), [earlier]) == {}
 
 
 def test_markers_move_one_by_one_and_the_base_all_at_once():
     model = small_model()
     problem = problem_of(tilts(model), model, {"mount_tilt_x": Bounds(-0.1, 0.1), "mount_tilt_y": Bounds(-0.1, 0.1)})
     linear = at_truth(problem)
-    moves = considered(problem, linear, Tolerances(marker_place=1e-3, base_place=1e-3), [])
+    moves = moves_of(problem, linear, Tolerances(marker_place=1e-3, base_place=1e-3), [])
     last = problem.markers[-1]
     shifted = [replace(e, positions=e.positions.copy()) for e in problem.experiments]
     exact = model.__copy__()
@@ -162,9 +169,9 @@ def test_kinds_that_differ_share_the_estimate():
     model = small_model()
     alone = problem_of(tilts(model), model, LINE)
     sizes = Tolerances(by_kind={"stiffness": 0.04})
-    assert considered(alone, at_truth(alone), sizes, [])["by_kind", "stiffness static_tilt"][0] == pytest.approx(-0.04)
+    assert moves_of(alone, at_truth(alone), sizes, [])["by_kind", "stiffness static_tilt"][0] == pytest.approx(-0.04)
     both = problem_of([*tilts(model), static_pull(model, [12, 0, 0])], model, LINE)
-    moves = considered(both, at_truth(both), sizes, [])
+    moves = moves_of(both, at_truth(both), sizes, [])
     assert sum(move[0] for move in moves.values()) == pytest.approx(-0.04)
     assert [-0.04 < move[0] < 0 for move in moves.values()] == [True, True]
 
@@ -174,7 +181,7 @@ def test_a_zero_of_a_cable_is_like_a_command_that_is_off():
     trials = [curl(model, 20, frames=40), curl(model, 35, frames=40)]
     problem = problem_of(trials, model, {"kp": Bounds(10, 1e4)})
     linear = at_truth(problem)
-    moves = considered(problem, linear, Tolerances(zero=5e-4, backlash=4e-4, hole_place=2e-4, gain=0.05), [])
+    moves = moves_of(problem, linear, Tolerances(zero=5e-4, backlash=4e-4, hole_place=2e-4, gain=0.05), [])
     shifted = [replace(e, controls=e.controls + np.array([5e-4, 0, 0])) for e in problem.experiments]
     blocks = replace(problem, experiments=shifted).residuals(problem.start()[None])
     columns = [(after[0] - before)[:, None] for after, before in zip(blocks, linear.residuals, strict=True)]
@@ -190,7 +197,7 @@ def test_nothing_is_considered_where_nothing_is_asked_for():
     assert [sizes.none for sizes in (Tolerances(), Tolerances(clamp=0.1), Tolerances(by_kind={"kp": 0.1}))] == [
         True, False, False,
     ]  # fmt: skip
-    assert considered(problem, at_truth(problem), Tolerances(), []) == {}
+    assert moves_of(problem, at_truth(problem), Tolerances(), []) == {}
     assert changes(model, Tolerances(hole_place=1e-4, gain=0.1), moving=False, pulled=False) == []
 
 
@@ -255,7 +262,7 @@ def test_motion_is_considered_by_slow_waves_at_a_coarser_step_where_the_arm_bear
     model = small_model(4)
     problem = problem_of([release(model, 0.2, frames=20)], model, LINE, frames=20)
     linear, sizes = at_truth(problem), Tolerances(stiffness_scatter=0.02)
-    coarse = considered(problem, linear, sizes, [])
+    coarse = moves_of(problem, linear, sizes, [])
     simulate = Problem.simulate
 
     def broken(self, *args, **more):
@@ -264,10 +271,10 @@ def test_motion_is_considered_by_slow_waves_at_a_coarser_step_where_the_arm_bear
         return simulated
 
     monkeypatch.setattr(Problem, "simulate", broken)
-    fine = considered(problem, linear, sizes, [])
+    fine = moves_of(problem, linear, sizes, [])
     monkeypatch.undo()
     monkeypatch.setattr("trunkline.identification.fit.considered.COARSER", 1.0)
-    exact = considered(problem, linear, sizes, [])
+    exact = moves_of(problem, linear, sizes, [])
     assert len(exact) == WAVES_MOVING
     for key, move in exact.items():
         np.testing.assert_array_equal(fine[key], move)
@@ -280,9 +287,94 @@ def test_what_a_quantity_moves_is_the_same_whatever_was_simulated_before_it(monk
     model = small_model()
     problem = problem_of([release(model, 0.2, frames=20)], model, LINE, frames=20)
     sizes = Tolerances(place_taper=0.1, unit_end=3e-4)
-    together = considered(problem, at_truth(problem), sizes, [])
+    together = moves_of(problem, at_truth(problem), sizes, [])
     monkeypatch.setattr("trunkline.identification.fit.considered.AT_ONCE", 1)
-    alone = considered(problem, at_truth(problem), sizes, [])
+    alone = moves_of(problem, at_truth(problem), sizes, [])
     assert alone.keys() == together.keys()
     for key, move in alone.items():
         np.testing.assert_allclose(move, together[key], rtol=1e-6, atol=1e-12)
+
+
+def diverging(monkeypatch, too_much) -> None:
+    """Makes every simulation diverge in which `too_much` of the problem and a change, or None, is true."""
+    simulate = Problem.simulate
+
+    def broken(self, vectors, *args, changes=(), **more):
+        simulated = simulate(self, vectors, *args, changes=changes, **more)
+        for number in range(len(vectors)):
+            if too_much(self, changes[number] if changes else None):
+                simulated.diverged[number] = True
+                for places in simulated.positions:
+                    places[number] = np.nan
+        return simulated
+
+    monkeypatch.setattr(Problem, "simulate", broken)
+
+
+def test_less_of_what_makes_the_arm_diverge_is_taken(monkeypatch):
+    """By an eighth of the deviation, times eight; of changes of the model and of trials."""
+    model = small_model()
+    problem = problem_of([static_pull(model, [12, 0, 0]), static_pull(model, [6, 0, 0])], model, LINE)
+    sizes = Tolerances(clamp=0.02, mass=0.01, zero=1e-4, gravity=1e-3)
+    whole, linear, share = moves_of(problem, at_truth(problem), sizes, []), at_truth(problem), SCALES[-1]
+    pulls = [e.controls for e in problem.experiments]
+
+    def too_much(problem, change):
+        stiffer = change and problem.fields(problem.start()[None], changes=[change])["jnt_stiffness"][0, 0]
+        longer = [np.abs(e.controls - pull).max() for e, pull in zip(problem.experiments, pulls, strict=True)]
+        clamped = change and change.source == "clamp" and stiffer > 1.01 * model.jnt_stiffness[0]
+        return bool(clamped) or max(longer) > 5e-5
+
+    diverging(monkeypatch, too_much)
+    moves = moves_of(problem, linear, sizes, [])
+    assert moves.keys() == whole.keys()
+    for key, move in whole.items():
+        np.testing.assert_allclose(moves[key], move, rtol=0.05, atol=1e-5)
+    smaller = problem_of([static_pull(model, [12, 0, 0]), static_pull(model, [6, 0, 0])], model, LINE)
+    monkeypatch.undo()
+    for key in [("clamp", ""), ("zero", "1")]:
+        expected = moves_of(smaller, linear, sizes.scaled(share), [])[key] / share
+        np.testing.assert_allclose(moves[key], expected, rtol=1e-6)
+        assert (moves[key] != whole[key]).all()
+
+
+def test_what_no_deviation_bears_is_left_out_with_a_line(monkeypatch):
+    model = small_model()
+    problem = problem_of([static_pull(model, [12, 0, 0]), static_pull(model, [6, 0, 0])], model, LINE)
+    earlier = Earlier("identify_stiffness", ["kp", "joint_place"], np.array([6.0, 0.1]), np.eye(2) * 0.03, {})
+    sizes, linear = Tolerances(clamp=0.02, mass=0.01, gravity=1e-3), at_truth(problem)
+    whole = moves_of(problem, linear, sizes, [earlier])
+    upright = problem.experiments[0].gravity
+
+    def too_much(problem, change):
+        turned = not np.array_equal(problem.experiments[0].gravity, upright)
+        return turned or (change is not None and (change.source, change.label) in broken)
+
+    broken = {("clamp", ""), ("identify_stiffness", "1")}
+    diverging(monkeypatch, too_much)
+    moves, lines = considered(problem, linear, sizes, [earlier])
+    assert whole.keys() - moves.keys() == {("clamp", ""), ("gravity", "x"), ("gravity", "y")}
+    assert [line.partition(":")[0] for line in lines] == [
+        "considered.clamp", "considered.identify_stiffness 1", "considered.gravity x", "considered.gravity y",
+    ]  # fmt: skip
+    assert all("0.125" in line and "left out" in line for line in lines)
+    np.testing.assert_array_equal(moves["mass", ""], whole["mass", ""])
+    assert all(np.isfinite(move).all() for move in moves.values())
+
+
+def test_an_earlier_stage_scatters_the_same_way_for_all_that_come_after_it():
+    """A later stage's moves by it, and its own, are of the same directions: they may cancel."""
+    model = small_model()
+    values = {"stiffness": 1.0, "kp": 600.0}
+    correlation = {a: {b: 1.0 if a == b else 0.9 for b in values} for a in values}
+    rows = {name: {"value": v, "interval_95_given_model": [0.9 * v, 1.1 * v]} for name, v in values.items()}
+    table = {"parameters": rows, "correlation": correlation, "fitted_to": {str(i): "" for i in range(9)}}
+    whole = Earlier.from_table("identify_stiffness", table)
+    part = whole.without({"kp": Bounds(1, 1e4)})
+    assert part.names == ["stiffness"]
+    np.testing.assert_array_equal(part.scatter, whole.scatter[:1])
+    covariance = whole.scatter @ whole.scatter.T
+    assert covariance[0, 1] / np.sqrt(covariance[0, 0] * covariance[1, 1]) == pytest.approx(0.9)
+    problem = problem_of([static_pull(model, [12, 0, 0])], model, {"kp": Bounds(10, 1e4)})
+    moves = moves_of(problem, at_truth(problem), Tolerances(mass=1e-9), [whole])
+    assert [label for source, label in moves if source == EARLIER] == ["identify_stiffness 1", "identify_stiffness 2"]

@@ -95,3 +95,14 @@ def test_half_the_step_moves_tip_and_object_by_little():
     moved = np.linalg.norm(whole[-1].tip - whole[0].tip)
     assert np.linalg.norm(whole[-1].tip - half[-1].tip) < 0.01 * moved
     assert np.linalg.norm(whole[-1].object - half[-1].object) < 1e-4
+
+
+def test_robots_that_begin_alike_rest_alike_and_share_nothing():
+    """The arm's rest is sought once: what the first robot does to its arm is no matter to the next."""
+    first = robot()
+    rest = [part.copy() for part in first.state]
+    first.send(first.joints[0], [0.02, 0.0, 0.0])
+    first.advance(0.5)
+    assert any((moved != part).any() for moved, part in zip(first.state, rest, strict=True))
+    for part, again in zip(rest, robot().state, strict=True):
+        np.testing.assert_array_equal(part, again)

@@ -135,3 +135,18 @@ def test_the_metrics_name_package_code_experiments_and_previews():
 )
 def test_of_outcomes_those_that_are_one_are_counted(outcomes, ones, share):
     assert share_of(outcomes) == (ones, share, *wilson(ones, len(outcomes)))
+
+
+def test_what_cameras_are_worth_is_of_reaches_that_were_corrected_or_refused_to_be():
+    rows = [
+        reach(5.0, 1.0, off_target_mm=12.0, corrected_mm=1.5, correction="corrected"),
+        reach(5.0, 1.0, off_target_mm=10.0, corrected_mm=12.0, correction="corrected"),
+        reach(NAN, 1.0, off_target_mm=11.0, corrected_mm=13.1, correction="not corrected"),
+        reach(5.0, 1.0, off_target_mm=1.0, corrected_mm=NAN, correction="corrected"),
+        reach(5.0, 1.0),
+    ]
+    cameras = scores(rows)["cameras"]
+    assert cameras["farther"] == 2
+    assert [cameras[name]["inside"] for name in ("without", "with")] == [2, 1]
+    assert (cameras["with"]["share"], cameras["with"]["low"], cameras["with"]["high"]) == (0.25, *wilson(1, 4))
+    assert "cameras" not in scores(rows[-1:])

@@ -242,6 +242,7 @@ def doubts(
         ]
         + [f"{name} ended on a bound of its range" for name in result.at_bound]
         + [f"{name} is not determined: its 95 % interval spans its range" for name in undetermined(result, bounds)]
+        + result.unconsidered
     )
 
 

@@ -2,6 +2,7 @@
 tell is refused by name, and an anchor brings it all back."""
 
 import asyncio
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -165,11 +166,12 @@ class Person:
 
     def __init__(self, procedure, seed=0, sigma=3e-4, pose=TRUE):
         self.procedure, self.rng, self.sigma, self.pose = procedure, np.random.default_rng(seed), sigma, pose
-        self.time = 0.0
+        self.time, self.cameras = 0.0, None  # m by which cameras see the mark elsewhere; None where they do not
 
     def hear(self, controller, mark=None):
         self.time += 1 / 72
-        self.procedure.hear(self.time, controller, mark)
+        cameras = None if self.cameras is None or mark is None else mark + self.cameras
+        self.procedure.hear(self.time, controller, mark, cameras)
 
     def pivot(self):
         for position, quaternion in zip(*turned(400, 30, self.rng), strict=True):
@@ -206,7 +208,24 @@ def test_the_base_is_aligned_by_six_touches_and_its_error_is_told_before_anythin
     progress = aligned.progress()
     assert (progress.step, progress.fasten, aligned.unfit) == ("done", True, "")
     assert progress.expected < 2e-3
-    assert progress.said.startswith("Aligned; expected error ")
+    assert progress.said.startswith("Aligned by touches; expected error ")
+    np.testing.assert_allclose(in_base(aligned.alignment, in_base(inverse(TRUE), PLACES)), PLACES, atol=2e-3)
+
+
+@pytest.mark.parametrize("bad", [None, 2])
+def test_touches_say_by_how_much_the_cameras_have_the_base_elsewhere(bad):
+    """They are in use, and a touch that was wrong is left out of both."""
+    aligned = procedure()
+    person = Person(aligned)
+    person.cameras = np.array([0.0, 0.02, 0.0])
+    person.align(bad)
+    if bad is not None:
+        person.touch(PLACES[bad])
+    words = re.fullmatch(
+        r"Aligned by touches; expected error [\d.]+ mm where the arm works\. "
+        r"By the cameras the base is ([\d.]+) mm elsewhere there, expected error [\d.]+ mm\.", aligned.progress().said
+    )  # fmt: skip
+    assert float(words[1]) == pytest.approx(20.0, abs=0.1)
     np.testing.assert_allclose(in_base(aligned.alignment, in_base(inverse(TRUE), PLACES)), PLACES, atol=2e-3)
 
 

@@ -23,7 +23,7 @@ CLOSED = {  # by what fails: what was begun before, closed in the reverse order
 
 
 class Cameras:
-    names = ("base", "tip")
+    names, sees_mount = ("base", "tip"), False
 
     def __init__(self, closed, fails):
         self._closed, self._fails = closed, fails
@@ -50,7 +50,8 @@ def test_where_a_session_is_not_made_all_that_has_begun_is_closed(monkeypatch, t
         "simulation_of": simulation,
         "PreviewProcess": begun("previewer"),
         "scene": {},
-        "subject_of": Subject(("base",), (), (), np.zeros(3), ("base", (0.0, 0.0, 0.0)), ""),
+        "subject_of": (subject := Subject(("base",), (), (), np.zeros(3), ("base", (0.0, 0.0, 0.0)), "")),
+        "measured_subject": subject,
         "natnet_cameras": Cameras(closed, fails == "cameras"),
         "new_path": tmp_path / "log.mcap",
         "LogWriterProcess": begun("log_writer"),

@@ -14,7 +14,9 @@ from tests.support.live import BODIES, PREVIEW, PlainPlanning, patient
 from tests.support.operator import PACKAGE, Everywhere
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import messages
+from trunkline.ar.session.arm_cameras import MeasuredArm
 from trunkline.ar.session.binary import HAND, Received
+from trunkline.ar.session.broadcast import Broadcast
 from trunkline.ar.session.controller import MOST_INPUTS, UNDRAWN, SessionController
 from trunkline.ar.session.controller_input import controllers
 from trunkline.ar.session.follow import PLANNER_TIMEOUT
@@ -24,7 +26,7 @@ from trunkline.ar.session.robot_process import RobotState
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.executor import FOLLOWS, PlanFollower
 from trunkline.ar.teleop.messages import Controller, ExecutorReport, Intent, Obstacle, PlanReport, Pose
-from trunkline.ar.teleop.plan import Plan
+from trunkline.ar.teleop.plan import CorrectionBounds, Plan
 
 DT, IDENTITY = 1 / 72, (1.0, 0.0, 0.0, 0.0)
 BASE = Pose((0.0, 0.0, 0.0), IDENTITY)
@@ -452,6 +454,43 @@ def test_from_hands_to_a_robot_that_has_arrived(session):
     np.testing.assert_allclose(session.robot.joints, session.planning.plans[0].joints[-1], atol=1e-9)
     assert session.robot.state().mode == "done"
     assert session.robot.stops == 1  # as control began
+
+
+def test_where_the_preview_had_the_tip_is_known_once_the_plan_has_arrived_and_until_the_next_motion(session):
+    controller = session.executing().controller
+    foreseen = controller.prediction
+    foreseen = controller.prediction = replace(foreseen, spread=(*foreseen.spread[:-1], 0.012))
+    assert controller.arrived is None
+    session.until(lambda intent: intent.mode == "aim")
+    session.tick()
+    place, radius = controller.arrived
+    np.testing.assert_array_equal(place, foreseen.tip[-1])
+    assert radius == 0.012
+    digest = controller.plan.digest()
+    assert controller._arrival(digest) is not None
+    for other in (replace(foreseen, digest="another"), replace(foreseen, spread=(), unknown="no certificate"), None):
+        controller.prediction = other
+        assert controller._arrival(digest) is None
+    controller.prediction = foreseen
+    controller.plan = replace(controller.plan, correction=CorrectionBounds(foreseen.tip[-1], 1, 0.001, 0.01))
+    assert controller._arrival(digest) is None
+    controller._begin(replace(controller.intent, motion="follow"))
+    assert controller.arrived is None
+
+
+def test_clients_hear_how_far_the_measured_tip_is_from_where_the_preview_had_it(session):
+    controller = session.executing().controller
+    poses = np.tile([0.1, 0.2, 0.3, 1, 0, 0, 0], (2, 1))
+    arm = MeasuredArm(0.0, poses, np.array([0.1, 0.2, 0.3]), 0.01, 120.0, 0.0, "", None)
+    hears = Broadcast(controller, None)
+    for second, (tip, arrived, expected) in enumerate([
+        (arm.tip, None, (None, None)),
+        (arm.tip, (arm.tip + [0.003, 0, 0.004], 0.008), (0.005, 0.008)),
+        (np.full(3, np.nan), (arm.tip, 0.008), (None, None)),
+    ]):  # fmt: skip
+        controller.arm, controller.arrived = replace(arm, tip=tip), arrived
+        message = hears.new_measured(1.0 + second)
+        assert (message.from_preview, message.radius) == expected
 
 
 def test_what_runs_is_still_known_where_its_preview_breaks_off_meanwhile(session):

@@ -12,7 +12,7 @@ from tests.support.operator import Operator
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import messages
 from trunkline.ar.session.log_reader import read_session_log
-from trunkline.ar.session.preview_validation import Execution, _end, _grasped, _holds, executions, lines, main
+from trunkline.ar.session.preview_validation import Execution, _end, _grasped, executions, holds, lines, main
 from trunkline.ar.session.robot_process import RobotState
 from trunkline.ar.teleop.messages import ExecutorReport, Intent, WorldObject
 from trunkline.kinematics.panda.kinematics import joint_frames, mount_pose
@@ -186,8 +186,8 @@ def test_what_came_of_a_grasp(before, later, expected):
     [([], False), ([OTHER], False), ([world_of("held")], True), ([world_of("held"), world_of("hanging")], False),
      ([world_of("hanging"), world_of("held"), OTHER], True), ([world_of("standing", "hanging")], False)],
 )  # fmt: skip
-def test_whether_the_arm_holds_anything(events, expected):
-    assert _holds(events) == expected
+def test_whether_the_armholds_anything(events, expected):
+    assert holds(events) == expected
 
 
 def executed(probability, grasped, within=None, visible=True):

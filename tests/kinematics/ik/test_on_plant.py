@@ -155,7 +155,7 @@ def test_poses_of_the_arm_tell_how_far_it_is_aside(model, chain):
 
 
 def test_other_networks_are_scored_beside_on_the_same_tips(model, chain, drawn):
-    """One that knows of the arm misses nothing, and the arm's own tips are sought once."""
+    """One that knows of the arm misses nothing. The arm's own tips are sought for the first alone."""
     rig, knows = Shifted(model, chain, MM), exact(chain)
 
     def informed(poses):
@@ -166,7 +166,7 @@ def test_other_networks_are_scored_beside_on_the_same_tips(model, chain, drawn):
     result = score_on_plant(
         model, chain, exact(chain), drawn.targets, drawn.commands, Rig(rig.reach, 1.0), {"with_poses": informed}
     )
-    assert len(rig.sent) == 5
-    medians = [part["own_surface"]["position_error_mm"]["median"] for part in (result["with_poses"], result)]
-    assert medians[0] < 0.05 < medians[1]
-    assert set(result["with_poses"]) == set(result) - {"with_poses"}
+    assert len(rig.sent) == 4
+    medians = [part["position_error_mm"]["median"] for part in (result["with_poses"], result)]
+    assert medians[0] < 0.4 < 0.9 < medians[1]  # mm; aimed off the twin's surface, exact to first order
+    assert set(result["with_poses"]) == set(result) - {"with_poses", "own_surface"}

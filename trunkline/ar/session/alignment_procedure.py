@@ -87,6 +87,7 @@ class AlignmentProcedure:
         self._dwell = Dwell()
         self._reference: list[np.ndarray] = []
         self._base: list[np.ndarray] = []
+        self._cameras: list[np.ndarray] = []
 
     @property
     def alignment(self) -> Pose | None:
@@ -129,9 +130,11 @@ class AlignmentProcedure:
 
     # --- what is seen
 
-    def hear(self, time: float, controller: ControllerPose | None, mark: np.ndarray | None) -> None:
+    def hear(
+        self, time: float, controller: ControllerPose | None, mark: np.ndarray | None, cameras: np.ndarray | None = None
+    ) -> None:
         """At `time`, s, the touching hand, None where it is not tracked; the flange's mark in the base, m (3,), None
-        where the robot moves."""
+        where the robot moves, and the same as cameras see it, None where they do not."""
         if self.step in ("tip", "touch", "check") and controller is None:
             self.message = UNTRACKED
         elif self.message == UNTRACKED:
@@ -144,7 +147,7 @@ class AlignmentProcedure:
                 point = np.array(add(controller.position, rotate(controller.quaternion, self.tip)))
             touched = self._dwell.hear(time, point, mark)
             if touched is not None and mark is not None:
-                self._checked(touched, mark) if self.step == "check" else self._touched(touched, mark)
+                self._checked(touched, mark) if self.step == "check" else self._touched(touched, mark, cameras)
 
     def anchored(self, id: str, pose: Pose | None, stored: Anchor | None) -> str:
         """The anchor `id` is at `pose` of the reference frame, None where it is lost; `stored`: its stored form. Why
@@ -207,13 +210,14 @@ class AlignmentProcedure:
         self.tip, self.step, self.message = (x, y, z), self._then, f"The tip is found, within {_mm(tip.missed)}."
         self._poses = []
 
-    def _touched(self, point: np.ndarray, mark: np.ndarray) -> None:
+    def _touched(self, point: np.ndarray, mark: np.ndarray, cameras: np.ndarray | None) -> None:
         reference, base = self._reference, self._base
         if any(np.linalg.norm(mark - other) < self.settings.apart for other in base):
             self.message = "Move the robot further before the next touch."
             return
         reference.append(point)
         base.append(mark)
+        self._cameras.append(np.full(3, np.nan) if cameras is None else cameras)
         self.message = f"Touch {len(base)} is heard."
         if len(base) < self.settings.places:
             return
@@ -221,13 +225,13 @@ class AlignmentProcedure:
         wrong = suspect(touched, marks)
         if wrong is not None:
             self.message = f"Touch {wrong.index + 1} is {_mm(wrong.off)} off the others; touch there again."
-            del reference[wrong.index], base[wrong.index]
+            del reference[wrong.index], base[wrong.index], self._cameras[wrong.index]
             return
         try:
             pose = fit(touched, marks)
         except InputError as error:
             self.message = f"{str(error)[:1].upper()}{str(error)[1:]}."
-            del reference[-1], base[-1]
+            del reference[-1], base[-1], self._cameras[-1]
             return
         level, most = np.degrees(tilt(pose)), self.settings.level_deg
         if level > most:
@@ -236,9 +240,23 @@ class AlignmentProcedure:
             return
         self.expected = expected_error(pose, touched, marks, np.array(self.settings.at))
         missed = float(np.sqrt(np.mean(residuals(pose, touched, marks) ** 2)))
-        message = f"Aligned; expected error {_mm(self.expected)} where the arm works."
+        message = f"Aligned by touches; expected error {_mm(self.expected)} where the arm works."
+        message += self._by_cameras(pose, touched)
         self._placed(inverse(pose), missed, self.expected, self.unfit or message)
         self.message = self.unfit or message
+
+    def _by_cameras(self, pose: Pose, touched: np.ndarray) -> str:
+        """By how much cameras have the base elsewhere than touches, which are in use; "" where they tell nothing."""
+        marks = np.array(self._cameras)
+        visible = np.isfinite(marks).all(axis=1)
+        at = np.array(self.settings.at)
+        try:
+            other = fit(touched[visible], marks[visible])
+        except InputError:  # too few, or too near to a plane
+            return ""
+        apart = float(np.linalg.norm(in_base(other, in_base(inverse(pose), at)) - at))
+        error = expected_error(other, touched[visible], marks[visible], at)
+        return f" By the cameras the base is {_mm(apart)} elsewhere there, expected error {_mm(error)}."
 
     def _checked(self, point: np.ndarray, mark: np.ndarray) -> None:
         assert self.place is not None

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
+import mujoco
 import numpy as np
 from pydantic import Field
 from scipy.spatial.transform import Rotation
@@ -20,6 +21,7 @@ from trunkline.ar.tracking.stream_checks import StreamLimits
 from trunkline.ar.tracking.tracker import ExpectedBodies, Tracker
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
+from trunkline.model.arm_model import CENTER
 
 EVERY = 4  # units from one that the simulated cameras see to the next
 MOUNT = "base"  # the arm's first body
@@ -36,7 +38,8 @@ class ArmCameraSettings:
     robot's base frame. limits: of the stream, `distance` as a share of the first of `apart`: an arm that curls brings
     only neighbors no nearer to each other. natnet: where Motive is. simulated: of the simulated robot's cameras, which
     need none of these but limits. mount: the arm's in the frame of the first body, m; None where no body is at the
-    mount, as of a single one, and nothing shows then that the cameras' frame is elsewhere.
+    mount, as of a single one, and nothing shows then that the cameras' frame is elsewhere. markers: what the arm's
+    model calls the bodies, in the same order; none where it calls them as Motive does.
     """
 
     bodies: Annotated[tuple[Annotated[str, Field(min_length=1, max_length=64)], ...], Field(max_length=100)]
@@ -48,11 +51,14 @@ class ArmCameraSettings:
     natnet: NatNetSettings
     simulated: CameraSettings
     mount: Place | None = (0.0, 0.0, 0.0)
+    markers: Annotated[tuple[Annotated[str, Field(min_length=1, max_length=64)], ...], Field(max_length=100)] = ()
 
     def __post_init__(self) -> None:
         if len(self.apart) != max(len(self.bodies) - 1, 0):
             counts = f"{len(self.bodies)} bodies and {len(self.apart)} distances"
             raise ValueError(f"bodies, apart: found {counts}, expected a distance from each to the next")
+        if self.markers and (len(self.markers) != len(self.bodies) or len(set(self.markers)) < len(self.markers)):
+            raise ValueError(f"markers: found {', '.join(self.markers)}, expected a name for each body, or none")
         norm = float(np.linalg.norm(self.quaternion))
         if abs(norm - 1) > 1e-3:
             raise ValueError(f"quaternion: found a length of {norm:.3g}, expected 1")
@@ -76,13 +82,24 @@ class MeasuredArm:
 
 class ArmCameras:
     """A tracker of the arm's bodies, from the mount to the tip. pose: of the cameras' frame in the base. tip: m, in the
-    frame of the last body, mount: in that of the first, None where that is not there. Shapes (3,)."""
+    frame of the last body, mount: in that of the first, None where that is not there. Shapes (3,). names: of the
+    bodies, in the arm's model where it has them."""
 
     def __init__(
         self, tracker: Tracker, names: Sequence[str], pose: Pose, tip: np.ndarray, mount: np.ndarray | None
     ) -> None:
         self.names, self._tracker, self._tip, self._mount = tuple(names), tracker, tip, mount
+        self.align(pose)
+
+    def align(self, pose: Pose) -> None:
+        """The cameras' frame is there in the base from now on."""
+        self.pose = pose
         self._turn, self._origin = rotation_from_wxyz(np.array(pose.quaternion)), np.array(pose.position)
+
+    @property
+    def sees_mount(self) -> bool:
+        """Whether the first body is at the arm's mount."""
+        return self._mount is not None
 
     def connect(self) -> None:
         """As of `Tracker`."""
@@ -116,17 +133,22 @@ class SimulatedArmCameras(ArmCameras):
         names = [MOUNT, *units[last % EVERY : last + 1 : EVERY]]
         poses = BodyPoses(simulation.twin.model, simulation.bodies).of(_start(simulation))
         self._rows = [simulation.bodies.index(name) for name in names]
-        apart = np.linalg.norm(np.diff(poses[self._rows, :3], axis=0), axis=1)
+        marked = markers_of(simulation.twin.model, names)
+        self._places = np.array([np.zeros(3) if marker is None else marker[1] for marker in marked])
+        apart = np.linalg.norm(np.diff(self._markers(poses), axis=0), axis=1)
         cameras = settings.simulated
         turn = rotation_from_wxyz(np.array(cameras.quaternion)).inv()
         pose = _pose(turn, -turn.apply(np.array(cameras.origin)))
         self._simulated = SimulatedTracker(cameras, _expected(names, apart), settings.limits)
-        super().__init__(self._simulated, names, pose, np.array(tip[1], float), np.zeros(3))
+        super().__init__(self._simulated, names, pose, np.array(tip[1], float) - self._places[-1], np.zeros(3))
         self.show(poses)
 
     def show(self, bodies: np.ndarray) -> None:
-        rows = bodies[self._rows]
-        self._simulated.show(rows[:, :3], rows[:, 3:])
+        self._simulated.show(self._markers(bodies), bodies[self._rows, 3:])
+
+    def _markers(self, bodies: np.ndarray) -> np.ndarray:
+        """Where the markers are, m, of drawn bodies (N, 7). Shape (B, 3)."""
+        return marker_positions(bodies[self._rows], self._places)
 
 
 def natnet_cameras(settings: ArmCameraSettings) -> ArmCameras:
@@ -141,7 +163,24 @@ def natnet_cameras(settings: ArmCameraSettings) -> ArmCameras:
     tracker = NatNetTracker(settings.natnet, expected, settings.limits)
     alone = settings.mount is None or len(settings.bodies) == 1
     pose, mount = Pose(settings.position, settings.quaternion), None if alone else np.array(settings.mount)
-    return ArmCameras(tracker, settings.bodies, pose, np.array(settings.tip), mount)
+    return ArmCameras(tracker, settings.markers or settings.bodies, pose, np.array(settings.tip), mount)
+
+
+def markers_of(
+    model: mujoco.MjModel, names: Sequence[str]
+) -> tuple[tuple[str, tuple[float, float, float]] | None, ...]:
+    """Of each marker of an arm the body that it is on, and where in that, m; None where the model lacks it."""
+    markers = []
+    for name in names:
+        site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, f"{name}{CENTER}")
+        x, y, z = (float(value) for value in model.site_pos[site])
+        markers.append(None if site < 0 else (model.body(model.site_bodyid[site]).name, (x, y, z)))
+    return tuple(markers)
+
+
+def marker_positions(poses: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """m, of what is at `places` (B, 3), m, in bodies at `poses` (B, 7); NaN where these are. Shape (B, 3)."""
+    return np.array([_place(pose, place) for pose, place in zip(poses, places, strict=True)])
 
 
 def _expected(names: Sequence[str], apart: np.ndarray) -> ExpectedBodies:

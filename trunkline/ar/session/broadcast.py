@@ -82,9 +82,13 @@ class Broadcast:
         drawn = controller.drawn_tip()
         if tip is not None and drawn is not None:
             apart = round(float(np.linalg.norm(arm.tip - drawn)), DIGITS)
+        from_preview, radius = None, None
+        if tip is not None and controller.arrived is not None:
+            place, radius = controller.arrived
+            from_preview = round(float(np.linalg.norm(arm.tip - place)), DIGITS)
         markers = tuple(_point(pose[:3]) for pose in arm.poses)
         figures = round(arm.age, 3), round(arm.rate, 1), round(arm.loss, 3)
-        return messages.MeasuredMessage(markers, tip, apart, *figures, arm.fault)
+        return messages.MeasuredMessage(markers, tip, apart, *figures, arm.fault, from_preview, radius)
 
 
 def _point(position: np.ndarray) -> messages.Point | None:

@@ -10,8 +10,16 @@ from trunkline.ar.preview.package import Package, read_package
 from trunkline.ar.preview.preview_twin import compose_twin, robot_model_of
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import preview_process, simulated
-from trunkline.ar.session.arm_cameras import ArmCameras, ArmCameraSettings, SimulatedArmCameras, natnet_cameras
+from trunkline.ar.session.arm_cameras import (
+    MOUNT,
+    ArmCameras,
+    ArmCameraSettings,
+    SimulatedArmCameras,
+    markers_of,
+    natnet_cameras,
+)
 from trunkline.ar.session.bodies import drawn_bodies
+from trunkline.ar.session.camera_alignment import CameraAlignment
 from trunkline.ar.session.certificate import certificate_of
 from trunkline.ar.session.controller import SessionController
 from trunkline.ar.session.hardware import Hardware
@@ -85,15 +93,18 @@ def make(
         arm_cameras = cameras_of(cameras, simulation, subject, config.cameras)
         if arm_cameras is not None:
             begun.callback(arm_cameras.close)
-            subject = replace(subject, measured=arm_cameras.names)
+            subject = measured_subject(subject, arm_cameras, simulation)
         log_writer = LogWriterProcess(new_path(Path(config.journal.folder)), subject, config.journal.period)
         begun.callback(log_writer.close)
         robot = robot_of(simulation, hardware)
         begun.callback(robot.close)
         core = Teleoperation(teleop.core, package.reach, package.digest, teleop.mount_offset)
         lift = teleop.handling.least_lift
+        alignment = None
+        if arm_cameras is not None and arm_cameras.sees_mount:
+            alignment = CameraAlignment(arm_cameras, teleop.mount_offset, config.correction.misplaced)
         controller = SessionController(
-            core, robot, previewer, world, lift, log_writer, package.period, arm_cameras, config.correction
+            core, robot, previewer, world, lift, log_writer, package.period, arm_cameras, config.correction, alignment
         )
         controller.begin(config.rate, __version__)
         log_writer.await_begun()
@@ -121,6 +132,15 @@ def cameras_of(kind: str, simulation: Simulation, subject: Subject, settings: Ar
         cameras.close()
         raise
     return cameras
+
+
+def measured_subject(subject: Subject, cameras: ArmCameras, simulation: Simulation) -> Subject:
+    """The subject of a session in which `cameras` see the arm."""
+    mount = cameras.names[0] if cameras.sees_mount else ""
+    names = [MOUNT if name == mount else name for name in cameras.names]
+    return replace(
+        subject, measured=cameras.names, markers=markers_of(simulation.twin.model, names), mount=mount
+    )  # fmt: skip
 
 
 def subject_of(simulation: Simulation, hardware: Hardware | None = None) -> Subject:

@@ -17,6 +17,7 @@ from trunkline.ar.preview.world_model import update_world
 from trunkline.ar.session import messages
 from trunkline.ar.session.arm_cameras import MeasuredArm
 from trunkline.ar.session.binary import MARKERS
+from trunkline.ar.session.camera_alignment import CameraAlignment, CamerasAligned
 from trunkline.ar.session.controller_input import NOWHERE
 from trunkline.ar.session.correction_control import CorrectionControl
 from trunkline.ar.session.correction_steps import CorrectionAnswer
@@ -88,11 +89,13 @@ class Cameras(Protocol):
 
     def show(self, bodies: np.ndarray) -> None: ...
     def latest(self) -> MeasuredArm: ...
+    def align(self, pose: Pose) -> None: ...
 
 
 class SessionController:
     """One robot, one core. `lift`: m by which a grasp lifts at least. `log_writer`: of the session. `period`: s, of the
-    arm's slowest vibration mode. `cameras`: that see the arm, None without; `correction`: of plans, by what they see.
+    arm's slowest vibration mode. `cameras`: that see the arm, None without; `correction`: of plans, by what they see;
+    `camera_alignment`: of their frame, None where they see no mount.
     """
 
     def __init__(
@@ -106,6 +109,7 @@ class SessionController:
         period: float = 0.0,
         cameras: Cameras | None = None,
         correction: CorrectionSettings | None = None,
+        camera_alignment: CameraAlignment | None = None,
     ) -> None:
         self.core, self.robot, self.previewer, self.world = core, robot, previewer, world
         self.lift, self.period = lift, period
@@ -130,6 +134,8 @@ class SessionController:
         self._logged: tuple = ()
         self._follow = FollowControl(previewer.submit, robot.hear)
         self.cameras, self.arm = cameras, None
+        self.camera_alignment = camera_alignment
+        self.aligned: CamerasAligned | None = None  # the last that was computed
         self._moved = -math.inf  # s, when anything moved
         self._written = -math.inf  # s, of the newest of what cameras saw in the log
         self.correction = CorrectionControl(
@@ -137,6 +143,7 @@ class SessionController:
             core.mount_offset,
         )  # fmt: skip
         self._bounds: CorrectionBounds | None = None  # of the plan that is asked for
+        self.arrived: tuple[np.ndarray, float] | None = None  # as `_arrival` has it, of the plan that ran last
 
     def begin(self, rate: float, version: str = "") -> None:
         """The log's first line: all that a replay needs besides the package. rate: of ticks, Hz. version: of
@@ -145,7 +152,7 @@ class SessionController:
         self.log_writer.event(
             "begin", version=version, package=core.package, rate=rate, settings=core.settings,
             mount_offset=core.mount_offset, tip={"body": subject.tip[0], "place": subject.tip[1]},
-            hardware=subject.hardware,
+            hardware=subject.hardware, measured=subject.measured, mount=subject.mount,
         )  # fmt: skip
 
     # --- what is heard
@@ -349,9 +356,16 @@ class SessionController:
             self._moved = now
         if self.arm.stamp > self._written + (0.0 if now - self._moved < SWINGS else RARELY):
             self._written = self.arm.stamp
-            self.log_writer.measured(self.arm.stamp, self.arm.poses)
+            poses = self.arm.poses.copy()
+            if self.arm.mount is not None:
+                poses[0, :3] = self.arm.mount  # as recordings have their base
+            self.log_writer.measured(self.arm.stamp, poses)
         if before is not None and self.arm.fault != before.fault:
             self.log_writer.event("cameras", fault=self.arm.fault)
+        aligned = self.camera_alignment.observe(robot_state, self.arm) if self.camera_alignment is not None else None
+        if aligned is not None:
+            self.aligned = aligned
+            self.log_writer.event("cameras", fault=self.arm.fault, aligned=aligned)
 
     def why_uncorrected(self, targets: Targets) -> str:
         """Why a plan for these targets cannot correct itself by what cameras see, "" where it may be able to."""
@@ -364,6 +378,10 @@ class SessionController:
     def _ask(self, intent: Intent, robot_state: RobotState, correct: bool = False) -> None:
         request = intent.request
         if request is not None and request.serial != self._requested:
+            if self.cameras is not None and self.camera_alignment is not None:
+                pose = self.camera_alignment.take()  # here, as the robot rests and nothing is corrected
+                if pose is not None:
+                    self.cameras.align(pose)
             self._requested, self.report, self.plan, self.preview = request.serial, None, None, None
             self.prediction, self.pieces, self._shown_digest = None, [], ""
             self._ordered = True
@@ -400,7 +418,7 @@ class SessionController:
 
     def _begin(self, intent: Intent) -> None:
         """Start the plan that was confirmed, or to follow, once."""
-        self._started = intent.execute or FOLLOWS
+        self._started, self.arrived = intent.execute or FOLLOWS, None
         self.correction.forget()
         if intent.motion == "follow":
             following = Following(self.core.settings.follow_delay, self.period, self.core.mount_offset)
@@ -421,8 +439,16 @@ class SessionController:
         done = executor.mode == "done" and executor.digest != self._believed and self.plan is not None
         phases = tuple(name for name, _ in self.plan.phases) if done and self.plan is not None else ()
         if done:
-            self._believed = executor.digest
+            self._believed, self.arrived = executor.digest, self._arrival(executor.digest)
         self.world = update_world(self.world, robot_state.object, phases, self.lift)
+
+    def _arrival(self, digest: str) -> tuple[np.ndarray, float] | None:
+        """Where a plan's preview has the tip at its end (3,), m, and the radius about it that it states, m; None where
+        it states none, or where the plan has corrected itself since."""
+        foreseen, corrects = self.prediction, self.plan is None or self.plan.correction is not None
+        if corrects or foreseen is None or foreseen.digest != digest or not foreseen.spread:
+            return None
+        return np.array(foreseen.tip[-1]), foreseen.spread[-1]
 
     # --- what is told
 

@@ -53,7 +53,9 @@ class Record(NamedTuple):
 class Subject:
     """Whose session it is: names of the bodies (N), of the rigid robot's joints and of the cables (K), whose lengths
     are `straight` (K,), m, in the straight arm; a pull is that less the length. tip: the body of the arm's tip, and
-    where it is in that, m. hardware: what of it is real, in words. measured: names of the bodies that cameras see."""
+    where it is in that, m. hardware: what of it is real, in words. measured: names of the bodies that cameras see (B).
+    markers: the body of the arm that each of these is on, and where in that, m; None where its model has none of the
+    name. mount: name of that of them which is at the arm's mount, "" without."""
 
     bodies: tuple[str, ...]
     joints: tuple[str, ...]
@@ -62,6 +64,8 @@ class Subject:
     tip: tuple[str, tuple[float, float, float]]
     hardware: str = SIMULATED
     measured: tuple[str, ...] = ()
+    markers: tuple[tuple[str, tuple[float, float, float]] | None, ...] = ()
+    mount: str = ""
 
     @property
     def poses(self) -> str:

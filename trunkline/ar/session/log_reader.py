@@ -71,18 +71,22 @@ def read_session_log(path: Path) -> LogReader:
     Raises:
         InputError: it is no log of a live session.
     """
-    log = read_log(path)
+    return session_log(read_log(path))
+
+
+def session_log(log: Log) -> LogReader:
+    """As `read_session_log`, of a log that was read."""
     try:
         events = [json.loads(text) for text, _ in _texts(log, EVENTS)]
         zero = next((logged - round(1e9 * json.loads(text)["time"]) for text, logged in _texts(log, EVENTS)), 0)
         steps = _steps(log)
     except ValueError as error:
-        raise InputError(f"{path}: {error}, expected the log of a live session") from error
+        raise InputError(f"{log.path}: {error}, expected the log of a live session") from error
     if not steps:
-        raise InputError(f"{path}: {INPUT}: found no step of the core, expected the log of a live session")
+        raise InputError(f"{log.path}: {INPUT}: found no step of the core, expected the log of a live session")
     poses, twin = (pose_stream({None: log.topics[name]}) if name in log.topics else None for name in (POSES, TWIN))
     joints = joint_stream(log.topics[JOINTS]) if JOINTS in log.topics else None
-    return LogReader(Path(path), log.damage, zero, events, steps, poses if twin is None else None, twin, joints)
+    return LogReader(log.path, log.damage, zero, events, steps, poses if twin is None else None, twin, joints)
 
 
 def _steps(log: Log) -> list[LogStep]:

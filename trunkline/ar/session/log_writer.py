@@ -42,6 +42,7 @@ from trunkline.ar.session.log_format import (
     new_file,
     run,
 )
+from trunkline.ar.session.log_reader import tip_path
 from trunkline.ar.session.robot_process import RobotState
 from trunkline.ar.teleop import messages
 from trunkline.ar.teleop.messages import Input, Intent, Pose
@@ -110,8 +111,8 @@ class LogWriter:
         self.keep(Record(STATIC, now, now, np.array([*pose.position, *pose.quaternion]), BASE))
 
     def piece(self, first: int, begins: float, poses: np.ndarray) -> None:
-        """Of a preview: the arm's last body in frames from the one numbered `first`, at `begins` s of the plan; of a
-        real machine the rigid robot's last body too, as nobody will see the arm.
+        """Of a preview: the arm's last body in frames from the one numbered `first`, at `begins` s of the plan, and
+        where the last of them has what cameras see; of a real machine the rigid robot's last body too.
 
         Args:
             poses: of all bodies, (F, N, 7).
@@ -120,7 +121,16 @@ class LogWriter:
         if bodies:
             wrist = {WRIST: poses[:, bodies.index(WRIST)].tolist()} if self.subject.poses == TWIN else {}
             rows = poses[:, bodies.index(self.subject.tip[0])]
-            self.event("piece", first=first, begins=begins, poses=rows.tolist(), **wrist)
+            markers = {"markers": self._markers(poses[-1])} if self.subject.markers else {}
+            self.event("piece", first=first, begins=begins, poses=rows.tolist(), **wrist, **markers)
+
+    def _markers(self, poses: np.ndarray) -> list[list[float] | None]:
+        """m, of those that cameras see, the bodies at `poses` (N, 7); None of those that the arm's model lacks."""
+        on, bodies = self.subject.markers, self.subject.bodies
+        return [
+            None if marker is None else tip_path(poses[[bodies.index(marker[0])]].astype(float), marker[1])[0].tolist()
+            for marker in on
+        ]
 
     def event(self, kind: str, **fields: object) -> None:
         """Anything else, by the name of its `kind`; fields are what JSON can hold, or dataclasses."""

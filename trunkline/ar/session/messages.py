@@ -230,7 +230,9 @@ class MeasuredMessage:
     """The arm as cameras see it, ten times a second where a session has any. markers: m, from the mount to the tip,
     null where one is not seen; tip: m. apart: from there to the drawn robot's tip, m; null where it is not seen. age:
     s; rate: Hz; loss: share of the frames that did not come. fault: why nothing is corrected by them now, ""
-    while they are sound."""
+    while they are sound. from_preview: from the tip to where the preview of the plan that ran last had it at its end,
+    m, and radius: that the preview stated about there, m; both null until it has arrived, and where it stated none or
+    corrected itself."""
 
     markers: tuple[Point | None, ...]
     tip: Point | None
@@ -239,6 +241,8 @@ class MeasuredMessage:
     rate: float
     loss: float
     fault: str
+    from_preview: float | None = None
+    radius: float | None = None
     type: Literal["measured"] = "measured"
 
 

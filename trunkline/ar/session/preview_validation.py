@@ -153,15 +153,15 @@ def _compared(
 
 def _grasped(before: list[dict], later: list[dict]) -> bool:
     """Whether the arm holds something that it did not, as believed until the next plan is asked for."""
-    success = _holds(before)
+    success = holds(before)
     for event in later:
         if event["event"] == "request":
             break
-        success = _holds([event]) if event["event"] == "world" else success
+        success = holds([event]) if event["event"] == "world" else success
     return success
 
 
-def _holds(events: list[dict]) -> bool:
+def holds(events: list[dict]) -> bool:
     world = next((event["world"] for event in reversed(events) if event["event"] == "world"), {"things": []})
     return any(object["support"] == "held" for object in world["things"])
 

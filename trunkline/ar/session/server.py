@@ -19,6 +19,7 @@ from trunkline.ar.session.alignment_procedure import AlignmentProcedure
 from trunkline.ar.session.anchors import Anchor, Anchors
 from trunkline.ar.session.auth import HEADERS, Origins, PairingCode, make_token, same
 from trunkline.ar.session.broadcast import Broadcast, piece
+from trunkline.ar.session.camera_alignment import CamerasAligned, camera_mark
 from trunkline.ar.session.client import PER_SECOND, Client, end
 from trunkline.ar.session.connections import IdleConnections
 from trunkline.ar.session.controller import SessionController
@@ -80,6 +81,7 @@ class Server:
             composition.certificate,
         )  # fmt: skip
         self._world, self._unwritten, self._gc_policy = None, "", GCPolicy()
+        self._aligned_cameras: CamerasAligned | None = None  # the last of which the terminal has a line
         self._ticked = now()
 
     # --- routes
@@ -305,7 +307,9 @@ class Server:
         rests = self.controller.robot.state().mode in ("idle", "done")
         mark = mark_at(self.controller.robot.robot_state().joints, settings.mark) if rests else None
         before = procedure.progress()
-        procedure.hear(received.stamp, controller_pose(received, TOUCHING), mark)
+        arm, offset = self.controller.arm, self.controller.core.mount_offset
+        visible = camera_mark(arm, settings.mark, offset) if arm is not None and mark is not None else None
+        procedure.hear(received.stamp, controller_pose(received, TOUCHING), mark, visible)
         self._aligned(client, before)
 
     def _handle(self, client: Client, message: messages.ClientMessage, now: float) -> None:
@@ -464,6 +468,10 @@ class Server:
         if self.controller.log_writer.fault != self._unwritten:
             self._unwritten = self.controller.log_writer.fault
             self.composition.log(self._unwritten or "log: written again")
+        aligned = self.controller.aligned
+        if aligned is not None and aligned is not self._aligned_cameras:
+            self._aligned_cameras = aligned
+            self.composition.log(aligned.words)
         self._show(now)
         if self.controller.world is not self._world:
             self._world = self.controller.world

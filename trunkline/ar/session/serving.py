@@ -22,6 +22,7 @@ from trunkline.ar.session.auth import CODE_SECONDS, HEADERS, Origins, make_token
 from trunkline.ar.session.composition import SessionParts, make
 from trunkline.ar.session.connections import LONGEST
 from trunkline.ar.session.hardware import Hardware, hardware_of
+from trunkline.ar.session.measured_session import write_session
 from trunkline.ar.session.server import PARTING, Composition, Server
 from trunkline.ar.session.settings import AlignmentSettings, SessionConfig, read_session_config
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
@@ -177,11 +178,18 @@ async def serve(options: argparse.Namespace, names: list[str], context: ssl.SSLC
             log("The motors wind up their cables now, before the page is there: stand clear. Ctrl-C lets them go.")
     address = Address(options.port, options.host, tuple(names), context)
     expect_free(address)  # what a session needs takes long to load
-    async with opened(options.package, address, log, hardware, cameras=options.cameras) as (server, made):
-        log(f"log: {made.log_writer.path}")
-        log(f"{address.url}/#token={server.composition.token}")
-        _pair(server, log, asyncio.get_running_loop())
-        await asyncio.Event().wait()
+    path = None
+    try:
+        async with opened(options.package, address, log, hardware, cameras=options.cameras) as (server, made):
+            path = made.log_writer.path
+            log(f"log: {path}")
+            log(f"{address.url}/#token={server.composition.token}")
+            _pair(server, log, asyncio.get_running_loop())
+            await asyncio.Event().wait()
+    finally:
+        if path is not None:  # all processes have ended, nothing moves
+            for line in write_session(path):
+                log(line)
 
 
 def _pair(server: Server, log, loop: asyncio.AbstractEventLoop) -> None:

@@ -12,14 +12,13 @@ What an earlier stage identified is considered too. What moved it, moves the lat
 cancel: S_c is then that of J_c + J_E S_c,E, with J_E by differences along the axes of its covariance.
 """
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 from scipy.special import ndtri, stdtrit
 
-from trunkline.errors import InputError
 from trunkline.identification.fit.linearisation import Linearisation
 from trunkline.identification.fit.problem import Problem
 from trunkline.identification.fit.surrogate import reaches
@@ -30,12 +29,14 @@ from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.winch import wind
 from trunkline.recordings.trials.experiments import is_static
 
-Moves = dict[tuple[str, str], np.ndarray]  # by source and label of a quantity: S_c, on the axes of the search, (P,)
-Effect = tuple[tuple[str, str], list[np.ndarray]]  # source and label, and per trial the residuals' change (R,)
+Key = tuple[str, str]  # source and label of a quantity
+Moves = dict[Key, np.ndarray]  # S_c, on the axes of the search, (P,)
+Effects = dict[Key, list[np.ndarray] | None]  # per trial the residuals' change (R,); None where the arm diverges
 EARLIER = "earlier"  # source of what the trials of an earlier stage left open
 # times the time step: what a step itself changes is in both of two simulations, and goes as they are subtracted
 COARSER = 2.0
 AT_ONCE = 12  # candidates, as the positions of all of them are kept until they are compared
+SCALES = (1.0, 0.125)  # shares of a deviation by which residuals are changed, in turn, where the arm diverges with one
 LEVEL = ndtri(0.975)  # of what is considered: its deviations are stated, not estimated (JCGM 100, G.4)
 
 
@@ -43,13 +44,14 @@ LEVEL = ndtri(0.975)  # of what is considered: its deviations are stated, not es
 class Earlier:
     """What an earlier stage identified, of P parameters on the axes of the search.
 
-    stage, names. estimate: (P,). covariance: over its trials, given its model. Shape (P, P). moves: (P,) each.
+    stage, names. estimate: (P,). scatter: columns that are independent of each other, which its trials leave open given
+    its model; their products with themselves add up to the covariance. Shape (P, C). moves: (P,) each.
     """
 
     stage: str
     names: list[str]
     estimate: np.ndarray
-    covariance: np.ndarray
+    scatter: np.ndarray
     moves: Moves
 
     @classmethod
@@ -66,22 +68,54 @@ class Earlier:
             for source, rows in table.get("considered", {}).items()
             for label, row in rows.items()
         }
-        return cls(stage, names, estimate, correlation * np.outer(deviation, deviation), moves)
+        return cls(stage, names, estimate, _root(correlation * np.outer(deviation, deviation)), moves)
 
     def without(self, names) -> "Earlier":
         """But for parameters that a later stage identifies anew."""
-        left = [i for i, name in enumerate(self.names) if name not in names]
+        staying = [i for i, name in enumerate(self.names) if name not in names]
         return Earlier(
-            self.stage, [self.names[i] for i in left], self.estimate[left], self.covariance[np.ix_(left, left)],
-            {key: move[left] for key, move in self.moves.items()},
+            self.stage, [self.names[i] for i in staying], self.estimate[staying], self.scatter[staying],
+            {key: move[staying] for key, move in self.moves.items()},
         )  # fmt: skip
 
 
-def considered(problem: Problem, linear: Linearisation, sizes: Tolerances, earlier: list[Earlier]) -> Moves:
+@dataclass
+class _Steps:
+    """An earlier stage's parameters that this one takes over, moved along the axes of their covariance.
+
+    root: columns whose products with themselves add up to it, with the stage's moves. Shape (P, P). shifts: by how much
+    residuals change with each column, per trial (R, P).
+    """
+
+    stage: Earlier
+    root: np.ndarray
+    shifts: list[np.ndarray] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, stage: Earlier) -> "_Steps":
+        parts = np.column_stack([stage.scatter, *stage.moves.values()])
+        return cls(stage, _root(parts @ parts.T))
+
+    def changes(self, scale: float) -> list[Perturbation]:
+        """One for each column, times `scale`."""
+        return [_shifted(self.stage, str(number + 1), scale * step) for number, step in enumerate(self.root.T)]
+
+    def change(self, move: np.ndarray) -> list[np.ndarray]:
+        """Residuals' change with the parameters' `move` (P,) on the axes of the search. Per trial (R,)."""
+        steps = np.linalg.pinv(self.root) @ move
+        return [block @ steps for block in self.shifts]
+
+
+def considered(
+    problem: Problem, linear: Linearisation, sizes: Tolerances, earlier: list[Earlier]
+) -> tuple[Moves, list[str]]:
     """By how much the minimum of `problem` moves with one standard deviation of each quantity.
 
     Args:
         linear: of the residuals, at the minimum.
+
+    Returns:
+        The moves, and a line on each quantity that is left out, as the arm diverges with the least of it.
     """
     vector, fine = linear.vector, problem
     if not fine.rubs:  # else the motors' damping answers otherwise
@@ -89,43 +123,41 @@ def considered(problem: Problem, linear: Linearisation, sizes: Tolerances, earli
     base = problem.simulate(vector[None])
     if base.diverged.any():  # a stiff arm
         problem, base = fine, fine.simulate(vector[None])
-    blocks = problem.compare(base.positions)
+    blocks = [block[0] for block in problem.compare(base.positions)]
     if problem.rubs:  # the arm sticks and slips as a parameter changes, and only long differences mean something
-        jacobians = _differences(problem, vector, reaches(problem))
-        linear = replace(linear, jacobians=jacobians)
-    columns: dict[tuple[str, str], list[np.ndarray]] = {}
+        linear = replace(linear, jacobians=_differences(problem, vector, reaches(problem)))
     moving = any(not is_static(e.kind) for e in problem.experiments)
     pulled = any(not e.slack(problem.model) for e in problem.experiments)
-    of_model = changes(problem.model, sizes, moving, pulled)
-    roots, of_earlier = [], []
-    for stage in (part.without(problem.parameters) for part in earlier):
-        root = _root(stage.covariance + sum(np.outer(move, move) for move in stage.moves.values()))
-        roots.append((stage, root))
-        of_earlier += [_shifted(stage, step) for step in root.T]
-    shifts = []
-    for change, column in _changed(problem, vector, blocks, [*of_model, *of_earlier]):
-        if change.source == EARLIER:
-            shifts.append(column)
-        else:
-            columns[change.source, change.label] = column
-    columns |= dict(_of_trials(problem, vector, blocks, sizes))
-    columns |= dict(_of_markers(problem, vector, base.positions, blocks, sizes))
-    columns |= dict(_by_kind(problem, linear, sizes, roots, shifts))
-    answered = {key: linear.answers([block[:, None] for block in column])[0] for key, column in columns.items()}
-    begin = 0
-    for stage, root in roots:
-        to_axes = np.linalg.pinv(root)  # of the stage's parameters, to so many of its steps
-        stacked = [np.stack(parts, axis=1) for parts in zip(*shifts[begin : begin + root.shape[1]], strict=True)]
-        begin += root.shape[1]
-        if not stacked:
-            continue
-        response = linear.answers(stacked).T @ to_axes  # of this stage to the earlier one's parameters
-        for number, scatter in enumerate(_root(stage.covariance).T):
-            key = (EARLIER, f"{stage.stage} {number + 1}")
-            answered[key] = answered.get(key, 0) + response @ scatter
-        for key, move in stage.moves.items():
+    stages = [_Steps.of(stage) for part in earlier if (stage := part.without(problem.parameters)).names]
+
+    def model_changes(scale: float) -> list[Perturbation]:
+        of_model = changes(problem.model, sizes.scaled(scale), moving, pulled)
+        return [*of_model, *(change for stage in stages for change in stage.changes(scale))]
+
+    columns = _of_models(problem, vector, blocks, model_changes) | _of_trials(problem, vector, blocks, sizes)
+    lines = [
+        f"considered.{source}{label and f' {label}'}: found that the arm diverges with {SCALES[-1]:g} of it, left out"
+        for (source, label), column in columns.items()
+        if column is None
+    ]
+    for stage in stages:
+        nothing = [np.zeros_like(block) for block in blocks]
+        steps = [columns.pop((stage.stage.stage, change.label)) or nothing for change in stage.changes(1.0)]
+        stage.shifts = [np.stack(parts, axis=1) for parts in zip(*steps, strict=True)]
+    columns |= _of_markers(problem, vector, base.positions, blocks, sizes)
+    columns |= _by_kind(problem, linear, sizes, stages)
+    answered = {
+        key: linear.answers([block[:, None] for block in column])[0]
+        for key, column in columns.items()
+        if column is not None
+    }
+    for stage in stages:
+        part = stage.stage
+        scatter = {(EARLIER, f"{part.stage} {number + 1}"): move for number, move in enumerate(part.scatter.T)}
+        response = linear.answers(stage.shifts).T @ np.linalg.pinv(stage.root)  # (parameters here, parameters there)
+        for key, move in (scatter | part.moves).items():
             answered[key] = answered.get(key, 0) + response @ move
-    return answered
+    return answered, lines
 
 
 def half_widths(given_model: np.ndarray, moves: Moves) -> np.ndarray:
@@ -146,62 +178,63 @@ def _root(covariance: np.ndarray) -> np.ndarray:
     return vectors * np.sqrt(np.maximum(values, 0))
 
 
-def _shifted(stage: Earlier, step: np.ndarray) -> Perturbation:
+def _shifted(stage: Earlier, label: str, step: np.ndarray) -> Perturbation:
     """All parameters of an earlier stage at once, by `step` (P,) on the axes of the search."""
     places = zip(stage.names, stage.estimate + step, strict=True)
-    parts = [of_parameter(name, float(parameter_named(name).value(place)), EARLIER) for name, place in places]
+    parts = [of_parameter(name, float(parameter_named(name).value(place)), stage.stage) for name, place in places]
 
     def write(fields, candidate, model):
         for part in parts:
             part.write(fields, candidate, model)
 
-    return Perturbation(
-        EARLIER, stage.stage, tuple(dict.fromkeys(name for part in parts for name in part.fields)), write
-    )
+    return Perturbation(stage.stage, label, tuple(dict.fromkeys(name for part in parts for name in part.fields)), write)
 
 
-def _changed(
-    problem: Problem, vector, blocks, listed: list[Perturbation]
-) -> Iterator[tuple[Perturbation, list[np.ndarray]]]:
-    """By how much residuals change with each: per trial (R,). None of what diverges."""
-    for begin in range(0, len(listed), AT_ONCE):
-        some = listed[begin : begin + AT_ONCE]
-        simulated = problem.simulate(np.repeat(vector[None], len(some), axis=0), near=vector, changes=some)
-        compared = problem.compare(simulated.positions)
-        for number, change in enumerate(some):
-            if simulated.diverged[number]:
-                raise InputError(
-                    f"considered.{change.source}: found that the arm diverges, expected a smaller deviation"
-                )
-            yield change, [moved[number] - block[0] for moved, block in zip(compared, blocks, strict=True)]
+def _of_models(
+    problem: Problem, vector: np.ndarray, blocks: list[np.ndarray], listed: Callable[[float], list[Perturbation]]
+) -> Effects:
+    """Residuals' changes with each change of the model in `listed`, whose argument is its size."""
+    columns: Effects = {(change.source, change.label): None for change in listed(1.0)}
+    for scale in SCALES:
+        missing = [change for change in listed(scale) if columns[change.source, change.label] is None]
+        for begin in range(0, len(missing), AT_ONCE):
+            some = missing[begin : begin + AT_ONCE]
+            simulated = problem.simulate(np.repeat(vector[None], len(some), axis=0), near=vector, changes=some)
+            compared = problem.compare(simulated.positions)
+            for number in np.flatnonzero(~simulated.diverged):
+                moved = [(after[number] - block) / scale for after, block in zip(compared, blocks, strict=True)]
+                columns[some[number].source, some[number].label] = moved
+    return columns
 
 
-def _of_trials(
-    problem: Problem, vector, blocks, sizes: Tolerances
-) -> Iterator[tuple[tuple[str, str], list[np.ndarray]]]:
+def _of_trials(problem: Problem, vector: np.ndarray, blocks: list[np.ndarray], sizes: Tolerances) -> Effects:
     """Residuals' changes with what acts in trials beside the model: gravity, zeros of cables, winches."""
-    listed: list[tuple[tuple[str, str], Callable[[Experiment], Experiment]]] = []
+    columns: Effects = dict.fromkeys(_trial_changes(problem, sizes))
+    for scale in SCALES:
+        for key, change in _trial_changes(problem, sizes.scaled(scale)).items():
+            if columns[key] is None:
+                other = replace(problem, experiments=[change(e) for e in problem.experiments])
+                simulated = other.simulate(vector[None])
+                if not simulated.diverged.any():
+                    compared = other.compare(simulated.positions)
+                    columns[key] = [(after[0] - block) / scale for after, block in zip(compared, blocks, strict=True)]
+    return columns
+
+
+def _trial_changes(problem: Problem, sizes: Tolerances) -> dict[Key, Callable[[Experiment], Experiment]]:
+    """What `_of_trials` changes, of one trial each."""
+    listed: dict[Key, Callable[[Experiment], Experiment]] = {}
     for axis, name in enumerate("xy" if sizes.gravity else ""):
         turn = Rotation.from_rotvec(sizes.gravity * np.eye(3)[axis])
-        listed.append((("gravity", name), lambda e, turn=turn: replace(e, gravity=turn.apply(e.gravity))))
+        listed["gravity", name] = lambda e, turn=turn: replace(e, gravity=turn.apply(e.gravity))
     pulled = [e for e in problem.experiments if not e.slack(problem.model)]
     for cable in range(problem.model.nu if sizes.zero and pulled else 0):
         offset = sizes.zero * np.eye(problem.model.nu)[cable]
-        listed.append((("zero", str(cable + 1)), lambda e, d=offset: replace(e, controls=e.controls + d)))
+        listed["zero", str(cable + 1)] = lambda e, d=offset: replace(e, controls=e.controls + d)
     driven = any(not is_static(e.kind) for e in pulled)
     if sizes.backlash and driven and not ArmModel(problem.model).backlash:
-        listed.append((("backlash", ""), lambda e: _with_play(e, sizes.backlash)))
-    if not listed:
-        return
-    trials = problem.experiments
-    several = replace(
-        problem, experiments=[change(e) for _, change in listed for e in trials],
-        trial_weights=np.tile(problem.trial_weights, len(listed)) * len(listed),
-    )  # fmt: skip
-    moved = several.residuals(vector[None])
-    for number, (key, _) in enumerate(listed):
-        of_change = moved[number * len(trials) : (number + 1) * len(trials)]
-        yield key, [after[0] - block[0] for after, block in zip(of_change, blocks, strict=True)]
+        listed["backlash", ""] = lambda e: _with_play(e, sizes.backlash)
+    return listed
 
 
 def _with_play(experiment: Experiment, play: float) -> Experiment:
@@ -213,18 +246,14 @@ def _with_play(experiment: Experiment, play: float) -> Experiment:
     return replace(experiment, controls=delivered[0])
 
 
-def _of_markers(problem: Problem, vector, positions, blocks, sizes: Tolerances) -> Iterator[Effect]:
+def _of_markers(
+    problem: Problem, vector: np.ndarray, positions: list[np.ndarray], blocks: list[np.ndarray], sizes: Tolerances
+) -> Effects:
     """Residuals' changes with the places of markers in their bodies' frames and of the base's marker, along each axis.
 
     One simulation has all markers moved along an axis, and each is compared with the others where they were."""
-    count = len(problem.markers)
+    count, columns = len(problem.markers), Effects()
     sites = ArmModel(problem.model).marker_sites(problem.markers)
-    for axis, name in enumerate("xyz" if sizes.base_place else ""):
-        offset = sizes.base_place * np.eye(3)[axis]
-        moved = problem.compare([places - offset for places in positions])
-        yield ("base_place", name), [after[0] - block[0] for after, block in zip(moved, blocks, strict=True)]
-    if not sizes.marker_place:
-        return
 
     def along(axis: int) -> Perturbation:
         def write(fields, candidate, model):
@@ -232,6 +261,11 @@ def _of_markers(problem: Problem, vector, positions, blocks, sizes: Tolerances) 
 
         return Perturbation("marker_place", "xyz"[axis], ("site_pos",), write)
 
+    for axis, name in enumerate("xyz" if sizes.base_place else ""):
+        moved = problem.compare([places - sizes.base_place * np.eye(3)[axis] for places in positions])
+        columns["base_place", name] = [after[0] - block for after, block in zip(moved, blocks, strict=True)]
+    if not sizes.marker_place:
+        return columns
     simulated = problem.simulate(np.repeat(vector[None], 3, axis=0), near=vector, changes=[along(k) for k in range(3)])
     for axis, name in enumerate("xyz"):
         alone = []
@@ -240,26 +274,24 @@ def _of_markers(problem: Problem, vector, positions, blocks, sizes: Tolerances) 
             places[range(count), :, range(count)] = after[axis].transpose(1, 0, 2)
             alone.append(places)
         moved = problem.compare(alone)
-        for marker in range(count):
-            key = ("marker_place", f"{problem.markers[marker]} {name}")
-            yield key, [after[marker] - block[0] for after, block in zip(moved, blocks, strict=True)]
+        for number, marker in enumerate(problem.markers):
+            column = [after[number] - block for after, block in zip(moved, blocks, strict=True)]
+            columns["marker_place", f"{marker} {name}"] = column
+    return columns
 
 
-def _by_kind(problem: Problem, linear: Linearisation, sizes: Tolerances, roots, shifts) -> Iterator[Effect]:
+def _by_kind(problem: Problem, linear: Linearisation, sizes: Tolerances, stages: list[_Steps]) -> Effects:
     """Residuals' changes with parameters that differ from one kind of experiment to another, in the trials of each."""
-    kinds = dict.fromkeys(e.kind for e in problem.experiments)
+    kinds, columns = dict.fromkeys(e.kind for e in problem.experiments), Effects()
     for name, size in sizes.by_kind.items():
         column: list[np.ndarray] = []
         if name in problem.parameters:
             index = list(problem.parameters).index(name)
             column = [size * jacobian[:, index] for jacobian in linear.jacobians]
-        begin = 0
-        for stage, root in roots:
-            if name in stage.names:
-                steps = np.linalg.pinv(root)[:, stage.names.index(name)] * size
-                of_stage = zip(*shifts[begin : begin + root.shape[1]], strict=True)
-                column = [steps @ np.stack(parts) for parts in of_stage]
-            begin += root.shape[1]
+        for stage in stages:
+            if name in stage.stage.names:
+                column = stage.change(size * np.eye(len(stage.stage.names))[stage.stage.names.index(name)])
         for kind in kinds if column else ():
             there = [e.kind == kind for e in problem.experiments]
-            yield ("by_kind", f"{name} {kind}"), [part * here for part, here in zip(column, there, strict=True)]
+            columns["by_kind", f"{name} {kind}"] = [part * here for part, here in zip(column, there, strict=True)]
+    return columns

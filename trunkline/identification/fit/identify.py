@@ -7,7 +7,7 @@ import numpy as np
 
 from trunkline.compute.progress import progress
 from trunkline.identification.evaluation.evaluation import marker_positions
-from trunkline.identification.fit.considered import Moves, considered
+from trunkline.identification.fit.considered import Moves, considered, half_widths
 from trunkline.identification.fit.fit import Fit, Refinement
 from trunkline.identification.fit.influence import Influence, influence
 from trunkline.identification.fit.intervals import Certainty, bootstrap, certainty
@@ -24,6 +24,7 @@ from trunkline.identification.simulate.resting import RestShape, hang_in
 from trunkline.recordings.trials.experiments import is_static
 from trunkline.recordings.trials.splits import IDENTIFY
 
+NEAR = 5.0  # times the last descent's tolerance: where outlying trials are still to be weighed, it need be no nearer
 SEEN = 0.05  # share of the losses by which a surrogate may mistake those at a new estimate, and still serve there
 REWEIGHINGS, SAME_WEIGHT = 4, 0.05  # at most; weights that change by less leave the minimum where it is
 BOUND_TOLERANCE = 0.01  # of the range: closer to an end counts as on it; least squares stays just inside
@@ -39,6 +40,7 @@ class Identification:
         by resampling trials, lowest and highest z, shape (2, P).
     factor_certainty: of all factors, given the scalars; None without factors.
     considered: how far the scalars move with what the model fixes, on the axes of the search; empty if nothing is.
+    unconsidered: a line on each quantity with which the arm diverges.
     influence: of every trial on every scalar.
     at_bound: names of what ended on a bound.
     converged: which searches stopped for that reason; the coarse one, if its starts agree too.
@@ -52,6 +54,7 @@ class Identification:
     bootstrap: np.ndarray
     factor_certainty: Certainty | None
     considered: Moves
+    unconsidered: list[str]
     influence: Influence
     at_bound: list[str]
     converged: dict[str, bool]
@@ -61,6 +64,11 @@ class Identification:
     evaluations: int
     diverged: int
     steps: int
+
+    @property
+    def half_width(self) -> np.ndarray:
+        """Of the scalars' 95 % intervals, with what is considered, on the axes of the search. Shape (P,)."""
+        return half_widths(self.certainty.half_width, self.considered)
 
 
 def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], fit: Fit) -> Identification:
@@ -83,7 +91,8 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
     if method.rough.step_factor > 1 and not all(is_static(e.kind) for e in fitted):  # at rest, the step changes nothing
         near, last = fit.problem(model, fitted, method.rough.step_factor), "whole"
         problems.append(near)
-    result = _refine(near, result, method.polish, f"{label} near")
+    nearly = replace(method.polish, tolerance=min(NEAR * method.polish.tolerance, 1.0))
+    result = _refine(near, result, nearly, f"{label} near")
     # what outlies, and by how much an estimate answers a trial, is as plain at a coarser step, which costs less
     searches[last], around = _reweigh(near, result, fit, f"{label} {last}")
     result = searches[last]
@@ -94,7 +103,9 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
     coarse = with_parameters(model, values, rest=rest)
     at_bound = _at_bound(parameters, result.vector, *exact.bounds())
     linear = linearise(exact, result.vector, result.residuals)
-    moves = {} if fit.considered.none else considered(exact, linear, fit.considered, fit.earlier)
+    moves, unconsidered = {}, []
+    if not fit.considered.none:
+        moves, unconsidered = considered(exact, linear, fit.considered, fit.earlier)
 
     factors: dict[str, np.ndarray] = {}
     factor_certainty = None
@@ -120,6 +131,7 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
         bootstrap=bootstrap(linear, method.seed, around),
         factor_certainty=factor_certainty,
         considered=moves,
+        unconsidered=unconsidered,
         influence=influence(around, [e.name for e in fitted], list(parameters)),
         at_bound=at_bound,
         converged={name: search.converged for name, search in searches.items()},

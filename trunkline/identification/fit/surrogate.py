@@ -9,12 +9,14 @@ design (Box, Wilson 1951), and what of the second order may be jumps alone is ta
 """
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
 from trunkline.identification.fit.problem import Problem
 from trunkline.identification.parameters.parameters import parameter_named
 
+WHOLE_CUBE, HALF_CUBE = 4, 7  # parameters, up to which a design has all corners of their cube, or half of them
 FEW = 12  # parameters, up to which the second order is taken along
 REACH = 0.2  # of the differences, in ln(value): about as far as intervals reach, far beyond the jumps
 SIGNED_REACH = 0.02  # the same of signed values
@@ -167,11 +169,21 @@ def _stencil(reach: np.ndarray, second: bool) -> np.ndarray:
 
 
 def _composite(reach: np.ndarray) -> np.ndarray:
-    """The centre, both ends of every axis and all four corners of every two, for reaches (P,). Shape (2 P² + 1, P)."""
-    steps = np.diag(reach)
-    first, second = steps[np.tril_indices(len(reach), -1)[0]], steps[np.tril_indices(len(reach), -1)[1]]
-    corners = [first + second, first - second, second - first, -first - second]
-    return np.concatenate([np.zeros((1, len(reach))), steps, -steps, *corners])
+    """A central composite design for reaches (P,): the centre, both ends of every axis, and corners √2 as far. Up to
+    four parameters all corners of the cube; up to seven the half of them whose last sign is the product of the others
+    (of resolution V and more: no two products are alike); of more, which would be too many, all four corners of every
+    two. Shape (N, P)."""
+    count, steps = len(reach), np.diag(reach)
+    if count > HALF_CUBE:
+        first, second = steps[np.tril_indices(count, -1)[0]], steps[np.tril_indices(count, -1)[1]]
+        corners = np.concatenate([first + second, first - second, second - first, -first - second])
+    else:
+        free = count if count <= WHOLE_CUBE else count - 1
+        signs = np.array(list(product((1.0, -1.0), repeat=free)))
+        if free < count:
+            signs = np.column_stack([signs, signs.prod(axis=1)])
+        corners = signs * reach * np.sqrt(2 / count)
+    return np.concatenate([np.zeros((1, count)), steps, -steps, corners])
 
 
 def _losses(grams: np.ndarray, places: np.ndarray, second: bool) -> np.ndarray:

@@ -71,6 +71,11 @@ class Tolerances:
         """Whether nothing is considered."""
         return not any(vars(self).values())
 
+    def scaled(self, factor: float) -> "Tolerances":
+        """All of them times `factor`."""
+        sizes = {name: factor * size for name, size in vars(self).items() if name != "by_kind"}
+        return Tolerances(**sizes, by_kind={name: factor * size for name, size in self.by_kind.items()})
+
 
 class Perturbation(NamedTuple):
     """Of one candidate. source: field of `Tolerances`. label: which of several. fields: that it writes. write: (fields,

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from trunkline.identification.fit.considered import half_widths
 from trunkline.identification.fit.identify import Identification
 from trunkline.identification.fit.intervals import weakest_in_words
 from trunkline.identification.fit.problem import Bounds
@@ -23,28 +22,22 @@ def parameter_table(result: Identification, bounds: dict[str, Bounds]) -> dict:
     """
     names, certainty = list(result.values), result.certainty
     place = {name: i for i, name in enumerate(names)}
-    wide = half_widths(certainty.half_width, result.considered)
     initial, vague = result.models["initial"], undetermined(result, bounds)
-    scalars = {
-        name: {
+    scalars = {}
+    for i, (name, value) in enumerate(result.values.items()):
+        estimate = parameter_named(name).coordinate(value)
+        wide = _within(name, bounds, estimate + ENDS * result.half_width[i])
+        scalars[name] = {
             "value": value,
             "unit": parameter_named(name).unit,
             "initial": parameter_named(name).read(initial),
-            "interval_95_given_model": _within(
-                name, bounds, parameter_named(name).coordinate(value) + ENDS * certainty.half_width[i]
-            ),
-            **(
-                {"interval_95": _within(name, bounds, parameter_named(name).coordinate(value) + ENDS * wide[i])}
-                if result.considered
-                else {}
-            ),
+            "interval_95_given_model": _within(name, bounds, estimate + ENDS * certainty.half_width[i]),
+            **({"interval_95": wide} if result.considered else {}),
             "bootstrap_95_given_model": _within(name, bounds, result.bootstrap[:, i]),
             "range": [bounds[name].low, bounds[name].high],
             "at_bound": name in result.at_bound,
             "undetermined": name in vague,
         }
-        for i, (name, value) in enumerate(result.values.items())
-    }
     per_session = {name: row for name, row in scalars.items() if SESSION_MARK in name}
     names = [name for name in names if name not in per_session]
     return {
@@ -74,7 +67,7 @@ def undetermined(result: Identification, bounds: dict[str, Bounds]) -> list[str]
     searched = {
         name: np.diff(parameter_named(name).coordinate([span.low, span.high]))[0] for name, span in bounds.items()
     }
-    halves = zip(result.values, half_widths(result.certainty.half_width, result.considered), strict=True)
+    halves = zip(result.values, result.half_width, strict=True)
     return [name for name, half in halves if 2 * half > searched[name]]
 
 

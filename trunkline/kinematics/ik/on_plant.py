@@ -53,7 +53,7 @@ def score_on_plant(
     the tip is counts as doubted: a package has what its session went up to, and previews say so.
 
     Args:
-        ask: the network, targets to its answer. others: further networks by name, scored likewise.
+        ask: the network, targets to its answer. others: further networks by name, scored on `targets`.
         targets, commands: as `as_controls.Drawn` has them.
     """
     reach = _in_base_frame(model, rig)
@@ -61,13 +61,10 @@ def score_on_plant(
     rested = np.isfinite(tips).all(axis=1)
     own_targets = targets[rested].copy()
     position_of(own_targets)[:] = tips[rested]
-
-    def scored(ask: Ask) -> dict:
-        own_surface = _score(chain, ask, own_targets, reach, rig.pulls) if rested.any() else {"targets": 0}
-        left_out = {"left_out": {"unrested": int((~rested).sum())}}
-        return _score(chain, ask, targets, reach, rig.pulls) | {"own_surface": own_surface | left_out}
-
-    return scored(ask) | {name: scored(other) for name, other in (others or {}).items()}
+    own_surface: dict = _score(chain, ask, own_targets, reach, rig.pulls) if rested.any() else {"targets": 0}
+    own_surface["left_out"] = {"unrested": int((~rested).sum())}
+    result = _score(chain, ask, targets, reach, rig.pulls) | {"own_surface": own_surface}
+    return result | {name: _score(chain, other, targets, reach, rig.pulls) for name, other in (others or {}).items()}
 
 
 def record(

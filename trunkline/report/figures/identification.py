@@ -8,7 +8,6 @@ from matplotlib.ticker import MaxNLocator
 
 from trunkline.identification.evaluation.error_tables import LABELS
 from trunkline.identification.evaluation.evaluation import Prediction
-from trunkline.identification.fit.considered import half_widths
 from trunkline.identification.fit.identify import Identification
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.parameters.parameters import parameter_named
@@ -152,7 +151,7 @@ def shape_figure(table: pd.DataFrame) -> Figure:
 def parameter_figure(identification: Identification, bounds: dict[str, Bounds], undetermined: list[str]) -> Figure:
     """Each scalar with its 95 % interval within its range, grey if that is open or a bound, and per-joint factors."""
     panels, count = 1 + bool(identification.factors), len(identification.values)
-    widths = half_widths(identification.certainty.half_width, identification.considered)
+    widths = identification.half_width
     promise = "with the model's tolerances" if identification.considered else "given the model"
     figure, axes = plt.subplots(1, panels, figsize=(6.5 * panels, max(1.4 + 0.42 * count, 2.4)), squeeze=False)
     for row, (name, value) in enumerate(identification.values.items()):
