@@ -162,7 +162,7 @@ class Guest:
     async def say(self, **message):
         await self.socket.send_json(message)
 
-    async def hears(self, kind, seconds=5.0, **fields):
+    async def hears(self, kind, seconds=30.0, **fields):
         """The newest message of this type with these fields, once there is one."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:

@@ -57,9 +57,9 @@ def test_friction_taken_together_bends_as_much():
 
 
 def test_friction_acts_where_the_cable_does():
-    """In a bent arm, the last unit's arms of every stretch's friction are those of the cable itself."""
+    """In a bent arm at rest, the last unit's arms of every stretch's friction are those of the cable itself."""
     model = rubbing_arm(4)
-    controls = np.tile(model.tendon_length0[ArmModel(model).cables] - [0.05, 0, 0], (1, 400, 1))
+    controls = np.tile(model.tendon_length0[ArmModel(model).cables] - [0.05, 0, 0], (1, 1600, 1))
     batch = batch_of(model, 1)
     hold(batch, model, controls[:, 0])
     slope = batch.bind("ten_J")
@@ -69,7 +69,7 @@ def test_friction_acts_where_the_cable_does():
     for cable, entries in zip(arm.cables, last, strict=True):
         row = model.ten_J_rowadr[cable] + model.ten_J_rownnz[cable] - 2
         assert abs(model.wrap_prm[entries[0]] / slope[0, row] - 1) > 0.02, "or the arm is straight"
-        np.testing.assert_allclose(batch.expand("wrap_prm")[0, entries], slope[0, row], rtol=0.01)
+        np.testing.assert_allclose(batch.expand("wrap_prm")[0, entries], slope[0, row], rtol=1e-3)
 
 
 def test_a_cable_without_tension_does_not_rub():
