@@ -82,7 +82,7 @@ JUDGES = {  # by function, the test that has its table, and its file below tests
         "ar/session/test_preview_validation.py",
         "test_what_came_of_a_grasp",
     ),
-    "trunkline.ar.session.preview_validation:_holds": (
+    "trunkline.ar.session.preview_validation:holds": (
         "ar/session/test_preview_validation.py",
         "test_whether_the_arm_holds_anything",
     ),
@@ -116,6 +116,7 @@ JUDGES = {  # by function, the test that has its table, and its file below tests
     ),
 }
 OTHERWISE = {  # what the word stands for there: no verdict
+    "rehearsal.experiments.corrected:correct": "lets the robot correct its plan",
     "trunkline.identification.results.parameter_table:parameter_table": "looks a name up among those at a bound",
     "trunkline.compute.scheduler:spread_rows": "shares rows out to workers",
 }

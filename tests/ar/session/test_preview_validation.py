@@ -186,7 +186,7 @@ def test_what_came_of_a_grasp(before, later, expected):
     [([], False), ([OTHER], False), ([world_of("held")], True), ([world_of("held"), world_of("hanging")], False),
      ([world_of("hanging"), world_of("held"), OTHER], True), ([world_of("standing", "hanging")], False)],
 )  # fmt: skip
-def test_whether_the_armholds_anything(events, expected):
+def test_whether_the_arm_holds_anything(events, expected):
     assert holds(events) == expected
 
 
