@@ -43,6 +43,7 @@ from trunkline.pipeline.config import PROJECT, load_folder
 
 TOKEN, RATE, BODIES = "t" * 22, 72.0, 3
 TICK = 0.005  # s
+WAIT = 30.0  # s at most for a message, on a loaded machine as well
 PREVIEW = 0.3  # s that a preview lasts, whatever the plan
 
 
@@ -162,7 +163,7 @@ class Guest:
     async def say(self, **message):
         await self.socket.send_json(message)
 
-    async def hears(self, kind, seconds=30.0, **fields):
+    async def hears(self, kind, seconds=WAIT, **fields):
         """The newest message of this type with these fields, once there is one."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
@@ -175,7 +176,7 @@ class Guest:
             await asyncio.sleep(0.005)
         raise AssertionError(f"no {kind} with {fields}; heard {self.messages[-5:]}")
 
-    async def refused(self, word, seconds=3.0):
+    async def refused(self, word, seconds=WAIT):
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             for message in self.messages:
