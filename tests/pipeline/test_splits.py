@@ -41,6 +41,7 @@ MAY_NAME = {
     "examples/ftdcr/session.py": {"TEST"},  # likewise
     "examples/pairs/session.py": {"TEST"},  # likewise
     "studies/families.py": {"TEST"},  # shows it, of arms by which nothing is chosen
+    "trunkline/ar/session/measured_session.py": {"TEST"},  # deals a measured session's plans to the splits
     "trunkline/tools/batch/results.py": {"TEST"},  # shows its errors, as `score` wrote them
     "upkeep/limits.py": {"TEST"},  # refuses rows of it
     "upkeep/readme.py": {"TEST"},  # shows it
