@@ -9,9 +9,13 @@ model: heavier, with dry friction in its joints.
 """
 
 import argparse
+import os
 import sys
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import redirect_stdout
 from dataclasses import dataclass, field
+from functools import cache, partial
+from multiprocessing import get_context
 
 import mujoco
 import numpy as np
@@ -22,6 +26,7 @@ from studies.stage_chain import committed
 from tests.support.matched_plant import FRAME, curl, markers_of, motion, small_model, static_pull, tilt
 from tests.support.noisy_trials import WEIGHTS, Stage, measured, releases, with_values
 from trunkline.compute.progress import progress
+from trunkline.compute.threads import thread_count
 from trunkline.errors import in_one_line
 from trunkline.identification.fit.intervals import certainty
 from trunkline.identification.fit.linearisation import linearise
@@ -35,7 +40,7 @@ from trunkline.model.arm.joints import Joints, MaxwellElement
 from trunkline.recordings.trials.trial import Trial
 from upkeep.results import recorded
 
-REPETITIONS = 200
+REPETITIONS = 80
 UNITS, STEPS = 3, 4  # of the arm, of a frame: small, so that so many repetitions take minutes
 FRAMES = {"stiffness": 1, "damping": 100, "control": 60}  # of a trial
 RANGE = 10.0  # times the truth and a share of it: where is searched
@@ -132,36 +137,53 @@ def mismatched(truth: mujoco.MjModel) -> mujoco.MjModel:
     return plant
 
 
-def cover(name: str, is_matched: bool, repetitions: int) -> IntervalCoverage:
-    """The repetitions of one stage."""
-    stage, bounds, frames = STAGES[name], bounds_of(name), FRAMES[name]
+@cache
+def _lab(name: str, is_matched: bool) -> tuple[mujoco.MjModel, list[Trial], dict[str, float]]:
+    """The model of a stage, trials without noise, and what its parameters should come to."""
+    stage = STAGES[name]
     model = small_model(UNITS, stage.joints, **stage.motors)
     model.opt.timestep = FRAME / STEPS
     truth = with_values(model, stage.true)
-    clean = stage.trials(truth if is_matched else mismatched(truth), frames)
-    scaled = [key for key in stage.true if not parameter_named(key).signed]
+    clean = stage.trials(truth if is_matched else mismatched(truth), FRAMES[name])
     expected = {
         key: value / MASS_FACTOR if key in FORCES and not is_matched else value for key, value in stage.true.items()
     }
+    return model, clean, expected
+
+
+def repeat(name: str, is_matched: bool, repetition: int) -> tuple[np.ndarray, np.ndarray, bool]:
+    """One fit: errors and half widths, as `IntervalCoverage` has them, and whether it converged."""
+    model, clean, expected = _lab(name, is_matched)
+    scaled = [key for key in expected if not parameter_named(key).signed]
     exact = np.array([parameter_named(key).coordinate(value) for key, value in expected.items()])
     unit = np.array([1.0 if key in scaled else abs(value) for key, value in expected.items()])
-    found = IntervalCoverage(list(stage.true), len(clean))
+    rng = np.random.default_rng([repetition, list(STAGES).index(name)])
+    begin = with_values(model, {key: expected[key] * RANGE ** rng.uniform(-1, 1) for key in scaled})
+    experiments = [prepare(measured(trial, rng), begin, FRAMES[name]) for trial in clean]
+    problem = Problem(begin, experiments, markers_of(begin), bounds_of(name), "positions", WEIGHTS)
+    rough = search(problem, ROUGH, repetition, lambda best: None)
+    end = descend(problem, rough.vector, *POLISH, lambda best: None)
+    around = surrogate(problem, end.vector, end.residuals)
+    half_width = certainty(linearise(problem, end.vector, end.residuals), around=around).half_width
+    return (end.vector - exact) / unit, half_width / unit, end.converged
+
+
+def cover(name: str, is_matched: bool, repetitions: int, run=map) -> IntervalCoverage:
+    """The repetitions of one stage, by `run`, which is as `map`."""
+    found = IntervalCoverage(list(STAGES[name].true), len(_lab(name, is_matched)[1]))
     with redirect_stdout(sys.stderr), progress(repetitions, f"coverage of {name}", "repetitions") as bar:
-        for repetition in range(repetitions):
-            rng = np.random.default_rng([repetition, list(STAGES).index(name)])
-            drawn = {key: expected[key] * RANGE ** rng.uniform(-1, 1) for key in scaled}
-            begin = with_values(model, drawn)
-            experiments = [prepare(measured(trial, rng), begin, frames) for trial in clean]
-            problem = Problem(begin, experiments, markers_of(begin), bounds, "positions", WEIGHTS)
-            rough = search(problem, ROUGH, repetition, lambda best: None)
-            end = descend(problem, rough.vector, *POLISH, lambda best: None)
-            around = surrogate(problem, end.vector, end.residuals)
-            linear = linearise(problem, end.vector, end.residuals)
-            found.errors.append((end.vector - exact) / unit)
-            found.widths.append(certainty(linear, around=around).half_width / unit)
-            found.lost += not end.converged
+        for error, width, converged in run(partial(repeat, name, is_matched), range(repetitions)):
+            found.errors.append(error)
+            found.widths.append(width)
+            found.lost += not converged
             bar.update(1)
     return found
+
+
+def begin_worker() -> None:
+    """A process has one thread: many small problems, in which threads only get in each other's way."""
+    os.environ["TRUNKLINE_THREADS"] = "1"
+    threadpool_limits(1, user_api="blas")
 
 
 @in_one_line
@@ -169,15 +191,15 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="studies.coverage", description=__doc__)
     parser.add_argument("--repetitions", type=int, default=REPETITIONS)
     arguments = parser.parse_args()
-    with recorded("coverage", keep=arguments.repetitions >= REPETITIONS):
+    pool = ProcessPoolExecutor(thread_count(), get_context("spawn"), begin_worker)
+    with recorded("coverage", keep=arguments.repetitions >= REPETITIONS), pool:
         print(
             "| stage | plant | parameter | holds it | median error | scatter | promised | off by half | not converged |"
         )
         print("|---|---|---|---:|---:|---:|---:|---:|---:|")
         for name, is_matched in (("damping", True), ("damping", False), ("stiffness", True), ("control", True)):
             plant = "the model" if is_matched else "heavier, dry friction"
-            with threadpool_limits(1, user_api="blas"):  # many small problems: threads only get in each other's way
-                covered = cover(name, is_matched, arguments.repetitions)
+            covered = cover(name, is_matched, arguments.repetitions, pool.map)
             print("\n".join(covered.rows(f"`identify_{name}`", plant)), flush=True)
     return 0
 
