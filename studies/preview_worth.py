@@ -10,6 +10,7 @@ A row is kept in docs/results/preview_worth.csv when its run ends; stopped, the 
 import argparse
 import sys
 from collections.abc import Iterable
+from contextlib import redirect_stdout
 from pathlib import Path
 
 import numpy as np
@@ -68,7 +69,8 @@ def main() -> int:
     runs = wanted(RUNS, 0) + [Run("grasp", seed, name) for name in ABLATED for seed in range(RUNS["grasp"])]
     committed = read_yaml(Path("rehearsal/params.yaml")).rehearse.runs.reach
     with recorded("preview_worth"):
-        results = make(runs, package, source, table, thread_count())
+        with redirect_stdout(sys.stderr):  # each run as it ends
+            results = make(runs, package, source, table, thread_count())
         reaches = [row for row in results if row.experiment == "reach"]
         new = [row for row in reaches if row.seed >= committed]
         print(coverage_table({"all": reaches, f"those beyond the committed seeds, from {committed} on": new}))
