@@ -11,6 +11,7 @@ model: heavier, with dry friction in its joints.
 import argparse
 import os
 import sys
+from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import redirect_stdout
 from dataclasses import dataclass, field
@@ -45,7 +46,7 @@ UNITS, STEPS = 3, 4  # of the arm, of a frame: small, so that so many repetition
 FRAMES = {"stiffness": 1, "damping": 100, "control": 60}  # of a trial
 RANGE = 10.0  # times the truth and a share of it: where is searched
 ROUGH = LeastSquares(starts=7, descents=1, iterations=6, tolerance=1e-2)
-POLISH = 12, 1e-6  # iterations and tolerance
+POLISH = 60, 1e-6  # iterations and tolerance
 MASS_FACTOR, DRY_FRICTION = 1.05, 8e-4  # of the mismatched plant, as the stand-in lab's; the latter in rad
 FORCES = ("stiffness", "damping")  # told by motion only over the masses
 
@@ -168,7 +169,7 @@ def repeat(name: str, is_matched: bool, repetition: int) -> tuple[np.ndarray, np
     return (end.vector - exact) / unit, half_width / unit, end.converged
 
 
-def cover(name: str, is_matched: bool, repetitions: int, run=map) -> IntervalCoverage:
+def cover(name: str, is_matched: bool, repetitions: int, run: Callable[..., Iterable] = map) -> IntervalCoverage:
     """The repetitions of one stage, by `run`, which is as `map`."""
     found = IntervalCoverage(list(STAGES[name].true), len(_lab(name, is_matched)[1]))
     with redirect_stdout(sys.stderr), progress(repetitions, f"coverage of {name}", "repetitions") as bar:
