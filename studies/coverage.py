@@ -26,6 +26,7 @@ from threadpoolctl import threadpool_limits
 from studies.stage_chain import committed
 from tests.support.matched_plant import FRAME, curl, markers_of, motion, small_model, static_pull, tilt
 from tests.support.noisy_trials import WEIGHTS, Stage, measured, releases, with_values
+from trunkline.compute.processes import end_with_parent
 from trunkline.compute.progress import progress
 from trunkline.compute.threads import thread_count
 from trunkline.errors import in_one_line
@@ -91,6 +92,7 @@ STAGES = {
 }  # fmt: skip
 
 
+@cache  # each repetition asks
 def bounds_of(name: str) -> dict[str, Bounds]:
     """The ranges of a stage's parameters: about the truth, and no wider than the committed ones that hold it, which
     keep a slow branch and a fast one apart."""
@@ -183,6 +185,7 @@ def cover(name: str, is_matched: bool, repetitions: int, run: Callable[..., Iter
 
 def begin_worker() -> None:
     """A process has one thread: many small problems, in which threads only get in each other's way."""
+    end_with_parent()
     os.environ["TRUNKLINE_THREADS"] = "1"
     threadpool_limits(1, user_api="blas")
 
