@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from tests.support.live import WAIT
 from tests.support.operator import PACKAGE, config
 from tests.support.small_arm import small_spec
 from trunkline.ar.hybrid.rollout_batch import joined, nominal
@@ -187,10 +188,10 @@ def test_it_holds_when_nobody_says_that_it_may_go_on(robot):
     assert robot.robot_state().hold_time - silent < DEAD_MAN + LATE
 
 
-def hearing(robot, axes, seconds):
-    """What it follows, for so long."""
+def hearing(robot, axes, seconds, arrived=lambda: False):
+    """What it follows, for so long, or until it has arrived."""
     begun = heard = time.monotonic()
-    while (now := time.monotonic()) < begun + seconds:
+    while (now := time.monotonic()) < begun + seconds and not arrived():
         robot.permit()
         if now >= heard:
             robot.hear(0.0, axes)
@@ -203,16 +204,20 @@ def test_it_follows_what_it_hears_a_delay_later_and_brakes_when_it_is_stopped(ro
     now = robot.robot_state()
     here = np.append(now.joints, now.commands)
     there = here + np.eye(10)[0] * 0.3
-    assert robot.follow(Following(0.3, 0.0, 0.05)) == ""
+
+    def first():
+        return robot.robot_state().joints[0]
+
+    assert robot.follow(Following(0.6, 0.0, 0.05)) == ""
     until(lambda: robot.state().mode == "running", 3.0, robot.permit)
-    assert robot.follow(Following(0.3, 0.0, 0.05)).startswith("busy")
+    assert robot.follow(Following(0.6, 0.0, 0.05)).startswith("busy")
     hearing(robot, here, 0.25)
     hearing(robot, there, 0.2)
     np.testing.assert_allclose(robot.robot_state().joints, now.joints, atol=1e-3)  # its delay is longer
-    hearing(robot, there, 2.0)
+    hearing(robot, there, WAIT, lambda: abs(first() - there[0]) < 5e-4)
     np.testing.assert_allclose(robot.robot_state().joints, there[:7], atol=1e-3)
     assert robot.state().mode == "running"
-    hearing(robot, here, 0.45)
+    hearing(robot, here, WAIT, lambda: first() < there[0] - 0.02)
     pressed = time.monotonic()
     robot.stop()
     until(lambda: robot.state().mode == "idle", 3.0, robot.permit)
