@@ -94,12 +94,12 @@ def test_the_robot_does_what_the_preview_shows():
 def robot():
     s = simulation()
     process = RobotProcess(simulated.run, (s,), len(s.commands), len(s.bodies), s.limits, s.package)
-    until(lambda: process.ready, 60.0)
+    until(lambda: process.ready, 2 * WAIT)
     yield process
     process.close()
 
 
-def until(happens, seconds=5.0, each=lambda: None):
+def until(happens, seconds=WAIT, each=lambda: None):
     end = time.monotonic() + seconds
     while not happens():
         assert time.monotonic() < end, "it did not happen"
@@ -111,7 +111,7 @@ def until(happens, seconds=5.0, each=lambda: None):
 def test_a_robot_whose_session_ends_comes_to_rest_on_its_way_first():
     s = simulation()
     process = RobotProcess(simulated.run, (s,), len(s.commands), len(s.bodies), s.limits, s.package)
-    until(lambda: process.ready, 60.0)
+    until(lambda: process.ready, 2 * WAIT)
     way = back(process)
     until(lambda: np.abs(process.robot_state().joints - way.joints[0]).max() > 0.05, each=process.permit)
     process.close()
@@ -171,7 +171,7 @@ def test_it_holds_when_it_is_stopped_and_goes_on_by_no_permit(robot):
     robot.stop()
     until(lambda: robot.robot_state().hold_time >= pressed)
     assert robot.robot_state().hold_time - pressed < LATE
-    until(lambda: robot.state().mode == "idle", 3.0, robot.permit)
+    until(lambda: robot.state().mode == "idle", each=robot.permit)
     joints = robot.robot_state().joints
     for _ in range(40):
         robot.permit()
@@ -209,7 +209,7 @@ def test_it_follows_what_it_hears_a_delay_later_and_brakes_when_it_is_stopped(ro
         return robot.robot_state().joints[0]
 
     assert robot.follow(Following(0.6, 0.0, 0.05)) == ""
-    until(lambda: robot.state().mode == "running", 3.0, robot.permit)
+    until(lambda: robot.state().mode == "running", each=robot.permit)
     assert robot.follow(Following(0.6, 0.0, 0.05)).startswith("busy")
     hearing(robot, here, 0.25)
     hearing(robot, there, 0.2)
@@ -220,7 +220,7 @@ def test_it_follows_what_it_hears_a_delay_later_and_brakes_when_it_is_stopped(ro
     hearing(robot, here, WAIT, lambda: first() < there[0] - 0.02)
     pressed = time.monotonic()
     robot.stop()
-    until(lambda: robot.state().mode == "idle", 3.0, robot.permit)
+    until(lambda: robot.state().mode == "idle", each=robot.permit)
     assert robot.robot_state().hold_time - pressed < LATE
     joints = robot.robot_state().joints
     assert here[0] < joints[0] < there[0]
@@ -233,7 +233,7 @@ def test_it_follows_what_it_hears_a_delay_later_and_brakes_when_it_is_stopped(ro
 def test_a_process_that_ends_is_a_fault():
     s = simulation()
     process = RobotProcess(simulated.run, (s,), len(s.commands), len(s.bodies), s.limits, s.package)
-    until(lambda: process.ready, 60.0)
+    until(lambda: process.ready, 2 * WAIT)
     process._process.kill()
     until(lambda: process.state().mode == "fault")
     assert process.state().fault == "its process has ended"
@@ -267,10 +267,10 @@ def test_where_its_server_is_gone_it_brakes_along_the_plan_before_it_ends():
     loop = Loop(channel, robot, Still())
     drive(loop, gone)  # at rest, it ends at once
     channel.plans.put((1, plan().digest(), plan(), channel.requests[STOPS]))
-    channel.requests[PERMIT], channel.requests[PERMITTED] = time.monotonic(), 1
+    began = time.monotonic()
+    channel.requests[PERMIT], channel.requests[PERMITTED] = began, 1
     loop.turn(time.monotonic())
     assert robot.state().mode == "running"
-    began = time.monotonic()
     drive(loop, gone)
     assert robot.state().mode == "idle"
     assert DEAD_MAN < loop.hold_time - began < DEAD_MAN + LATE
