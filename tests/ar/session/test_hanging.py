@@ -37,8 +37,8 @@ class Lab:
             self.time += 1 / RATE
             place, turn = base_frames(joints, OFFSET)
             swings = [swing * np.sin(2 * np.pi * 1.3 * self.time), 0.0, 0.0]
-            seen = np.array([place + turn @ (self.hangs + swings), place]) + NOISE * self.rng.standard_normal((2, 3))
-            tip, at_mount = in_base(self.cameras.pose, in_base(inverse(TRUE), seen))
+            measured = np.array([place + turn @ (self.hangs + swings), place]) + NOISE * self.rng.standard_normal((2, 3))
+            tip, at_mount = in_base(self.cameras.pose, in_base(inverse(TRUE), measured))
             arm = MeasuredArm(self.time, np.zeros((2, 7)), tip, 0.01, RATE, 0.0, fault, at_mount if mount else None)
             state = RobotState(self.time, 0.0, joints, commands, np.zeros(7), np.zeros((0, 7)), measured)
             self.watch.observe(state, arm)
@@ -94,10 +94,10 @@ def test_a_look_that_was_disturbed_begins_anew():
 
 def test_after_the_first_motion_nothing_is_seen_and_what_was_seen_stays():
     lab, late = Lab(), Lab()
-    seen = lab.look()
+    earlier = lab.look()
     lab.watch.end()
     lab.hangs = np.array([0.02, 0.0, -0.5])
-    np.testing.assert_array_equal(lab.look(), seen)
+    np.testing.assert_array_equal(lab.look(), earlier)
     late.watch.end()
     assert late.look() is None
 
