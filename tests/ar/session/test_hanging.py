@@ -37,8 +37,8 @@ class Lab:
             self.time += 1 / RATE
             place, turn = base_frames(joints, OFFSET)
             swings = [swing * np.sin(2 * np.pi * 1.3 * self.time), 0.0, 0.0]
-            measured = np.array([place + turn @ (self.hangs + swings), place]) + NOISE * self.rng.standard_normal((2, 3))
-            tip, at_mount = in_base(self.cameras.pose, in_base(inverse(TRUE), measured))
+            centres = np.array([place + turn @ (self.hangs + swings), place]) + NOISE * self.rng.standard_normal((2, 3))
+            tip, at_mount = in_base(self.cameras.pose, in_base(inverse(TRUE), centres))
             arm = MeasuredArm(self.time, np.zeros((2, 7)), tip, 0.01, RATE, 0.0, fault, at_mount if mount else None)
             state = RobotState(self.time, 0.0, joints, commands, np.zeros(7), np.zeros((0, 7)), measured)
             self.watch.observe(state, arm)
