@@ -81,7 +81,8 @@ export function camerasText(message) {
   if (message.fault) return `not relied on: ${message.fault}`;
   const visible = message.markers.filter(Boolean).length;
   const apart = message.apart === null ? "tip not seen" : `tip ${(1000 * message.apart).toFixed(1)} mm from the twin’s`;
-  return `${visible} of ${message.markers.length} bodies, ${Math.round(message.rate)} Hz; ${apart}${heldText(message)}`;
+  const seen = `${visible} of ${message.markers.length} bodies, ${Math.round(message.rate)} Hz`;
+  return `${seen}; ${apart}${heldText(message)}${message.frame && `; ${message.frame}`}`;
 }
 
 /** Whether the tip is where the preview of the plan that ran last stated it, in words; "" where it stated nothing. */

@@ -253,6 +253,7 @@ export const SERVER_MESSAGES = {
     "fault": "required",
     "from_preview": null,
     "radius": null,
+    "frame": "",
     "type": "measured"
   },
   "world": {

@@ -258,11 +258,12 @@ test("in a small window the robot is viewed in what the panels leave free", () =
 });
 
 test("a measured tip within the radius that its plan's preview stated is green and says so, one beyond it is vermilion", () => {
-  const soon = { markers: [[0, 0, 0], null], tip: [0, 0, 0], apart: 0.0075, age: 0, rate: 120, loss: 0, fault: "", from_preview: null, radius: null };
+  const soon = { markers: [[0, 0, 0], null], tip: [0, 0, 0], apart: 0.0075, age: 0, rate: 120, loss: 0, fault: "", from_preview: null, radius: null, frame: "" };
   assert.equal(camerasText(soon), "1 of 2 bodies, 120 Hz; tip 7.5 mm from the twin’s");
   const within = { ...soon, from_preview: 0.0042, radius: 0.0081 }, beyond = { ...within, from_preview: 0.0082 };
   assert.match(camerasText(within), /twin’s, 4.2 mm from its preview’s end, within the 8.1 mm stated$/);
   assert.match(camerasText(beyond), /8.2 mm from its preview’s end, beyond the 8.1 mm stated$/);
   assert.deepEqual([within, beyond].map(colourOf), [OFFER, WRONG]);
   assert.ok(![OFFER, WRONG].includes(colourOf(soon)));
+  assert.match(camerasText({ ...soon, frame: "frame as set" }), /from the twin’s; frame as set$/);
 });

@@ -175,6 +175,8 @@ def test_a_session_uses_it_from_the_next_plan_on_and_its_log_has_it(tmp_path):
     before, pose = session.cameras.pose, Pose((0.1, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
     result, there = CamerasAligned(pose, 6, 1e-3, 5e-4, 2e-3, 0.1, 0.05, ""), [pose]
     comes = [result]
+    session.controller.camera_alignment = None
+    assert session.controller.cameras_frame == "frame as set, which nothing checks"
     session.controller.camera_alignment = SimpleNamespace(
         observe=lambda robot, arm: comes.pop() if comes else None, take=lambda: there.pop() if there else None
     )
@@ -185,9 +187,14 @@ def test_a_session_uses_it_from_the_next_plan_on_and_its_log_has_it(tmp_path):
     session.wait(1.0)
     assert session.controller.aligned == result
     assert session.cameras.pose == before
+    assert session.controller.cameras_frame == "frame as set"
     session.right = {"grip": 1.0, "trigger": 1.0}
     session.until(lambda intent: intent.request is not None)
     assert session.cameras.pose == pose
+    words = "frame by 6 places of the mount, ±1.0 mm at the tip, 2.0 mm from the pose before"
+    assert session.controller.cameras_frame == words
+    session.controller.aligned = replace(result, places=7, unused="found error 9.0 mm")
+    assert session.controller.cameras_frame == f"{words}; 7 places of the mount not used: found error 9.0 mm"
     (event,) = [e for e in read_session_log(session.close()).events if e["event"] == "cameras"]
     assert (event["fault"], event["aligned"]["places"], event["aligned"]["expected"]) == ("", 6, 1e-3)
     assert json.dumps(event["aligned"]["pose"])

@@ -88,7 +88,8 @@ class Broadcast:
             from_preview = round(float(np.linalg.norm(arm.tip - place)), DIGITS)
         markers = tuple(_point(pose[:3]) for pose in arm.poses)
         figures = round(arm.age, 3), round(arm.rate, 1), round(arm.loss, 3)
-        return messages.MeasuredMessage(markers, tip, apart, *figures, arm.fault, from_preview, radius)
+        preview = from_preview, radius
+        return messages.MeasuredMessage(markers, tip, apart, *figures, arm.fault, *preview, controller.cameras_frame)
 
 
 def _point(position: np.ndarray) -> messages.Point | None:

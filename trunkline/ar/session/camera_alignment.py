@@ -51,6 +51,12 @@ class CamerasAligned:
         used = f"not used: {self.unused}" if self.unused else "used from the next plan on"
         return f"cameras aligned by {error}, {apart}; {tilt}; {used}"
 
+    @property
+    def frame_words(self) -> str:
+        """What a page says of the frame where this is used."""
+        error, apart = f"±{1e3 * self.expected:.1f} mm at the tip", f"{1e3 * self.apart:.1f} mm from the pose before"
+        return f"frame by {self.places} places of the mount, {error}, {apart}"
+
 
 class CameraAlignment:
     """Of `cameras` that see the body at the mount. limit: m, of the expected error and of each place, above which an

@@ -136,6 +136,7 @@ class SessionController:
         self.cameras, self.arm = cameras, None
         self.camera_alignment = camera_alignment
         self.aligned: CamerasAligned | None = None  # the last that was computed
+        self._frame_by: CamerasAligned | None = None  # the last that is used
         self._moved = -math.inf  # s, when anything moved
         self._written = -math.inf  # s, of the newest of what cameras saw in the log
         self.correction = CorrectionControl(
@@ -367,6 +368,17 @@ class SessionController:
             self.aligned = aligned
             self.log_writer.event("cameras", fault=self.arm.fault, aligned=aligned)
 
+    @property
+    def cameras_frame(self) -> str:
+        """By what the cameras' frame in the base is known, in words; "" without cameras."""
+        if self.cameras is None:
+            return ""
+        words = "frame as set" if self._frame_by is None else self._frame_by.frame_words
+        if self.camera_alignment is None:
+            return f"{words}, which nothing checks"
+        refused = self.aligned.unused if self.aligned is not None else ""
+        return f"{words}; {self.aligned.places} places of the mount not used: {refused}" if refused else words
+
     def why_uncorrected(self, targets: Targets) -> str:
         """Why a plan for these targets cannot correct itself by what cameras see, "" where it may be able to."""
         if self.cameras is None or self.arm is None:
@@ -382,6 +394,7 @@ class SessionController:
                 pose = self.camera_alignment.take()  # here, as the robot rests and nothing is corrected
                 if pose is not None:
                     self.cameras.align(pose)
+                    self._frame_by = self.aligned
             self._requested, self.report, self.plan, self.preview = request.serial, None, None, None
             self.prediction, self.pieces, self._shown_digest = None, [], ""
             self._ordered = True

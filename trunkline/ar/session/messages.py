@@ -232,7 +232,7 @@ class MeasuredMessage:
     s; rate: Hz; loss: share of the frames that did not come. fault: why nothing is corrected by them now, ""
     while they are sound. from_preview: from the tip to where the preview of the plan that ran last had it at its end,
     m, and radius: that the preview stated about there, m; both null until it has arrived, and where it stated none or
-    corrected itself."""
+    corrected itself. frame: by what the cameras' frame in the base is known, in words."""
 
     markers: tuple[Point | None, ...]
     tip: Point | None
@@ -243,6 +243,7 @@ class MeasuredMessage:
     fault: str
     from_preview: float | None = None
     radius: float | None = None
+    frame: str = ""
     type: Literal["measured"] = "measured"
 
 
