@@ -41,10 +41,11 @@ def tip_of(chain, commands):
     return rest.position[0]
 
 
-def pulled(chain, *pulls):
-    """Commands of these pulls, m; the other motors pay out."""
-    straight = chain.straight_lengths
-    return np.where(np.array(pulls) > 0, straight - np.array(pulls), straight + chain.length)
+def pulled(chain, *pulls, slack=0.2):
+    """Commands of these pulls, m; the cables of the other motors are loose by `slack`, m, at most in many steps."""
+    pulling, straight = np.array(pulls) > 0, chain.straight_lengths
+    loose = np.where(pulling, straight - np.array(pulls), straight + chain.length)
+    return np.where(pulling, loose, actuated(chain, loose[None], DOWN).lengths[0] + slack)
 
 
 def corrected(twin, arm, commands, target, settings=SETTINGS) -> tuple[TipCorrection, list]:
@@ -156,6 +157,48 @@ def test_no_motor_pushes_and_a_loose_cable_is_wound_a_little_beyond_where_it_pul
         assert wound[0] >= -2 * correction.NEGLIGIBLE, "no looser than just loose"
 
 
+def test_a_loose_cable_is_wound_up_over_several_steps_and_the_arm_then_follows(chain):
+    commands = pulled(chain, 0.03, 0.0, 0.0, slack=8e-3)
+    target = tip_of(chain, pulled(chain, 0.03, 0.008, 0.0, slack=8e-3))
+    loop, sent = corrected(chain, chain, commands, target)
+    changes = np.linalg.norm(np.diff(sent, axis=0), axis=1)
+    assert max(changes) <= SETTINGS.longest + 1e-12
+    assert changes[0] == pytest.approx(SETTINGS.longest)
+    assert loop.errors[1] == pytest.approx(loop.errors[0], abs=0.7e-3), "while the cable is loose the arm rests"
+    assert min(loop.errors) < 0.3 * loop.errors[0]
+
+
+@pytest.mark.parametrize(("slack", "steps", "wound"), [(8e-3, 5, True), (8e-3, 2, False), (19e-3, 5, True),
+                                                       (21e-3, 5, False)])  # fmt: skip
+def test_a_loose_cable_is_wound_up_only_if_a_step_is_left_to_pull(chain, slack, steps, wound):
+    """Of `steps` all but one may wind up 5 mm each."""
+    commands = pulled(chain, 0.03, 0.0, 0.0, slack=slack)
+    target = tip_of(chain, pulled(chain, 0.03, 0.008, 0.0, slack=slack))
+    loop = TipCorrection(chain, DOWN, target, commands, replace(SETTINGS, steps=steps))
+    loop.measured(tip_of(chain, commands))
+    assert (loop.commands[1] < commands[1]) == wound
+    assert loop.commands[2] == commands[2]
+
+
+def test_a_loose_cable_stays_loose_where_the_others_bring_the_tip_most_of_the_way(chain):
+    commands = pulled(chain, 0.03, 0.02, 0.0, slack=2e-3)
+    loop = TipCorrection(chain, DOWN, tip_of(chain, pulled(chain, 0.032, 0.02, 0.0, slack=2e-3)), commands, SETTINGS)
+    loop.measured(tip_of(chain, commands))
+    assert loop.commands[2] == commands[2]
+    assert (loop.commands[:2] != commands[:2]).all()
+
+
+def test_an_arm_that_rests_only_as_its_motors_hold_their_place_is_left_alone(chain):
+    commands = pulled(chain, 0.015, 0.01, 0.0, slack=1e-4)
+    rest = actuated(chain, commands[None], DOWN)
+    assert rest.converged[0]
+    assert np.isnan(tip_by_pulls(chain, rest, DOWN)).all()
+    loop = TipCorrection(chain, DOWN, rest.position[0] + [0.0, 0.0, 5e-3], commands, SETTINGS)
+    loop.measured(rest.position[0])
+    assert loop.ended == "the twin is near snapping through under these commands"
+    assert np.array_equal(loop.commands, commands)
+
+
 def test_an_arm_that_answers_otherwise_is_learnt(chain):
     """Of a tip that goes twice as far as the twin's, the second step is not too long again."""
     commands = pulled(chain, 0.03, 0.02, 0.0)
@@ -183,7 +226,7 @@ def test_a_motor_at_its_largest_force_ends_it(chain):
 
 
 def test_an_arm_near_snapping_through_is_left_alone(chain):
-    commands = pulled(chain, 0.03, 0.0, 0.0)
+    commands = pulled(chain, 0.03, 0.0, 0.0, slack=2e-3)
     rest = actuated(chain, commands[None], DOWN)
     steep = np.linalg.norm(tip_by_pulls(chain, rest, DOWN), axis=0).max()
     for factor, ends in ((0.9, True), (1.1, False)):

@@ -9,6 +9,10 @@ is missing after the step (CAUTION 3, the tip's coordinates). J and P begin with
 Kalman filter of constant J does (K. J. Åström, B. Wittenmark, Adaptive Control, 1995, sections 2.2 and 7.5), so that
 the arm's own answer, once to twice as strong as the twin's in trials, soon takes the twin's place.
 
+A loose cable is wound up where those that pull leave much of the way, as in trials it began to pull elsewhere than the
+twin says. No step changes the commands by more than `longest` in all, so that it may take several; a cable that lies
+too far away for the steps that are left stays loose.
+
 The radius halves with a step that left the tip farther off. The best command so far is never lost: it is the last one
 that is sent.
 """
@@ -30,6 +34,7 @@ FRICTION = 0.5e-3  # m by which a step may end elsewhere than J says, as cables 
 WORSE = 0.3e-3  # m farther off than before, beyond what a measurement scatters, that make a step a bad one
 STRONGEST = 0.95  # of a motor's largest force, that a step may ask of it
 BEGINS = 1e-3  # m beyond where the twin says that a loose cable pulls, that a step winds it at most
+RELUCTANT = 0.5  # of what is missing, that cables which pull must leave before a loose one is wound up
 NEGLIGIBLE = 1e-5  # m, change of a command that is not sent: a loose cable stays loose
 
 Metres = Annotated[float, Field(gt=0, le=0.1)]
@@ -117,6 +122,8 @@ class TipCorrection:
         chain, rest = self._chain, self._rest
         if not rest.converged[0]:
             return self._end("the twin does not rest under these commands")
+        if not np.isfinite(self._jacobian).all():
+            return self._end("the twin is near snapping through under these commands")
         change = self._change(missing)
         moving = change != 0
         if not moving.any():
@@ -124,7 +131,8 @@ class TipCorrection:
         steep = np.linalg.norm(self._jacobian[:, moving], axis=0).max(initial=0.0)
         if steep > self._settings.steepest:
             return self._end(f"the tip moves {steep:.0f} mm for 1 mm of a motor: near snapping through")
-        commands = np.where(moving, np.minimum(self.commands, rest.lengths[0]) - change, self.commands)
+        wanted = np.where(moving, np.minimum(self.commands, rest.lengths[0]) - change, self.commands)
+        commands = self.commands + shortened(wanted - self.commands, self._settings.longest)
         foreseen = actuated(chain, commands[None], self._gravity)
         if not foreseen.converged[0] or (foreseen.tensions[0] > STRONGEST * chain.max_tension).any():
             return self._end("a motor would be at its largest force")
@@ -134,19 +142,32 @@ class TipCorrection:
 
     def _change(self, missing: np.ndarray) -> np.ndarray:
         """Of the pulls, m. Shape (K,)."""
-        tendons = self._chain.tendons
-        caution = np.linalg.cholesky(CAUTION * self._variance).T
-        rows, wanted = np.vstack([self._jacobian, caution]), np.append(missing, np.zeros(tendons))
-        taut = np.maximum(self._rest.lengths[0] - self.commands, 0.0)
-        least, most = -taut - NEGLIGIBLE, np.where(self._rest.tensions[0] > 0, np.inf, BEGINS)
-        change = lsq_linear(rows, wanted, (least, most)).x
+        loose = self._rest.tensions[0] == 0
+        wound = self._rest.lengths[0] - self.commands
+        near = wound > -self._settings.longest * (self._settings.steps - len(self.errors))  # a step is left to pull
+        change = self._least_squares(missing, wound, loose)
+        if np.linalg.norm(missing - self._jacobian @ change) > RELUCTANT * np.linalg.norm(missing):
+            change = self._least_squares(missing, wound, loose & ~near)
         change = np.where(np.abs(change) > NEGLIGIBLE, change, 0.0)
-        return change * min(1.0, self._radius / max(np.linalg.norm(change), NEGLIGIBLE))
+        return shortened(change, self._radius)
+
+    def _least_squares(self, missing: np.ndarray, wound: np.ndarray, idle: np.ndarray) -> np.ndarray:
+        """Of the pulls, m, before it is shortened, for which the cables `idle`, (K,), stay loose. Shape (K,)."""
+        caution = np.linalg.cholesky(CAUTION * self._variance).T
+        rows, sought = np.vstack([self._jacobian, caution]), np.append(missing, np.zeros(len(wound)))
+        most = np.where(idle, NEGLIGIBLE, np.where(self._rest.tensions[0] > 0, np.inf, BEGINS))
+        return lsq_linear(rows, sought, (-np.maximum(wound, 0.0) - NEGLIGIBLE, most)).x
+
+
+def shortened(vector: np.ndarray, longest: float) -> np.ndarray:
+    """Of at most the length `longest`, with its direction. Shape as before."""
+    return vector * min(1.0, longest / max(float(np.linalg.norm(vector)), NEGLIGIBLE))
 
 
 def tip_by_pulls(chain: Chain, rest: Equilibrium, gravity: np.ndarray) -> np.ndarray:
     """The tip's way by each motor's pull, m/m, of an arm at rest; of a motor whose cable is loose, once it is taut. The
-    others that pull stay where they are. Shape (3, K).
+    others that pull stay where they are. NaN where the arm rests only because its motors hold their place, as one that
+    is about to snap through may. Shape (3, K).
 
     Args:
         rest: of one arm. gravity: m/s². Shape (3,).

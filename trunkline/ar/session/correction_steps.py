@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trunkline.ar.correction.correction import CorrectionSettings, TipCorrection
+from trunkline.ar.correction.correction import CorrectionSettings, TipCorrection, shortened
 from trunkline.ar.teleop.base_frames import base_frames
 from trunkline.ar.teleop.messages import Obstacle, Targets, Vector, World
 from trunkline.ar.teleop.plan import CorrectionBounds, Plan
@@ -70,12 +70,7 @@ class CorrectionSteps:
         change = float(np.linalg.norm(there - here))
         if change <= SAME:
             return CorrectionAnswer(order.serial, order.number, None, ended or "no motor brings the tip nearer")
-        if change > order.bounds.longest and not ended:
-            reason = (
-                f"a loose cable lies {1e3 * change:.1f} mm away, a step is at most {1e3 * order.bounds.longest:g} mm"
-            )
-            return CorrectionAnswer(order.serial, order.number, None, reason)
-        there = here + min(1.0, order.bounds.longest / change) * (there - here)
+        there = here + shortened(there - here, order.bounds.longest)
         try:
             return CorrectionAnswer(order.serial, order.number, self._plan(order, there), ended)
         except InputError as error:
