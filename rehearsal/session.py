@@ -75,10 +75,10 @@ class RehearsedRobot:
         return ExecutorReport("fault", report.digest, self._fault) if self._fault else report
 
     @property
-    def hangs(self) -> np.ndarray:
+    def hangs(self) -> np.ndarray | None:
         """Where the straight arm's tip was seen before the robot moved, in the frame of the arm's base, m. Shape (3,).
-        Its y is how far it is beside the bending plane. NaN where it was not seen before."""
-        return np.mean(self._hangs, axis=0) if self._hangs else np.full(3, np.nan)
+        Its y is how far it is beside the bending plane. None where it was not seen before."""
+        return np.mean(self._hangs, axis=0) if self._hangs else None
 
     def robot_state(self) -> RobotState:
         """As the sensors read it, which every call asks anew; its one body is the arm's tip."""

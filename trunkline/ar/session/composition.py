@@ -4,6 +4,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import mujoco
 import numpy as np
 
 from trunkline.ar.preview.package import Package, read_package
@@ -22,6 +23,7 @@ from trunkline.ar.session.bodies import drawn_bodies
 from trunkline.ar.session.camera_alignment import CameraAlignment
 from trunkline.ar.session.certificate import certificate_of
 from trunkline.ar.session.controller import SessionController
+from trunkline.ar.session.hanging import HangingWatch
 from trunkline.ar.session.hardware import Hardware
 from trunkline.ar.session.log_format import SIMULATED, Subject
 from trunkline.ar.session.log_writer import LogWriterProcess, new_path
@@ -30,6 +32,7 @@ from trunkline.ar.session.robot_process import RobotProcess
 from trunkline.ar.session.scene import Shells, scene
 from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.session.simulated import Simulation
+from trunkline.ar.teleop.base_frames import base_frames
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.messages import Obstacle
@@ -100,11 +103,14 @@ def make(
         begun.callback(robot.close)
         core = Teleoperation(teleop.core, package.reach, package.digest, teleop.mount_offset)
         lift = teleop.handling.least_lift
-        alignment = None
+        alignment = hanging = None
         if arm_cameras is not None and arm_cameras.sees_mount:
-            alignment = CameraAlignment(arm_cameras, teleop.mount_offset, config.correction.misplaced)
+            offset, limits = teleop.mount_offset, config.correction
+            alignment = CameraAlignment(arm_cameras, offset, limits.misplaced)
+            hanging = HangingWatch(arm_cameras, package.straight, hanging_tip(simulation), offset, limits.astray)
         controller = SessionController(
-            core, robot, previewer, world, lift, log_writer, package.period, arm_cameras, config.correction, alignment
+            core, robot, previewer, world, lift, log_writer, package.period, arm_cameras, config.correction, alignment,
+            hanging,
         )
         controller.begin(config.rate, __version__)
         log_writer.await_begun()
@@ -141,6 +147,16 @@ def measured_subject(subject: Subject, cameras: ArmCameras, simulation: Simulati
     return replace(
         subject, measured=cameras.names, markers=markers_of(simulation.twin.model, names), mount=mount
     )  # fmt: skip
+
+
+def hanging_tip(simulation: Simulation) -> np.ndarray:
+    """Where the tip of the twin hangs as all begins, in the arm's base frame, m (3,)."""
+    data = mujoco.MjData(simulation.twin.model)
+    if simulation.twin.start is not None:
+        data.qpos[:] = simulation.twin.start
+    mujoco.mj_kinematics(simulation.twin.model, data)
+    place, turn = base_frames(simulation.joints, simulation.mount_offset)
+    return (data.site("tip").xpos - place) @ turn
 
 
 def subject_of(simulation: Simulation, hardware: Hardware | None = None) -> Subject:

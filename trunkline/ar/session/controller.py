@@ -22,6 +22,7 @@ from trunkline.ar.session.controller_input import NOWHERE
 from trunkline.ar.session.correction_control import CorrectionControl
 from trunkline.ar.session.correction_steps import CorrectionAnswer
 from trunkline.ar.session.follow import FollowControl
+from trunkline.ar.session.hanging import HangingWatch
 from trunkline.ar.session.log_writer import LogWriter
 from trunkline.ar.session.previewer import (
     Answer,
@@ -95,7 +96,7 @@ class Cameras(Protocol):
 class SessionController:
     """One robot, one core. `lift`: m by which a grasp lifts at least. `log_writer`: of the session. `period`: s, of the
     arm's slowest vibration mode. `cameras`: that see the arm, None without; `correction`: of plans, by what they see;
-    `camera_alignment`: of their frame, None where they see no mount.
+    `camera_alignment`: of their frame, and `hanging`: of the straight arm, None where they see no mount.
     """
 
     def __init__(
@@ -110,6 +111,7 @@ class SessionController:
         cameras: Cameras | None = None,
         correction: CorrectionSettings | None = None,
         camera_alignment: CameraAlignment | None = None,
+        hanging: HangingWatch | None = None,
     ) -> None:
         self.core, self.robot, self.previewer, self.world = core, robot, previewer, world
         self.lift, self.period = lift, period
@@ -134,7 +136,7 @@ class SessionController:
         self._logged: tuple = ()
         self._follow = FollowControl(previewer.submit, robot.hear)
         self.cameras, self.arm = cameras, None
-        self.camera_alignment = camera_alignment
+        self.camera_alignment, self.hanging = camera_alignment, hanging
         self.aligned: CamerasAligned | None = None  # the last that was computed
         self._frame_by: CamerasAligned | None = None  # the last that is used
         self._moved = -math.inf  # s, when anything moved
@@ -363,6 +365,8 @@ class SessionController:
             self.log_writer.measured(self.arm.stamp, poses)
         if before is not None and self.arm.fault != before.fault:
             self.log_writer.event("cameras", fault=self.arm.fault)
+        if self.hanging is not None:
+            self.hanging.observe(robot_state, self.arm)
         aligned = self.camera_alignment.observe(robot_state, self.arm) if self.camera_alignment is not None else None
         if aligned is not None:
             self.aligned = aligned
@@ -376,8 +380,16 @@ class SessionController:
         words = "frame as set" if self._frame_by is None else self._frame_by.frame_words
         if self.camera_alignment is None:
             return f"{words}, which nothing checks"
-        refused = self.aligned.unused if self.aligned is not None else ""
-        return f"{words}; {self.aligned.places} places of the mount not used: {refused}" if refused else words
+        if self.aligned is not None and self.aligned.unused:
+            words += f"; {self.aligned.places} places of the mount not used: {self.aligned.unused}"
+        hangs = self.hanging.words if self.hanging is not None and self._frame_by is not None else ""
+        return f"{words}; {hangs}" if hangs else words
+
+    def _hangs(self, robot_state: RobotState) -> np.ndarray | None:
+        """Where the straight arm's tip was seen in its base frame, m (3,), or None."""
+        if robot_state.hangs is not None or self.hanging is None or self._frame_by is None:
+            return robot_state.hangs
+        return self.hanging.place
 
     def why_uncorrected(self, targets: Targets) -> str:
         """Why a plan for these targets cannot correct itself by what cameras see, "" where it may be able to."""
@@ -399,7 +411,7 @@ class SessionController:
             self.prediction, self.pieces, self._shown_digest = None, [], ""
             self._ordered = True
             self.log_writer.event("request", request=request)
-            here = robot_state.joints, robot_state.commands, robot_state.hangs
+            here = robot_state.joints, robot_state.commands, self._hangs(robot_state)
             uncorrected = self.why_uncorrected(request.targets) if correct else ""
             asks = correct and not uncorrected
             self._bounds = self.correction.bounds(request.targets.tip.position) if asks else None
@@ -432,6 +444,8 @@ class SessionController:
     def _begin(self, intent: Intent) -> None:
         """Start the plan that was confirmed, or to follow, once."""
         self._started, self.arrived = intent.execute or FOLLOWS, None
+        if self.hanging is not None:
+            self.hanging.end()
         self.correction.forget()
         if intent.motion == "follow":
             following = Following(self.core.settings.follow_delay, self.period, self.core.mount_offset)

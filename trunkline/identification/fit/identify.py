@@ -26,7 +26,7 @@ from trunkline.recordings.trials.splits import IDENTIFY
 
 NEAR = 5.0  # times the last descent's tolerance: where outlying trials are still to be weighed, it need be no nearer
 SEEN = 0.05  # share of the losses by which a surrogate may mistake those at a new estimate, and still serve there
-REWEIGHINGS, SAME_WEIGHT = 4, 0.05  # at most; weights that change by less leave the minimum where it is
+REWEIGHINGS, SAME_WEIGHT = 5, 0.05  # at most; weights that change by less leave the minimum where it is
 BOUND_TOLERANCE = 0.01  # of the range: closer to an end counts as on it; least squares stays just inside
 
 
@@ -180,18 +180,24 @@ def _refine(problem: Problem, coarse: SearchResult, settings: Refinement, label:
 def _reweigh(problem: Problem, result: SearchResult, fit: Fit, label: str) -> tuple[SearchResult, Surrogate]:
     """The minimum in which outlying trials count less, from near it, and the surrogate around it.
 
-    The surrogate says which, and about where the minimum then is; least squares goes there, until the weights stay. A
-    surrogate is made anew where its prediction of the losses was wrong.
+    A surrogate says which, and about where the minimum then is; least squares goes there, until the weights stay. The
+    first is of first order, which costs little where much is still to move. One of second order is made where its
+    prediction of the losses was wrong, or where the weights stay by it.
     """
     kinds, settings = [e.kind for e in problem.experiments], fit.method.polish
     straight = marker_positions(problem.model, problem.markers, problem.model.qpos0)
     bends = np.array([np.square(e.positions - straight).sum(axis=2)[e.measured].mean() for e in problem.experiments])
-    around = made = surrogate(problem, result.vector, result.residuals)
-    made_at = result.vector
+    around = made = surrogate(problem, result.vector, result.residuals, second=False)
+    made_at, is_last = result.vector, False  # is_last: whether it is of as high an order as there is
     for turn in range(REWEIGHINGS):
         weights, place = reweighted(around, kinds, bends, fit.weights.outlying)
-        if turn and np.abs(weights - problem.trial_weights).max() < SAME_WEIGHT:
+        stays = turn > 0 and np.abs(weights - problem.trial_weights).max() < SAME_WEIGHT
+        if stays and is_last:
             break
+        if stays:
+            around = made = surrogate(problem, result.vector, result.residuals)
+            made_at, is_last = result.vector, True
+            continue
         problem.trial_weights = weights
         tried = np.stack([result.vector, np.clip(result.vector + place, *problem.bounds())])
         start = tried[np.argmin(problem.losses(tried))]
@@ -206,7 +212,9 @@ def _reweigh(problem: Problem, result: SearchResult, fit: Fit, label: str) -> tu
             around = made.moved(moved, weights)
         else:
             around = made = surrogate(problem, result.vector, result.residuals)
-            made_at = result.vector
+            made_at, is_last = result.vector, True
+    if not is_last:
+        around = surrogate(problem, result.vector, result.residuals)
     return result, around
 
 

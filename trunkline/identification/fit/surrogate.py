@@ -109,14 +109,17 @@ class Surrogate:
         return place
 
 
-def surrogate(problem: Problem, vector: np.ndarray, residuals: list[np.ndarray] | None = None) -> Surrogate:
+def surrogate(
+    problem: Problem, vector: np.ndarray, residuals: list[np.ndarray] | None = None, second: bool = True
+) -> Surrogate:
     """Of the scalars `vector` (P,) of `problem`, from (P + 1)(P + 2) / 2 candidates, 2 P² + 1 where cables rub, or
-    P + 1 where P is large.
+    P + 1 where P is large or the first order does.
 
     Args:
         residuals: those at `vector`, where they are known. Per trial (R,).
+        second: whether the second order is asked for.
     """
-    second = len(vector) <= FEW
+    second &= len(vector) <= FEW
     reach = reaches(problem)
     places = _composite(reach) if second and problem.rubs else _stencil(reach, second)
     if residuals is None:
