@@ -477,7 +477,8 @@ class Page {
     const stale = !wire?.up || (this.frame?.flags.has("stale") ?? false) || (age ?? 0) > 1;
     this.drawn.fade(stale);
     const device = immersed ? "controllers" : this.desktop.touches ? "touch" : "keys";
-    const status = uiText({ state, lease, id: wire?.id ?? "", age: this.rounded(age), up: Boolean(wire?.up && wire.id), reason, ended: this.ended, stale, device, pressed: this.desktop.isPressed });
+    const pressed = immersed ? HANDS.some((side) => this.hands[side].grip || this.hands[side].trigger) : this.desktop.isPressed;
+    const status = uiText({ state, lease, id: wire?.id ?? "", age: this.rounded(age), up: Boolean(wire?.up && wire.id), reason, ended: this.ended, stale, device, pressed });
     this.addNotices(status, device);
     this.measured.update(clock());
     const cameras = camerasText(this.measured.message);

@@ -155,6 +155,10 @@ test("a notice is in the words of the device at hand", () => {
   assert.equal(ofDevice(notice, "keys"), "the tip’s target is 17 mm out of reach; R takes the nearest point that is within");
   assert.equal(ofDevice("stopped; primary button goes on", "touch"), "stopped; “Go on” goes on");
   assert.equal(ofDevice("hold G and press Enter to confirm, or move a target", "touch"), "hold “Let it move” and tap “Confirm”, or move a target");
+  for (const core of ["controllers have changed places; holding until both grips are let go", "left controller: not tracked; holding", "right controller: pose is not a number; holding"]) {
+    assert.doesNotMatch(ofDevice(core, "keys"), /controller|grip|trigger|primary/);
+    assert.doesNotMatch(ofDevice(core, "touch"), /controller|grip|trigger|primary|\bG\b/);
+  }
   for (const key of ["stopped", "ready", "plan", "hold", "aim"]) assert.doesNotMatch(ofDevice(whyNothing("Enter", { up: true, controls: true, mode: key, gripped: false }), "touch"), /\bEnter\b.*press|\bpress R\b|\bG\b/);
 });
 
@@ -187,7 +191,9 @@ test("letting go is asked only while something is pressed", () => {
   const state = { mode: "hold", keys: "let go of all keys for a moment", next: "let go of grips and triggers for a moment" };
   assert.match(uiText({ ...page, state, pressed: true }).next, /Let go of G/);
   assert.doesNotMatch(uiText({ ...page, state, pressed: false }).next, /let go/i);
-  assert.match(uiText({ ...page, state, device: "controllers" }).next, /grips and triggers/);
+  assert.match(uiText({ ...page, state, device: "controllers", pressed: true }).next, /grips and triggers/);
+  assert.doesNotMatch(uiText({ ...page, state, device: "controllers" }).next, /let go/i);
+  assert.match(uiText({ ...page, state, device: "touch", pressed: true }).next, /“Let it move”/);
 });
 
 test("the reason for lost control is what happened here of late", () => {
