@@ -218,7 +218,7 @@ async def taken_of_cameras(camera: Camera, cameras: ArmCameras) -> None:
     await camera.page.key("KeyC")
     await camera.until("document.querySelector('#correct').ariaPressed === 'true'", "a correction that is asked for")
     await camera.move(LED)
-    await camera.until(f"{SETTLED} && {CALM} && {sound}", "both targets")
+    await camera.until(f"{SETTLED} && {sound}", "both targets")
     await camera.page.key("Enter")
     await camera.until("trunkline.planned", "a plan")
     if not await camera.page.value("Boolean(trunkline.planned.correction)"):
