@@ -10,8 +10,10 @@ until it is connected anew.
 """
 
 import ctypes
+import math
 import multiprocessing
 import os
+import re
 import signal
 import sys
 import time
@@ -38,6 +40,7 @@ from trunkline.twin.package import arm_of, read_package
 BEGINS, LASTS, AFTERWARDS = 2.0, 1.5, 4.0  # s
 SPEED, BEND = 0.4, 0.05  # Hz and rad a joint, of the motion to and fro
 HZ = 90.0  # of looks, as a session's
+PHASES = 240  # of the motion, between which poses are interpolated
 Lie = Callable[[CameraFrame, CameraFrame], CameraFrame]  # of a frame and of the last true one
 
 
@@ -106,18 +109,24 @@ class BendingArm:
     """The arm of a package before cameras of `settings`, as it bends to and fro. names: of the bodies that they see."""
 
     def __init__(self, package: Path, settings: CameraSettings) -> None:
-        self._model = arm_of(read_package(package)).compile()
-        self._data = mujoco.MjData(self._model)
-        units = [name for row in range(self._model.nbody) if (name := self._model.body(row).name).startswith("unit_")]
+        model = arm_of(read_package(package)).compile()
+        data, names = mujoco.MjData(model), [model.body(row).name for row in range(model.nbody)]
+        units = [name for name in names if re.fullmatch(r"unit_\d+", name)]
         self.names = (MOUNT, *units[(len(units) - 1) % EVERY :: EVERY])
+        rows = [names.index(name) for name in self.names]
+        phases = np.linspace(0.0, 2 * np.pi, PHASES + 1)
+        self._table = np.empty((len(phases), len(rows), 7))
+        for place, phase in zip(self._table, phases, strict=True):
+            data.qpos[:] = model.qpos0 + BEND * np.sin(phase)
+            mujoco.mj_kinematics(model, data)
+            place[:] = np.hstack([data.xpos[rows], data.xquat[rows]])
         self._turn, self._origin = rotation_from_wxyz(np.array(settings.quaternion)), np.array(settings.origin)
 
     def poses(self, now: float) -> tuple[np.ndarray, np.ndarray]:
         """Positions (B, 3), m, and quaternions (B, 4), at `now`, s."""
-        self._data.qpos[:] = self._model.qpos0 + BEND * np.sin(2 * np.pi * SPEED * now)
-        mujoco.mj_kinematics(self._model, self._data)
-        rows = [self._model.body(name).id for name in self.names]
-        return self._data.xpos[rows].copy(), self._data.xquat[rows].copy()
+        share, row = math.modf(PHASES * (now * SPEED % 1.0))
+        place = (1 - share) * self._table[int(row)] + share * self._table[int(row) + 1]
+        return place[:, :3], place[:, 3:] / np.linalg.norm(place[:, 3:], axis=1, keepdims=True)
 
     def seen_tip(self, now: float) -> np.ndarray:
         """Where cameras that are right see the last body, m (3,)."""

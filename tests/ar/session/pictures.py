@@ -220,7 +220,7 @@ async def taken_of_cameras(camera: Camera, cameras: ArmCameras) -> None:
     await camera.move(LED)
     await camera.until(f"{SETTLED} && {sound}", "both targets")
     await camera.page.key("Enter")
-    await camera.until("trunkline.planned", "a plan")
+    await camera.until("Boolean(trunkline.planned)", "a plan")
     if not await camera.page.value("Boolean(trunkline.planned.correction)"):
         raise InputError(f"correction: {await camera.page.value('trunkline.planned.uncorrected')}")
     await camera.take("ready", f"trunkline.measured.bounds.visible && {sound}", "correcting")
