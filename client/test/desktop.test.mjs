@@ -272,6 +272,11 @@ test("the arm as cameras see it is drawn, a plan that may correct itself says it
   await loaded(page);
   await takeControl(page);
   assert.ok(await page.evaluate(() => document.querySelector("#correct").hidden));
+  await page.evaluate(() => (globalThis.trunkline.corrects = true));
+  await page.keyboard.press("c");
+  await until(page, () => /No cameras are heard/.test(document.querySelector("#notice").textContent));
+  assert.ok(await page.evaluate(() => globalThis.trunkline.corrects), "the choice is as it was");
+  await page.evaluate(() => (globalThis.trunkline.corrects = false));
   await fresh.command("cameras");
   await until(page, () => globalThis.trunkline.measured.group.visible && !document.querySelector("#correct").hidden);
   await until(page, () => /7 of 7 bodies, 120 Hz; tip 7.5 mm from the twin/.test(document.querySelector("#facts").textContent));
