@@ -69,8 +69,9 @@ const ENTER = {
   stopped: "The robot is stopped: press R to go on.",
 };
 
-/** Why a key does nothing now, "" where it does something. `offers`: whether anything is offered. */
-export function whyNothing(code, { up, controls, holder, mode, gripped, offers }) {
+/** Why a key does nothing now, "" where it does something. `offers`: whether anything is offered; `cameras`: heard. */
+export function whyNothing(code, { up, controls, holder, mode, gripped, offers, cameras }) {
+  if (code === "KeyC") return cameras ? "" : "No cameras are heard.";
   const acts = ["Enter", "KeyG", "KeyR", "KeyF"].includes(code) || ARROWS.has(code);
   if (!acts) return "";
   if (!up) return "There is no connection: keys do nothing until it is back.";
