@@ -5,6 +5,10 @@ const BY_KEYS = [
   [/client silent for ([\d.]+) s; holding/g, "this page was silent for $1 s, so the robot holds: its computer is busy"],
   [/primary button takes/g, "R takes"],
   [/primary button goes on/g, "R goes on"],
+  [/controllers have changed places; holding until both grips are let go/g, "the two targets have changed places; holding until G is let go"],
+  [/(?:left|right) controller: not tracked/g, "this page does not send where its markers are"],
+  [/left controller: /g, "the left ray: "],
+  [/right controller: /g, "the right ray: "],
   [/grips let go/g, "G was let go"],
   [/hold a grip to set each/g, "drag each marker, or move it by arrows"],
   [/hold a grip to follow/g, "hold G, and press F meanwhile"],
@@ -38,8 +42,10 @@ export function ofDevice(text, device) {
   return device === "touch" ? replaced(keys, BY_TOUCH) : keys;
 }
 
+const LET_GO = { controllers: "let go of grips and triggers for a moment", keys: "let go of G and of the mouse for a moment", touch: "let go of “Let it move” and of the picture for a moment" };
+
 /** The next action while the core holds: it waits until nothing is pressed. */
-export const whileHolding = (pressed) => (pressed ? "let go of G and of the mouse for a moment" : "wait a moment, aiming begins by itself");
+export const whileHolding = (pressed, device) => (pressed ? LET_GO[device] : "wait a moment, aiming begins by itself");
 
 /** Whether the cause of a `notice` that stands while aiming is still there. */
 export function lasts(notice, { mode, targets, gripped }) {
@@ -63,8 +69,9 @@ const ENTER = {
   stopped: "The robot is stopped: press R to go on.",
 };
 
-/** Why a key does nothing now, "" where it does something. `offers`: whether anything is offered. */
-export function whyNothing(code, { up, controls, holder, mode, gripped, offers }) {
+/** Why a key does nothing now, "" where it does something. `offers`: whether anything is offered; `cameras`: heard. */
+export function whyNothing(code, { up, controls, holder, mode, gripped, offers, cameras }) {
+  if (code === "KeyC") return cameras ? "" : "No cameras are heard.";
   const acts = ["Enter", "KeyG", "KeyR", "KeyF"].includes(code) || ARROWS.has(code);
   if (!acts) return "";
   if (!up) return "There is no connection: keys do nothing until it is back.";

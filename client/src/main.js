@@ -180,7 +180,7 @@ class Page {
   explain(code) {
     const { state, lease, wire } = this;
     const offers = Boolean(state?.targets?.rigid?.offer || state?.targets?.tip?.offer || state?.targets?.better || this.prediction?.offer);
-    const now = { up: Boolean(wire?.up), controls: Boolean(wire?.controls), holder: lease?.holder ?? "", mode: state?.mode, gripped: this.desktop.deadman, offers };
+    const now = { up: Boolean(wire?.up), controls: Boolean(wire?.controls), holder: lease?.holder ?? "", mode: state?.mode, gripped: this.desktop.deadman, offers, cameras: Boolean(this.measured.message) };
     const why = whyNothing(code, now), { mode } = now;
     if (why) this.warn(why, () => this.state?.mode !== mode || (Boolean(this.wire?.controls) !== now.controls) || this.desktop.deadman !== now.gripped);
   }
@@ -192,7 +192,7 @@ class Page {
 
   /** Whether plans that are asked for from now on may correct themselves by cameras; without them they never do. */
   chooseCorrection() {
-    this.corrects = Boolean(this.measured.message) && !this.corrects;
+    if (this.measured.message) this.corrects = !this.corrects;
   }
 
   /** As well as drawing is fast. */
@@ -477,7 +477,8 @@ class Page {
     const stale = !wire?.up || (this.frame?.flags.has("stale") ?? false) || (age ?? 0) > 1;
     this.drawn.fade(stale);
     const device = immersed ? "controllers" : this.desktop.touches ? "touch" : "keys";
-    const status = uiText({ state, lease, id: wire?.id ?? "", age: this.rounded(age), up: Boolean(wire?.up && wire.id), reason, ended: this.ended, stale, device, pressed: this.desktop.isPressed });
+    const pressed = immersed ? HANDS.some((side) => this.hands[side].grip || this.hands[side].trigger) : this.desktop.isPressed;
+    const status = uiText({ state, lease, id: wire?.id ?? "", age: this.rounded(age), up: Boolean(wire?.up && wire.id), reason, ended: this.ended, stale, device, pressed });
     this.addNotices(status, device);
     this.measured.update(clock());
     const cameras = camerasText(this.measured.message);

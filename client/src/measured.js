@@ -6,6 +6,7 @@ import { Label } from "./label.js";
 
 const MEASURED = 0xffffff; // white, on top of the robot; where a plan has arrived, by whether its preview held
 const MOST = 100; // markers
+const FAR = 2; // times the radius: with normal scatter, beyond 90 % is one tip in ten, beyond twice that at most one in 1000
 const OLD = 0.5; // s without a message, after which nothing is drawn
 
 export class MeasuredArm {
@@ -49,8 +50,9 @@ export class MeasuredArm {
       if (dot.visible) dot.position.fromArray(points[index]);
     });
     const { tip, apart } = message;
-    for (const material of [this.material, this.stroke]) material.color.set(colourOf(message));
-    this.label.set(tip && apart !== null ? `${(1000 * apart).toFixed(1)} mm` : "");
+    const colour = colourOf(message);
+    for (const material of [this.material, this.stroke]) material.color.set(colour);
+    this.label.set(tip && apart !== null ? `${(1000 * apart).toFixed(1)} mm` : "", colour);
     if (tip) this.label.sprite.position.fromArray(tip);
     this.label.sprite.visible = Boolean(tip) && apart !== null;
   }
@@ -72,7 +74,7 @@ export class MeasuredArm {
 
 /** Of the measured arm: by whether its tip is within what the preview stated, where it stated anything. */
 export function colourOf({ from_preview: off, radius }) {
-  return radius === null ? MEASURED : off <= radius ? OFFER : WRONG;
+  return radius === null ? MEASURED : off <= radius ? OFFER : off <= FAR * radius ? TIP : WRONG;
 }
 
 /** What cameras see, in words; "" without any. */
@@ -89,7 +91,7 @@ export function camerasText(message) {
 function heldText({ from_preview: off, radius }) {
   if (radius === null) return "";
   const mm = (metres) => (1000 * metres).toFixed(1);
-  return `, ${mm(off)} mm from its preview’s end, ${off <= radius ? "within" : "beyond"} the ${mm(radius)} mm stated`;
+  return `, ${mm(off)} mm from its preview’s end, ${off <= radius ? "within" : off <= FAR * radius ? "beyond" : "far beyond"} the ${mm(radius)} mm stated`;
 }
 
 /** By how much a plan may correct itself, as the message `preview` says; why not, where it was asked to; else "". */

@@ -19,7 +19,7 @@ const REMEDIES = { "token: wrong": "This address is not of the session that runs
 /** What to do about the `reason` for which the server has ended a connection. */
 export const remedy = (reason) => (reason in REMEDIES ? `${REMEDIES[reason]} (${reason}).` : reason);
 
-/** The status of `page` in words: `mode`, `title`, `next`, `notice`, whether the robot has `arrived`, and facts by name. `ended`: it will not connect again by itself. `device`: as in `ofDevice`; `pressed`: whether a key or the mouse is. */
+/** The status of `page` in words: `mode`, `title`, `next`, `notice`, whether the robot has `arrived`, and facts by name. `ended`: it will not connect again by itself. `device`: as in `ofDevice`; `pressed`: whether a key, the mouse, a grip or a trigger is. */
 export function uiText(page) {
   const { state, lease, id, age, up, reason, ended, stale, device = "keys", pressed = false } = page;
   const immersed = device === "controllers";
@@ -36,8 +36,8 @@ export function uiText(page) {
   let title = TITLES[mode];
   if (mode === "delay" && Number.isFinite(state.countdown)) title = `Moves in ${state.countdown.toFixed(1)} s`;
   const action = (immersed ? state?.next : state?.keys) ?? "";
-  const instruction = !immersed && controls && mode === "hold" ? whileHolding(pressed) : action;
-  let next = controls || !lease?.holder ? sentence(ofDevice(instruction, device)) : "You watch. Ask for control to aim.";
+  const instruction = controls && mode === "hold" ? whileHolding(pressed, device) : ofDevice(action, device);
+  let next = controls || !lease?.holder ? sentence(instruction) : "You watch. Ask for control to aim.";
   if (!up) next = reason === null ? "Waiting for the server." : `The connection is lost${reason ? `: ${reason}` : ""}. Trying again.`;
   if (!up && ended) next = `The server has ended the connection: ${reason}.`;
   return { mode, title, next, notice: ofDevice((up && state?.notice) || "", device), arrived, facts };

@@ -272,6 +272,11 @@ test("the arm as cameras see it is drawn, a plan that may correct itself says it
   await loaded(page);
   await takeControl(page);
   assert.ok(await page.evaluate(() => document.querySelector("#correct").hidden));
+  await page.evaluate(() => (globalThis.trunkline.corrects = true));
+  await page.keyboard.press("c");
+  await until(page, () => /No cameras are heard/.test(document.querySelector("#notice").textContent));
+  assert.ok(await page.evaluate(() => globalThis.trunkline.corrects), "the choice is as it was");
+  await page.evaluate(() => (globalThis.trunkline.corrects = false));
   await fresh.command("cameras");
   await until(page, () => globalThis.trunkline.measured.group.visible && !document.querySelector("#correct").hidden);
   await until(page, () => /7 of 7 bodies, 120 Hz; tip 7.5 mm from the twin/.test(document.querySelector("#facts").textContent));
@@ -286,7 +291,7 @@ test("the arm as cameras see it is drawn, a plan that may correct itself says it
   await until(page, () => globalThis.trunkline.state.targets && true);
   await page.keyboard.press("Enter");
   await inMode(page, "ready");
-  await until(page, () => /by 5 steps at most, each of up to 5 mm of cable, 25 mm in all, the tip within 60 mm of its target/.test(document.querySelector("#foreseen").textContent));
+  await until(page, () => /by 5 steps at most, each of up to 5 mm of cable, 25 mm in all, the tip within 30 mm of its target/.test(document.querySelector("#foreseen").textContent));
   assert.ok(await page.evaluate(() => globalThis.trunkline.measured.bounds.visible));
   await page.waitForTimeout(500);
   await picture(page, "measured-ready");
@@ -297,7 +302,7 @@ test("the arm as cameras see it is drawn, a plan that may correct itself says it
   await until(page, () => globalThis.trunkline.state.correction === "waits until the tip rests");
   await inMode(page, "aim");
   await page.keyboard.up("KeyG");
-  await until(page, () => /Correctionnot corrected, [\d.]+ mm off: the tip is \d+ mm off, expected at most 60 mm/.test(document.querySelector("#facts").textContent));
+  await until(page, () => /Correctionnot corrected, [\d.]+ mm off: the tip is \d+ mm off, expected at most 30 mm/.test(document.querySelector("#facts").textContent));
   assert.ok(await page.evaluate(() => !globalThis.trunkline.measured.bounds.visible));
   await fresh.command("blind");
   await until(page, () => /not relied on: found no frame for 0.20 s/.test(document.querySelector("#facts").textContent) && !globalThis.trunkline.measured.group.visible);

@@ -6,7 +6,7 @@ import { Playback } from "../src/playback.js";
 import { Recording } from "../src/recording.js";
 import { decode, encode, noHand } from "../src/wire.js";
 import { FROM_CLIENT, FROM_SERVER, HAND, HEAD_BYTES, INPUT_BYTES } from "../src/wire_table.js";
-import { Ray, Vector3 } from "three";
+import { Group, Ray, Vector3 } from "three";
 import { axisOf, onAxis, objectAt } from "../src/handles.js";
 import { doubtQuestion, isDoubtful, lasts, ofDevice, success, whyLost, whyNothing } from "../src/hints.js";
 import { LEVELS, Quality } from "../src/quality.js";
@@ -14,8 +14,8 @@ import { matrixOf } from "../src/geoms.js";
 import { Confirming } from "../src/confirming.js";
 import { freeArea } from "../src/views.js";
 import { predictionText, remedy, uiText } from "../src/panel.js";
-import { camerasText, colourOf } from "../src/measured.js";
-import { OFFER, WRONG } from "../src/colours.js";
+import { MeasuredArm, camerasText, colourOf } from "../src/measured.js";
+import { OFFER, TIP, WRONG, css } from "../src/colours.js";
 
 /** A message `robot` of one row. */
 function robot(sequence, time, x) {
@@ -155,6 +155,10 @@ test("a notice is in the words of the device at hand", () => {
   assert.equal(ofDevice(notice, "keys"), "the tip’s target is 17 mm out of reach; R takes the nearest point that is within");
   assert.equal(ofDevice("stopped; primary button goes on", "touch"), "stopped; “Go on” goes on");
   assert.equal(ofDevice("hold G and press Enter to confirm, or move a target", "touch"), "hold “Let it move” and tap “Confirm”, or move a target");
+  for (const core of ["controllers have changed places; holding until both grips are let go", "left controller: not tracked; holding", "right controller: pose is not a number; holding"]) {
+    assert.doesNotMatch(ofDevice(core, "keys"), /controller|grip|trigger|primary/);
+    assert.doesNotMatch(ofDevice(core, "touch"), /controller|grip|trigger|primary|\bG\b/);
+  }
   for (const key of ["stopped", "ready", "plan", "hold", "aim"]) assert.doesNotMatch(ofDevice(whyNothing("Enter", { up: true, controls: true, mode: key, gripped: false }), "touch"), /\bEnter\b.*press|\bpress R\b|\bG\b/);
 });
 
@@ -169,8 +173,10 @@ test("a notice lasts while aiming only as long as its cause", () => {
 });
 
 test("a key without effect has a reason, and one with an effect has none", () => {
-  const now = { up: true, controls: true, holder: "a", mode: "aim", gripped: false, offers: false };
+  const now = { up: true, controls: true, holder: "a", mode: "aim", gripped: false, offers: false, cameras: false };
   assert.equal(whyNothing("Enter", now), "");
+  assert.equal(whyNothing("KeyC", now), "No cameras are heard.");
+  assert.equal(whyNothing("KeyC", { ...now, cameras: true }), "");
   assert.equal(whyNothing("KeyX", { ...now, up: false }), "");
   assert.match(whyNothing("Enter", { ...now, controls: false, holder: "" }), /press “Take control” first/);
   assert.match(whyNothing("KeyG", { ...now, controls: false }), /Somebody else controls/);
@@ -187,7 +193,9 @@ test("letting go is asked only while something is pressed", () => {
   const state = { mode: "hold", keys: "let go of all keys for a moment", next: "let go of grips and triggers for a moment" };
   assert.match(uiText({ ...page, state, pressed: true }).next, /Let go of G/);
   assert.doesNotMatch(uiText({ ...page, state, pressed: false }).next, /let go/i);
-  assert.match(uiText({ ...page, state, device: "controllers" }).next, /grips and triggers/);
+  assert.match(uiText({ ...page, state, device: "controllers", pressed: true }).next, /grips and triggers/);
+  assert.doesNotMatch(uiText({ ...page, state, device: "controllers" }).next, /let go/i);
+  assert.match(uiText({ ...page, state, device: "touch", pressed: true }).next, /“Let it move”/);
 });
 
 test("the reason for lost control is what happened here of late", () => {
@@ -257,13 +265,26 @@ test("in a small window the robot is viewed in what the panels leave free", () =
   assert.deepEqual(freeArea(640, 360, rect(7, 7, 243, 143), rect(7, 310, 500, 43)), { left: 250, top: 0, width: 390, height: 310 });
 });
 
-test("a measured tip within the radius that its plan's preview stated is green and says so, one beyond it is vermilion", () => {
+test("a measured tip within the radius that its plan's preview stated is green and says so, one beyond is orange, beyond twice it vermilion", () => {
   const soon = { markers: [[0, 0, 0], null], tip: [0, 0, 0], apart: 0.0075, age: 0, rate: 120, loss: 0, fault: "", from_preview: null, radius: null, frame: "" };
   assert.equal(camerasText(soon), "1 of 2 bodies, 120 Hz; tip 7.5 mm from the twin’s");
-  const within = { ...soon, from_preview: 0.0042, radius: 0.0081 }, beyond = { ...within, from_preview: 0.0082 };
+  const within = { ...soon, from_preview: 0.0042, radius: 0.0081 }, beyond = { ...within, from_preview: 0.0082 }, far = { ...within, from_preview: 0.0163 };
   assert.match(camerasText(within), /twin’s, 4.2 mm from its preview’s end, within the 8.1 mm stated$/);
   assert.match(camerasText(beyond), /8.2 mm from its preview’s end, beyond the 8.1 mm stated$/);
-  assert.deepEqual([within, beyond].map(colourOf), [OFFER, WRONG]);
-  assert.ok(![OFFER, WRONG].includes(colourOf(soon)));
+  assert.match(camerasText(far), /16.3 mm from its preview’s end, far beyond the 8.1 mm stated$/);
+  assert.deepEqual([within, beyond, far].map(colourOf), [OFFER, TIP, WRONG]);
+  assert.ok(![OFFER, TIP, WRONG].includes(colourOf(soon)));
   assert.match(camerasText({ ...soon, frame: "frame as set" }), /from the twin’s; frame as set$/);
+});
+
+test("the label at a measured tip, and the arm, have the colour of how far the tip is from where its preview ends", (t) => {
+  const pen = { measureText: () => ({ width: 9 }), clearRect() {}, beginPath() {}, roundRect() {}, fill() {}, fillText(text) { this.written = [text, this.fillStyle]; } };
+  globalThis.document = { createElement: () => ({ getContext: () => pen }) };
+  t.after(() => delete globalThis.document);
+  const arm = new MeasuredArm(new Group()), message = { markers: [[0, 0, 0]], tip: [0, 0, 0.1], apart: 0.0075, fault: "", radius: 0.008 };
+  for (const [off, colour] of [[0.007, OFFER], [0.015, TIP], [0.017, WRONG]]) {
+    arm.receive({ ...message, from_preview: off }, 0);
+    assert.deepEqual(pen.written, ["7.5 mm", css(colour)]);
+    assert.equal(arm.material.color.getHex(), colour);
+  }
 });

@@ -109,7 +109,7 @@ def test_what_may_not_correct_itself_stays_and_says_why(monkeypatch):
 def test_a_tip_that_is_too_far_off_is_left_where_it_is():
     session, plan = arrived()
     far = replace(TARGETS, tip=Target((TARGET[0] - 0.1, *TARGET[1:])))
-    assert "expected at most 60 mm" in correct(session, plan, far)
+    assert "expected at most 30 mm" in correct(session, plan, far)
     assert len(session.planner.orders) == 0  # type: ignore[attr-defined]
 
 

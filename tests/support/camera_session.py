@@ -139,7 +139,7 @@ class CameraSession:
         core = Teleoperation(patient(silence=5.0), Everywhere(), PACKAGE, OFFSET)
         self.controller = SessionController(
             core, self.robot, InlinePreviewer(planning.answers), make_world(()), 0.1, self.log, 0.0, self.cameras,
-            CorrectionSettings(astray=30e-3),
+            CorrectionSettings(),
         )  # fmt: skip
         self.controller.begin(RATE)
         self.controller.control(BASE)

@@ -1,6 +1,9 @@
 """A picture of each state of a live session's page, for docs/live-sessions.md: docs/live-hold.png, ...
 
-    python -m tests.ar.session.pictures [PACKAGE] [--folder docs]
+    python -m tests.ar.session.pictures [PACKAGE] [--folder docs] [--cameras]
+
+With --cameras: of the measured arm once a plan has arrived, of a plan that may correct itself, and of cameras that have
+the last body elsewhere.
 
 The true server and its processes on the simulated robot; the committed page in a headless Chromium, by its buttons, its
 slider and its keys. Drawing is by software, and all share a processor. So page and robot may be silent for longer, the
@@ -19,16 +22,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
+import numpy as np
 from PIL import Image
 
 from qualification.browser import Page, browsing
 from trunkline.ar.preview.package import only_package
 from trunkline.ar.session import clock, controller, lease, robot_process
+from trunkline.ar.session.arm_cameras import ArmCameras
 from trunkline.ar.session.previewer import Answer, FollowRequest, Order, Previewer
 from trunkline.ar.session.serving import Address, opened
 from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.messages import Mode
+from trunkline.ar.tracking import tracking_process
 from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.config import PROJECT, load_folder
 
@@ -44,6 +50,7 @@ AIMED = (
 )
 LED = (("Digit1", {"ArrowLeft": 15}), ("Digit2", {"ArrowLeft": 15}))
 WATCHED, MOVED = 0.55, 0.5  # shares of the preview and of the mount's way, at which their pictures are taken
+ASTRAY = 0.5  # m, of the last body, where cameras have it elsewhere
 BACK = 0.05  # share by which the preview is taken back, as its slider reports only changes
 
 MODE = "document.querySelector('#mode').dataset.mode"
@@ -98,11 +105,11 @@ class Kept:
 
 
 class Camera:
-    """At a page. pictures: PNGs by state; they are made small later, as the server shares this thread."""
+    """At a page. pictures: PNGs by name; they are made small later, as the server shares this thread."""
 
     def __init__(self, page: Page) -> None:
         self.page = page
-        self.pictures: dict[Mode, bytes] = {}
+        self.pictures: dict[str, bytes] = {}
 
     async def until(self, expression: str, what: str) -> None:
         await self.page.until(expression, what, PATIENCE)
@@ -111,8 +118,8 @@ class Camera:
         first = await self.page.value("globalThis.drawn")
         await self.until(f"globalThis.drawn >= {first + frames}", "a picture of the page")
 
-    async def take(self, mode: Mode, when: str = CALM) -> None:
-        """In `mode`, while `when` is true.
+    async def take(self, mode: Mode, when: str = CALM, name: str = "") -> None:
+        """In `mode`, while `when` is true; `name` in place of the mode's.
 
         Raises:
             InputError: it is not reached, or over before its picture is taken.
@@ -124,7 +131,7 @@ class Camera:
             after = await self.page.value(MODE)
             if after != mode or time.monotonic() > end:
                 raise InputError(f"state {mode!r}: over before its picture was taken, the page is in {after!r}")
-        self.pictures[mode] = base64.b64decode(png)
+        self.pictures[name or mode] = base64.b64decode(png)
 
     async def move(self, steps: tuple[tuple[str, dict[str, int]], ...]) -> None:
         """Targets, by arrows."""
@@ -191,20 +198,65 @@ async def taken(camera: Camera, previewer: Kept) -> None:
     await camera.take("stopped", "trunkline.state.robot !== 'running'")
 
 
-async def session(package: Path) -> dict[Mode, bytes]:
-    """PNGs by state."""
+async def taken_of_cameras(camera: Camera, cameras: ArmCameras) -> None:
+    """The measured arm's pictures."""
+    message = "trunkline.measured.message"
+    sound = f"{message} && !{message}.fault"
+    await arrive(camera)
+    await camera.until(sound, "the measured arm")
+    await aim(camera)
+    await camera.until(f"{SETTLED} && {CALM}", "both targets")
+    await camera.page.key("Enter")
+    await camera.until(f"{MODE} === 'ready'", "state 'ready'")
+    await camera.page.key("KeyG", "rawKeyDown")
+    await camera.drawn()
+    await camera.page.key("Enter")
+    there = f"trunkline.state.robot === 'done' && {sound} && {message}.radius !== null"
+    await camera.until(there, "a tip that has arrived")
+    await camera.page.key("KeyG", "keyUp")
+    await camera.take("aim", there, "measured")
+    await camera.page.key("KeyC")
+    await camera.until("document.querySelector('#correct').ariaPressed === 'true'", "a correction that is asked for")
+    await camera.move(LED)
+    await camera.until(f"{SETTLED} && {sound}", "both targets")
+    await camera.page.key("Enter")
+    await camera.until("Boolean(trunkline.planned)", "a plan")
+    if not await camera.page.value("Boolean(trunkline.planned.correction)"):
+        raise InputError(f"correction: {await camera.page.value('trunkline.planned.uncorrected')}")
+    await camera.take("ready", f"trunkline.measured.bounds.visible && {sound}", "correcting")
+    show = cameras.show
+
+    def astray(bodies: np.ndarray) -> None:
+        moved = bodies.copy()
+        moved[cameras._rows[-1], 0] += ASTRAY
+        show(moved)
+
+    cameras.show = astray
+    await camera.take("ready", f"{message}?.fault", "astray")
+
+
+async def session(package: Path, cameras: str) -> dict[str, bytes]:
+    """PNGs by name."""
     config, teleop = load_folder(SessionConfig, PROJECT / "conf/live"), load_folder(Teleop, PROJECT / "conf/teleop")
     safety = replace(teleop.core.safety, silence=SILENCE, plan_wait=PATIENCE)
     teleop = replace(teleop, core=replace(teleop.core, safety=safety))
     lease.LEASE_TIMEOUT = controller.UNDRAWN = clock.LATEST = SILENCE
-    robot_process.STALE = STALE
+    robot_process.STALE, tracking_process.STALE = STALE, SILENCE
     with tempfile.TemporaryDirectory() as logs:
-        config = replace(config, journal=replace(config.journal, folder=logs))
-        async with opened(package, ADDRESS, lambda line: None, config=config, teleop=teleop) as (server, made):
-            previewer = made.controller.previewer = Kept(made.controller.previewer)
+        limits = replace(config.cameras.limits, silence=SILENCE, age=SILENCE)
+        arm_cameras = replace(config.cameras, limits=limits)
+        config = replace(config, journal=replace(config.journal, folder=logs), cameras=arm_cameras)
+        async with opened(
+            package, ADDRESS, lambda line: None, config=config, teleop=teleop, cameras=cameras
+        ) as opening:
+            server, made = opening
             async with browsing(f"{ADDRESS.url}/#token={server.composition.token}", SIZE, YIELDS) as page:
                 camera = Camera(page)
-                await taken(camera, previewer)
+                if made.cameras is not None:
+                    await taken_of_cameras(camera, made.cameras)
+                else:
+                    previewer = made.controller.previewer = Kept(made.controller.previewer)
+                    await taken(camera, previewer)
     return camera.pictures
 
 
@@ -213,13 +265,14 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("package", nargs="?", type=Path)
     parser.add_argument("--folder", type=Path, default=PROJECT / "docs")
+    parser.add_argument("--cameras", action="store_const", const="simulated", default="")
     args = parser.parse_args(arguments)
-    pictures = asyncio.run(session(args.package or only_package()))
-    missing = [mode for mode in get_args(Mode) if mode not in pictures]
+    pictures = asyncio.run(session(args.package or only_package(), args.cameras))
+    missing = [] if args.cameras else [mode for mode in get_args(Mode) if mode not in pictures]
     if missing:
         raise InputError(f"states: found no picture of {', '.join(missing)}, expected one of each")
-    for mode, png in pictures.items():
-        path = args.folder / f"live-{mode}.png"
+    for name, png in pictures.items():
+        path = args.folder / f"live-{name}.png"
         picture = Image.open(io.BytesIO(png)).convert("RGB")
         picture.quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
         print(f"{path}: {path.stat().st_size / 1000:.0f} kB")

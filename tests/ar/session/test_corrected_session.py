@@ -103,7 +103,7 @@ def test_the_tip_of_an_arm_that_is_not_as_its_twin_is_corrected_by_cameras(monke
         core = Teleoperation(patient(silence=5.0), Everywhere(), PACKAGE, OFFSET)
         controller = SessionController(
             core, robot, InlinePreviewer(planning.answers), make_world(()), 0.1, log, 0.0, cameras,
-            CorrectionSettings(astray=30e-3),
+            CorrectionSettings(),
         )  # fmt: skip
         controller.control(BASE)
         operator = Operator(controller)

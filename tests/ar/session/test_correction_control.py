@@ -40,7 +40,7 @@ from trunkline.ar.teleop.messages import ExecutorReport, Target, Targets, WorldO
 from trunkline.ar.teleop.plan import CorrectionBounds, Plan
 
 OFF = np.array([5.1e-3, 0.0, 0.0])  # m, of the tip from its target as the plan arrives
-SETTINGS = CorrectionSettings(astray=30e-3)
+SETTINGS = CorrectionSettings()
 BOUNDS = CorrectionBounds((0.0, 0.0, 0.0), 5, 5e-3, 30e-3)
 RAMP = 0.4  # s of a step
 

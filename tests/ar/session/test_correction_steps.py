@@ -31,7 +31,7 @@ from trunkline.model.statics.chain import read_chain
 from trunkline.model.statics.equilibria import actuated
 from trunkline.twin.discrepancy import Discrepancy, Lacking
 
-SETTINGS = CorrectionSettings(astray=30e-3)
+SETTINGS = CorrectionSettings()
 WORLD = make_world(())
 CHAIN = read_chain(small_spec().compile()).smooth
 PLANNER = replace(made().planner, chain=CHAIN)

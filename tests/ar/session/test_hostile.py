@@ -15,6 +15,7 @@ from tests.support.live import TOKEN, Hands, Laid, controlling, hand, laid
 from trunkline.ar.session import connections
 from trunkline.ar.session.auth import HEADERS, Origins
 from trunkline.ar.session.serving import Address, listening
+from trunkline.ar.session.tls import make_certificate, tls_context
 
 
 @pytest.mark.realtime
@@ -412,13 +413,16 @@ def test_of_too_many_idle_connections_the_oldest_go(monkeypatch):
     monkeypatch.setattr(connections, "MOST", 2)
 
     class Transport:
-        closed, left = False, 0
+        closed, left, address = False, 0, "10.0.0.1"
 
         def abort(self):
             self.closed = True
 
         def get_write_buffer_size(self):
             return self.left
+
+        def get_extra_info(self, name):
+            return (self.address, id(self))
 
     idle, each = connections.IdleConnections(), [Transport() for _ in range(5)]
     idle.busy.add(each[0])
@@ -427,3 +431,25 @@ def test_of_too_many_idle_connections_the_oldest_go(monkeypatch):
     assert idle.close(each, 1.0) == 1
     assert [transport.closed for transport in each] == [False, False, True, False, False]
     assert idle.close([each[0], each[1], each[3], each[4]], 1.0 + connections.LONGEST) == 2
+    lone, flood = Transport(), [Transport() for _ in range(3)]
+    lone.address = "10.0.0.2"  # came first, and is from elsewhere
+    idle = connections.IdleConnections()
+    idle.close([lone], 0.0)
+    assert idle.close([lone, *flood], 1.0) == 2
+    assert [transport.closed for transport in (lone, *flood)] == [False, True, True, False]
+
+
+@pytest.mark.realtime
+def test_half_a_tls_handshake_is_closed_within_five_seconds():
+    assert connections.HANDSHAKE + connections.LONGEST + connections.EVERY <= 5.0
+
+    async def session():
+        here = Laid(unused_port())
+        port, context = int(here.url.rpartition(":")[2]), tls_context(*make_certificate(["127.0.0.1"]))
+        async with listening(here.server, Address(port, context=context)):
+            reader, writer = await asyncio.open_connection("127.0.0.1", port)
+            writer.write(b"\x16\x03\x01\x02\x00\x01")  # the head of a client's hello, and no more
+            assert await asyncio.wait_for(reader.read(), 5.0) == b""
+            writer.close()
+
+    asyncio.run(session())

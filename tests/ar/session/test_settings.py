@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from trunkline.ar.correction.correction import CorrectionSettings
 from trunkline.ar.session.settings import read_session_config
 from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT
@@ -23,6 +24,10 @@ def test_keys_of_the_release_before_are_read_and_named(tmp_path, capsys):
         f"{tmp_path}: `{old}` is called `{new}` now: please rename it, the next release reads `{new}` alone\n"
         for old, new in (("boxes", "obstacles"), ("thing", "object"))
     )
+
+
+def test_corrections_have_the_same_bounds_in_a_session_as_where_they_are_scored():
+    assert read_session_config().correction == CorrectionSettings()
 
 
 def test_a_key_under_both_names_is_refused(tmp_path):

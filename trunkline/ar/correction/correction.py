@@ -51,7 +51,7 @@ class CorrectionSettings:
     steps: Annotated[int, Field(ge=1, le=20)] = 5
     longest: Metres = 5e-3
     steepest: Annotated[float, Field(gt=0, le=1000)] = 15.0
-    astray: Metres = 60e-3
+    astray: Metres = 30e-3
     misplaced: Metres = 5e-3
 
 

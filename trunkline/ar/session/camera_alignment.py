@@ -76,7 +76,7 @@ class CameraAlignment:
 
     def observe(self, robot: RobotState, arm: MeasuredArm) -> CamerasAligned | None:
         """What the robot does and cameras see now; the alignment, where another place of the mount has come to it."""
-        joints = robot.measured if robot.measured is not None and np.isfinite(robot.measured).all() else robot.joints
+        joints = robot.joints_now
         if not np.abs(joints - self._joints).max() <= STILL or arm.fault or arm.mount is None:
             self._joints, self._since, self._looks, self._seconds = joints, robot.time, [], []
             self._looked = False

@@ -1,15 +1,26 @@
 """Connections that ask for nothing: none is kept for long, and there are never many of them.
 
-aiohttp waits without an end for a request that was begun. A connection counts from when it opened, or from its last
-answer; what a handler is busy with, a session's socket above all, does not count.
+aiohttp waits without an end for a request that was begun. A connection counts from when it opened, by TLS from the end
+of its handshake, or from its last answer; what a handler is busy with, a session's socket above all, does not count.
 """
 
 import asyncio
-from collections.abc import Callable, Iterable
+from collections import Counter
+from collections.abc import Callable, Hashable, Iterable, Mapping
+from typing import TypeVar
 
-LONGEST = 5.0  # s without a request, a TLS handshake included
-MOST = 128  # of them at a time, beyond which the oldest goes
+HANDSHAKE = 2.0  # s for that of TLS
+LONGEST = 2.5  # s without a request after it; with it and EVERY none lasts for more than 5 s
+MOST = 128  # of them at a time, beyond which the oldest of the address with the most goes
 EVERY = 0.5  # s between looks
+Connection = TypeVar("Connection")
+
+
+def crowding(waiting: Mapping[Connection, Hashable]) -> Connection:
+    """Which of those that wait, the oldest first, each with its address, goes where they are too many: the first of the
+    address with the most, so that one that floods keeps nobody else out."""
+    counts = Counter(waiting.values())
+    return max(waiting, key=lambda connection: counts[waiting[connection]])
 
 
 class IdleConnections:
@@ -23,9 +34,13 @@ class IdleConnections:
         """Close those of the open `transports` that are idle for too long, or too many; how many."""
         idle = [t for t in transports if t is not None and t not in self.busy and not t.get_write_buffer_size()]
         self._since = {transport: self._since.get(transport, now) for transport in idle}
-        late = [transport for transport in idle if now - self._since[transport] >= LONGEST]
-        rest = sorted(set(idle) - set(late), key=lambda transport: self._since[transport])
-        closed = late + rest[: max(len(rest) - MOST, 0)]
+        closed = [transport for transport in idle if now - self._since[transport] >= LONGEST]
+        waiting = {transport: _address(transport) for transport in sorted(idle, key=lambda t: self._since[t])}
+        for transport in closed:
+            del waiting[transport]
+        while len(waiting) > MOST:
+            closed.append(crowding(waiting))
+            del waiting[closed[-1]]
         for transport in closed:
             transport.abort()
         return len(closed)
@@ -35,3 +50,9 @@ class IdleConnections:
         while True:
             await asyncio.sleep(EVERY)
             self.close(transports(), asyncio.get_running_loop().time())
+
+
+def _address(transport: asyncio.Transport) -> Hashable:
+    """The other end's, without its port."""
+    peer = transport.get_extra_info("peername")
+    return peer[0] if peer else None

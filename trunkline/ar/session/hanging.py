@@ -39,7 +39,7 @@ class HangingWatch:
         if self._over or self._joints is not None or arm.stamp <= self._stamp:
             return
         self._stamp = arm.stamp
-        joints = robot.measured if robot.measured is not None and np.isfinite(robot.measured).all() else robot.joints
+        joints = robot.joints_now
         upright = base_frames(joints, self._mount_offset)[1][2, 2] >= UPRIGHT
         slack = (robot.commands >= self._straight - PULLED).all()
         if arm.fault or arm.mount is None or not upright or not slack:

@@ -101,6 +101,11 @@ class RobotState:
     lengths: np.ndarray | None = None
     hangs: np.ndarray | None = None
 
+    @property
+    def joints_now(self) -> np.ndarray:
+        """As measured where all of them are, else as they are sent: (7,), rad."""
+        return self.joints if self.measured is None or not np.isfinite(self.measured).all() else self.measured
+
 
 class RobotProcess:
     """An `Executor` whose robot is another process, `run(channel, *setup)`."""

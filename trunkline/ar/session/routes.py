@@ -50,6 +50,8 @@ class Routes:
             self.idle.busy.add(transport)
             response = await handler(request)
         except web.HTTPException as error:
+            if error.status != web.HTTPNotFound.status_code:  # browsers ask for icons
+                self._log(f"refused {request.remote}: {request.method} {request.path}: {error.status} {error.reason}")
             return web.Response(status=error.status, text=f"error: {error.reason}\n", headers=HEADERS)
         except Exception as error:
             self._log(f"error: {request.remote} {request.path}: {type(error).__name__}: {error}")

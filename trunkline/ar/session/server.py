@@ -21,7 +21,7 @@ from trunkline.ar.session.auth import HEADERS, Origins, PairingCode, make_token,
 from trunkline.ar.session.broadcast import Broadcast, piece
 from trunkline.ar.session.camera_alignment import CamerasAligned, camera_mark
 from trunkline.ar.session.client import PER_SECOND, Client, end
-from trunkline.ar.session.connections import IdleConnections
+from trunkline.ar.session.connections import IdleConnections, crowding
 from trunkline.ar.session.controller import SessionController
 from trunkline.ar.session.controller_input import controller_pose
 from trunkline.ar.session.gc_policy import GCPolicy
@@ -38,7 +38,7 @@ HELLO = 3.0  # s for the first message
 LARGEST = 64 * 1024  # bytes of a message
 FLOOD = 4000.0  # messages of a client beyond its rate that end it
 MOST_CLIENTS = 64  # and one more, for a stop
-MOST_WAITING = 16  # connections before their hello; of more, the oldest goes
+MOST_WAITING = 16  # connections before their hello; of more, the oldest of the address with the most goes
 FULL = f"server: more than {MOST_CLIENTS} clients; this one may stop the robot, and watch"
 HEARTBEAT = 20.0  # s
 PARTING = 1.0  # s that a client has to say that it goes, as the session ends
@@ -74,7 +74,7 @@ class Server:
         self.clients: dict[str, Client] = {}
         self._ids: dict[str, str] = {}  # by key, of clients that are here or may come again
         self._procedures: dict[str, AlignmentProcedure] = {}  # by key, likewise
-        self._waiting: list[web.WebSocketResponse] = []
+        self._waiting: dict[web.WebSocketResponse, str | None] = {}  # each with its address
         self.broadcast = Broadcast(composition.controller, composition.shells)
         self._routes = Routes(
             composition.origins, composition.token, composition.scene, composition.page, composition.log,
@@ -106,9 +106,11 @@ class Server:
         socket = web.WebSocketResponse(max_msg_size=LARGEST, compress=False, heartbeat=HEARTBEAT)
         socket.headers.update(HEADERS)
         await socket.prepare(request)
-        self._waiting.append(socket)
+        self._waiting[socket] = request.remote
         if len(self._waiting) > MOST_WAITING:
-            asyncio.create_task(end(self._waiting.pop(0), "server: too many connections that say nothing"))
+            crowd = crowding(self._waiting)
+            del self._waiting[crowd]
+            asyncio.create_task(end(crowd, "server: too many connections that say nothing"))
         try:
             client = await self._welcome(socket)
         except InputError as error:
@@ -116,8 +118,7 @@ class Server:
             await end(socket, str(error))
             return socket
         finally:
-            if socket in self._waiting:
-                self._waiting.remove(socket)
+            self._waiting.pop(socket, None)
         tasks = [asyncio.create_task(work) for work in (client.send(), client.ping(self.now))]
         try:
             await self._hear(client)

@@ -20,7 +20,7 @@ from trunkline.ar.drivers.settings import read_execution_config
 from trunkline.ar.session.anchors import Anchors
 from trunkline.ar.session.auth import CODE_SECONDS, HEADERS, Origins, make_token
 from trunkline.ar.session.composition import SessionParts, make
-from trunkline.ar.session.connections import LONGEST
+from trunkline.ar.session.connections import HANDSHAKE
 from trunkline.ar.session.hardware import Hardware, hardware_of
 from trunkline.ar.session.measured_session import write_session
 from trunkline.ar.session.server import PARTING, Composition, Server
@@ -70,7 +70,7 @@ async def listening(server: Server, address: Address) -> AsyncIterator[None]:
     handlers = runner.server
     assert handlers is not None, "it is set up"
     watch = asyncio.create_task(server.idle.watch(lambda: [handler.transport for handler in handlers.connections]))
-    handshake = LONGEST if address.context is not None else None
+    handshake = HANDSHAKE if address.context is not None else None
     listener = None
     try:
         try:
