@@ -8,6 +8,8 @@ it is there. Stopped, the study goes on from there. Progress goes to stderr.
 """
 
 import argparse
+import contextlib
+import importlib
 import os
 import re
 import sys
@@ -16,13 +18,13 @@ from pathlib import Path
 
 from omegaconf import OmegaConf
 
-from studies.recovery import run
 from studies.rows import Rows, digest
 from tests.support.folders import CASES
 from tests.support.outside import COMMON, OUTCOMES, bench, outcome
 from trunkline.errors import InputError, in_one_line
 from trunkline.identification.evaluation.error_tables import number
 from trunkline.identification.stages import stated_interval
+from trunkline.pipeline.stage import run_stage
 from trunkline.recordings.preparation.motive import main as import_motive
 from upkeep.truth_table import identified
 
@@ -55,24 +57,30 @@ def about(case: str) -> list[str]:
 
 def fit(case: str, params: str) -> str:
     """What the stages tell of the arm, each parameter with its interval, beside what is right."""
-    with tempfile.TemporaryDirectory() as name:
+    with tempfile.TemporaryDirectory() as name, contextlib.redirect_stdout(sys.stderr):
         folder = bench(Path(name), case, params)
         if exports := sorted(CASES.glob(f"{case}/*.csv")):
             (folder / "data/raw" / case).unlink()
             import_motive(["--session", str(folder / "data/raw" / case), *map(str, exports)])
-        settings = OmegaConf.load(folder / "params.yaml")
-        stages = sorted((str(stage) for stage in settings), key=lambda stage: stage != "build_mjcf")
-        for stage in stages:
-            try:
-                run(f"stages.{stage}", folder)
-            except InputError:
-                return f"refused by {stage}"
+        stages = map(str, OmegaConf.load(folder / "params.yaml"))
+        with contextlib.chdir(folder):
+            for stage in sorted(stages, key=lambda stage: stage != "build_mjcf"):
+                try:
+                    run(stage)
+                except SystemExit:
+                    return f"refused by {stage}"
         words = []
         for parameter, row in identified(folder).items():
             low, high = stated_interval(row) or (None, None)
             interval = "not determined" if row["undetermined"] else f"{number(low, 3)} … {number(high, 3)}"
             words.append(f"{parameter} {number(row['value'], 4)} ({interval}; right {TRUTH[parameter]:g})")
         return ", ".join(words)
+
+
+def run(stage: str) -> None:
+    """A stage, in this process; it ends with SystemExit where it refuses, having said why."""
+    module = importlib.import_module(f"stages.{stage}")
+    run_stage(stage, module.Config, module.main)
 
 
 def cell(words: str) -> str:

@@ -249,7 +249,8 @@ def _built(path: Path, scratch: Path) -> str:
         models.mkdir(parents=True, exist_ok=True)
         shutil.copy(path, models)
         try:
-            build(BuildConfig(FromFile("mjcf", path.name), Joints(), GuideHoles(), ACTUATION, SOLVER))
+            build(BuildConfig(arm=FromFile("mjcf", path.name), joints=Joints(), holes=GuideHoles(), actuation=ACTUATION,
+                              solver=SOLVER))  # fmt: skip
         except InputError as error:
             return str(error).rpartition(".xml: ")[2]
     return "taken"
