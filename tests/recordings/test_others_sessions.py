@@ -108,9 +108,9 @@ RIGHT = {
 
 @pytest.mark.parametrize("case", RIGHT)
 def test_what_becomes_of_a_case_is_right_or_said(case, tmp_path):
-    """Where `describe` and `build_mjcf` differ, or where there is a word more of an honest session, the text does."""
     words = outcome(case, tmp_path)
     assert re.fullmatch(RIGHT[case], words), words
+    assert "by build_mjcf" not in words, "it takes what `describe` refuses, or the other way about"
     assert "\n" not in words
 
 
