@@ -61,6 +61,24 @@ def test_every_exchange_of_tendons_shows_in_the_curls_that_it_changes(model, cur
         assert refused(with_columns(trial, list(columns)), model) == (named != pulled), trial.name
 
 
+def mirrored(trial, axis):
+    """As in a left-handed frame: one axis of positions, attitudes and gravity alike points the other way."""
+    mirror = np.ones(3)
+    mirror[axis] = -1
+    quaternions = trial.quaternions * [1, *(-mirror)]
+    return replace(trial, positions=trial.positions * mirror, quaternions=quaternions, gravity=trial.gravity * mirror)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_left_handed_frame_shows_by_the_sides_of_tendons(model, curls, static_pulls, axis):
+    """Mirrored in x or y, an arm that hangs looks like another that hangs: only what pulls it has a side."""
+    moved = [motion(model, seed=seed, reach_mm=80, noise=3e-4) for seed in range(2)]
+    assert not refused(mirrored(tilt(model, 60), axis), model)
+    for trials in (curls, static_pulls, moved):
+        with pytest.raises(InputError, match=r"tendons: trial .* is the base body turned .* or the frame left-handed"):
+            check_trials([mirrored(trial, axis) for trial in trials], model)
+
+
 @pytest.fixture(scope="module")
 def static_pulls(model):
     pulls = ([30, -300, -300], [5, 30, -300], [30, -15, -15])

@@ -277,6 +277,21 @@ def test_an_input_that_was_heard_before_does_not_count(stamp, counts):
     assert controller.hear(*received(max(stamp, 1.0))) != ""  # nor a tick later
 
 
+@pytest.mark.parametrize("clock", [2371.98, 3.2])
+def test_passing_control_says_nothing_of_how_far_the_two_clocks_are_apart(clock):
+    """Each client stamps by a clock of its own: the core's goes on, and what is refused is said by the sender's."""
+    controller, notices = controller_of(ToldRobot()), []
+    for begin in (100.0, clock):
+        controller.control(BASE)
+        for number in range(40):
+            assert controller.hear(*received(begin + number * DT)) == ""
+            notices.append(controller.tick(DT).notice)
+        assert controller.state.stamp == pytest.approx(100 + 39 * DT, abs=1.0)
+    assert not [notice for notice in notices if "silent" in notice or "2271" in notice or " s" in notice]
+    again = controller.hear(*received(clock))
+    assert again == f"input: stamp {clock:.6g} s is not after {clock + 39 * DT:.6g} s: heard before"
+
+
 def test_of_more_inputs_than_a_tick_takes_the_oldest_are_left_out():
     controller = controller_of(ToldRobot())
     for number in range(MOST_INPUTS + 3):

@@ -100,12 +100,26 @@ def test_attitudes_that_contradict_positions_are_refused(tmp_path, change, remed
         checked(spoilt(tmp_path, change), None)
 
 
+def mirrored(axis: int):
+    """A change to a left-handed frame, quaternions likewise."""
+    mirror = np.ones(3)
+    mirror[axis] = -1
+    return lambda p, q: (p * mirror, q * [1, *(-mirror)])
+
+
 def test_a_left_handed_frame_is_refused(tmp_path):
-    """Mirrored along z, quaternions likewise."""
-    mirror = (1, 1, -1)
-    turn = np.array([1, *(np.prod(mirror) * np.array(mirror))])
     with pytest.raises(InputError, match="is the frame left-handed, or are its axes not the arm's"):
-        checked(spoilt(tmp_path, lambda p, q: (p * mirror, q * turn)))
+        checked(spoilt(tmp_path, mirrored(2)))
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_frame_that_is_mirrored_across_the_arm_gets_no_wrong_advice(tmp_path, axis):
+    """Without tendons it is as good as another arm that hangs; with them, their sides tell
+    (tests/identification/test_checks.py)."""
+    gathered = checked(spoilt(tmp_path, mirrored(axis)))
+    assert gathered.refused == {}
+    assert said_of_up(gathered) == ""
+    assert not any("attitudes" in line or "base" in line for each in gathered.findings for line in each.warnings)
 
 
 def test_a_base_of_other_axes_is_refused(tmp_path):

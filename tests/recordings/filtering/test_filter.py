@@ -1,6 +1,9 @@
 """The filter stage against the truth: poses, tilt, commands and the moment of release."""
 
+import contextlib
 import json
+import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,8 +13,10 @@ from stages import filter as filter_stage
 from stages import ingest
 from tests.support.sessions import CURL_BEGIN, RELEASE, all_truths
 from tests.support.workbench import workbench
+from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base, rotation_from_wxyz
 from trunkline.pipeline.stage import run_stage
+from trunkline.recordings.filtering.filter import Filter, _check_within, _marker
 from trunkline.recordings.trials.splits import SPLITS
 from trunkline.recordings.trials.trial import read_trials
 
@@ -107,6 +112,31 @@ def test_orientation_noise_is_reduced(results):
     ]
     spread = [np.sqrt(np.mean((r.mean().inv() * r).magnitude() ** 2) / 3) for r in rotations]
     assert np.degrees(np.median(spread)) < 0.3 * 0.7
+
+
+@pytest.mark.parametrize(("beyond", "refused"), [(54.9, False), (55.1, True)])
+def test_filtered_positions_beyond_all_measured_ones_are_refused_from_half_their_way_on(beyond, refused):
+    """And 5 mm: here 55 mm."""
+    time = np.arange(200) / 100
+    samples = 0.05 * np.sin(2 * np.pi * time)[:, None] * [1.0, 0.0, 0.0]
+    filtered = samples.copy()
+    filtered[120, 2] = -1e-3 * beyond
+    far = f"filtered positions are {beyond} mm beyond all measured ones at 1.20 s, expected at most 55 mm"
+    message = re.escape(f"trial swing: 'tip': {far}: are its times right?")
+    with pytest.raises(InputError, match=message) if refused else contextlib.nullcontext():
+        _check_within(time, filtered, samples, "trial swing: 'tip'")
+
+
+def test_a_curve_that_leaves_what_was_measured_is_refused_only_where_it_is_trusted():
+    """Unseen for a second on its way up, and seen again on its way down: a smooth curve goes far beyond."""
+    time = np.delete(np.arange(300) / 100, slice(100, 200))
+    swing = 0.02 * np.sin(6 * np.pi * time) * np.where(time < 1, 1, -1)
+    samples, grid = swing[:, None] * [1.0, 0.0, 0.0], np.arange(300) / 100
+    trusting = Filter(rate=100, cutoff=20, order=4, longest_bridge=2, outlier_deviations=1000, release="onset")
+    with pytest.raises(InputError, match=r"swing: filtered positions are [\d.]+ mm beyond .* expected at most 25 mm"):
+        _marker(time, samples, grid, trusting, "trial swing")
+    filtered = _marker(time, samples, grid, replace(trusting, longest_bridge=0.06), "trial swing")
+    assert np.abs(filtered.columns[filtered.measured]).max() < 0.025
 
 
 def test_cutoff_beyond_the_nyquist_rate_is_one_line(tmp_path, monkeypatch, capsys):

@@ -21,6 +21,8 @@ from trunkline.tools.describe.__main__ import main
 from trunkline.tools.describe.drawing import read_drawing
 from trunkline.tools.describe.words import doubt_lines, marker_lines, tendon_lines, unit_lines
 
+LINKS = (ROOT / "conf/build_mjcf/mjcf/four_links.xml").read_text()
+
 
 def session(kinds: list[str], **changes) -> Session:
     trials = [{"file": f"{kind}.mcap", "experiment": kind, "split": "identify"} for kind in kinds]
@@ -91,6 +93,38 @@ def test_what_is_hardly_meant_is_noted():
     ]
 
 
+RADIANS = "are ranges in radians, and read as degrees? Expected the unit of compiler.angle"
+DEGREES = "are ranges in degrees, and read as radians? Expected the unit of compiler.angle"
+
+
+@pytest.mark.parametrize(
+    ("angle", "range_", "note"),
+    [
+        ("degree", "-0.7 0.7", f"range: no joint bends by more than 0.7°, all together by 2.8°: {RADIANS}"),
+        ("degree", "-0.1 1.9", f"range: no joint bends by more than 1.9°, all together by 7.6°: {RADIANS}"),
+        ("degree", "-2.1 2.1", None),
+        ("radian", "-0.7 0.7", None),
+        ("radian", "-40 40", f"range: 'shoulder_pitch' bends by 2.29e+03°: {DEGREES}"),
+    ],
+)
+def test_ranges_in_another_unit_are_noted(tmp_path, angle, range_, note):
+    path = tmp_path / "links.xml"
+    text = LINKS.replace('angle="degree"', f'angle="{angle}"')
+    path.write_text(text.replace('range="-40 40"', f'range="{range_}"'))
+    assert [line for line in doubt_lines(read_drawing(path, ROOT), None) if "range" in line] == ([note] if note else [])
+
+
+def test_many_joints_that_bend_by_little_are_honest():
+    def noted(units):
+        slender = [replace(TWO[0], length=0.5, units=units)]
+        tendons = [Tendon(0.0), Tendon(120.0), Tendon(-120.0)]
+        described = arm(sections=slender, joint_range_deg=1.9, tendons=tendons, markers={})
+        model = described.build(ACTUATION, SOLVER, ROOT).spec.compile()
+        return any("radians" in line for line in doubt_lines(model, None))
+
+    assert (noted(40), noted(50)) == (True, False)
+
+
 def test_the_command_describes_a_file_and_draws_it(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main([str(ROOT / "conf/build_mjcf/arm/ftdcr.yaml")]) == 0
@@ -141,7 +175,6 @@ def test_keys_that_an_arm_lacks_are_told_at_once(tmp_path):
         assert key in message
 
 
-LINKS = (ROOT / "conf/build_mjcf/mjcf/four_links.xml").read_text()
 FAULTS = {
     "wind": ("<option ", '<option density="1.2" wind="8 0 0" ', "option wind: found 8 0 0, expected 0 0 0"),
     "gravity off": ("<worldbody>", '<option><flag gravity="disable"/></option><worldbody>', "found gravity disabled"),

@@ -13,6 +13,7 @@ from trunkline.recordings.trials.experiments import EXPERIMENTS
 WIDEST = 180.0  # deg between neighbouring tendons, from which on they cannot bend the arm to every side
 DENSEST = 11_340.0  # kg/m³, lead
 ALIKE = 1e-3  # share by which neighbouring units may differ and stand in one line
+NARROW, TOGETHER = 2.0, 90.0  # deg, of each joint and of all, below which they bend as if radians were read as degrees
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,8 @@ def marker_lines(model: mujoco.MjModel) -> list[str]:
 def doubt_lines(model: mujoco.MjModel, session: Session | None) -> list[str]:
     """What to know before any log is recorded, or of a session."""
     arm = ArmModel(model)
-    lines = [*_hardly_meant(model), "masses are as described: no log without a load tells them; weigh the arm"]
+    lines = [*_other_angles(model), *_hardly_meant(model)]
+    lines.append("masses are as described: no log without a load tells them; weigh the arm")
     angles = np.sort([_angle(model, cable) for cable in arm.cables])
     if len(angles):
         gaps = np.diff(np.append(angles, angles[0] + 360))
@@ -163,6 +165,21 @@ def _unknown(model: mujoco.MjModel, session: Session) -> list[str]:
             has = ", ".join(available[key]) or "none"
             lines.append(f"session.yaml: {key}: found {unknown[0]!r}, the arm has {has}")
     return lines
+
+
+def _other_angles(model: mujoco.MjModel) -> list[str]:
+    """Ranges of joints that look like another unit: radians read as degrees, or degrees read as radians."""
+    hinges = range(ArmModel(model).hinge_count)
+    bends = np.degrees(np.abs(model.jnt_range[hinges]).max(axis=1))
+    together = bends.sum() / 2  # half of the hinges bend the arm to either side
+    if model.jnt_limited[hinges].all() and bends.max() < NARROW and together < TOGETHER:
+        every = f"no joint bends by more than {bends.max():.2g}°, all together by {together:.3g}°"
+        return [f"range: {every}: are ranges in radians, and read as degrees? Expected the unit of compiler.angle"]
+    widest = int(bends.argmax())
+    if bends[widest] > 360:
+        wide = f"{model.joint(widest).name!r} bends by {bends[widest]:.3g}°"
+        return [f"range: {wide}: are ranges in degrees, and read as radians? Expected the unit of compiler.angle"]
+    return []
 
 
 def _hardly_meant(model: mujoco.MjModel) -> list[str]:
