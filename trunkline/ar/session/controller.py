@@ -20,6 +20,7 @@ from trunkline.ar.session.binary import MARKERS
 from trunkline.ar.session.camera_alignment import CameraAlignment, CamerasAligned
 from trunkline.ar.session.controller_input import NOWHERE
 from trunkline.ar.session.correction_control import CorrectionControl
+from trunkline.ar.session.correction_rests import MeasuredRest
 from trunkline.ar.session.correction_steps import CorrectionAnswer
 from trunkline.ar.session.follow import FollowControl
 from trunkline.ar.session.hanging import HangingWatch
@@ -134,7 +135,8 @@ class SessionController:
         self._stop, self._fault, self._shown_digest, self._since, self._believed = False, "", "", 0.0, ""
         self._requested, self._ordered, self._started, self._ran = 0, False, "", False
         self._logged: tuple = ()
-        self._follow = FollowControl(previewer.submit, robot.hear)
+        slow = (correction or CorrectionSettings()).slow
+        self._follow = FollowControl(previewer.submit, robot.hear, slow)
         self.cameras, self.arm = cameras, None
         self.camera_alignment, self.hanging = camera_alignment, hanging
         self.aligned: CamerasAligned | None = None  # the last that was computed
@@ -285,7 +287,7 @@ class SessionController:
             self._ask(intent, robot_state, hands.correct)
             self._follow.advance(dt / len(steps))
             if intent.mode == "follow":
-                self._follow.seek(intent.targets, robot_state.joints, self.world)
+                self._follow.seek(intent.targets, robot_state.joints, self.world, self._rests)
             else:
                 self._follow.end()
             self._drive(intent)
@@ -399,6 +401,11 @@ class SessionController:
             return f"cameras: {self.arm.fault}"
         return f"the arm would touch {targets.object}" if targets.object else ""
 
+    @property
+    def _rests(self) -> tuple[MeasuredRest, ...]:
+        """That corrections have measured, while the cameras' stream is sound."""
+        return tuple(self.correction.rests) if self.arm is not None and not self.arm.fault else ()
+
     def _ask(self, intent: Intent, robot_state: RobotState, correct: bool = False) -> None:
         request = intent.request
         if request is not None and request.serial != self._requested:
@@ -406,6 +413,7 @@ class SessionController:
                 pose = self.camera_alignment.take()  # here, as the robot rests and nothing is corrected
                 if pose is not None:
                     self.cameras.align(pose)
+                    self.correction.rests.clear()  # of the frame before
                     self._frame_by = self.aligned
             self._requested, self.report, self.plan, self.preview = request.serial, None, None, None
             self.prediction, self.pieces, self._shown_digest = None, [], ""
@@ -415,7 +423,7 @@ class SessionController:
             uncorrected = self.why_uncorrected(request.targets) if correct else ""
             asks = correct and not uncorrected
             self._bounds = self.correction.bounds(request.targets.tip.position) if asks else None
-            self.previewer.submit(Order(request, self.world, *here, self._bounds, uncorrected))
+            self.previewer.submit(Order(request, self.world, *here, self._bounds, uncorrected, self._rests))
         elif self._ordered and intent.mode in ("hold", "stopped", "aim", "execute"):
             self._ordered = False
             self.previewer.leave()
