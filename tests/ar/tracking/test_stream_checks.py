@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from trunkline.ar.tracking.stream_checks import LASTS, LOOKS, StreamChecks, StreamLimits
+from trunkline.ar.tracking.stream_checks import LASTS, LOOKS, StreamChecks, StreamLimits, along_arm
 from trunkline.ar.tracking.tracker import CameraFrame, ExpectedBodies
 from trunkline.errors import InputError
 from trunkline.recordings.cleaning.usual_distances import usual_distances
@@ -150,6 +150,19 @@ def test_without_usual_distances_what_positions_alone_show_is_still_noticed():
     checks, _ = run(lambda frame, _: with_body(frame, 3, frame.positions[5]), unknown)
     assert checks.fault.startswith("'marker_3': found poses exactly at the place of another body")
     assert run(off, unknown)[0].fault == ""
+
+
+def test_where_only_neighbors_distances_are_known_the_arm_reaches_as_far_as_all_of_them():
+    """The tip jumps by more than twice the way to the next body, and by less than twice the arm's length."""
+    beside = np.abs(np.subtract.outer(np.arange(7), np.arange(7))) == 1
+    np.testing.assert_allclose(along_arm(np.where(beside, USUAL, np.nan))[0], np.cumsum([0, *np.diagonal(USUAL, 1)]))
+    expected = replace(EXPECTED, distances=np.where(beside, USUAL, np.nan))
+
+    def away(metres):
+        return lambda frame, _: replace(frame, positions=frame.positions + [metres, 0.0, 0.0])
+
+    assert run(away(0.3), expected)[0].fault == ""
+    assert "farther away than the arm reaches" in run(away(1.0), expected)[0].fault
 
 
 def test_where_no_body_marks_the_base_distances_count_from_the_mount():

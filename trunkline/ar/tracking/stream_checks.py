@@ -26,6 +26,7 @@ from typing import Annotated
 
 import numpy as np
 from pydantic import Field
+from scipy.sparse.csgraph import csgraph_from_dense, shortest_path
 
 from trunkline.ar.tracking.tracker import CameraFrame, ExpectedBodies, TrackedPoses
 from trunkline.recordings.cleaning.invalid_samples import unmeasured
@@ -58,6 +59,12 @@ class StreamLimits:
     recovers: Annotated[float, Field(gt=0, le=60)] = 2.0
 
 
+def along_arm(distances: np.ndarray) -> np.ndarray:
+    """Distances (B, B), m, those that are NaN by way of other bodies: a session knows those of neighbors alone, and the
+    arm reaches as far as all of them together; infinite where no way leads."""
+    return shortest_path(csgraph_from_dense(distances, null_value=np.inf, nan_null=True), directed=False)
+
+
 class StreamChecks:
     """Of the frames of one stream."""
 
@@ -65,6 +72,7 @@ class StreamChecks:
         self._untrue = self._late = ""  # the first fault that persists, and the one of lateness that there is
         self._late_at = -math.inf  # s, when a frame was late last, or none came
         self._expected, self._limits = expected, limits
+        self._paths = None if expected.distances is None else along_arm(expected.distances)
         self._since: dict[tuple[str, str], float] = {}  # of objections, by rule and body
         self._dropped: dict[str, set[str]] = {}  # by rule, as of the last look at the window
         self._last: CameraFrame | None = None
@@ -216,6 +224,6 @@ class StreamChecks:
             swapped = swapped[len(swapped) - len(expected.names) :]
             others = " and ".join(repr(expected.names[body]) for body in np.flatnonzero(swapped))
             self._dropped["swap"] = self._drop(now, "swap", swapped, f"the labels {others} taken for each other,")
-        for flagged, words in unmeasured(places, expected.marked_base, expected.distances):
+        for flagged, words in unmeasured(places, expected.marked_base, self._paths):
             flagged = flagged[-1, places.shape[1] - len(expected.names) :]
             self._dropped[words] = self._drop(now, words, flagged, f"poses {words}")
