@@ -1,5 +1,6 @@
 """QTM as a source of poses, against a stand-in of its real-time server."""
 
+import re
 import threading
 import time
 from contextlib import contextmanager
@@ -122,7 +123,7 @@ def test_a_frame_of_other_bodies_and_the_end_of_the_connection_are_named():
     ("fault", "line"),
     [
         ("old", "expected both to grow"),
-        ("frozen", "expected noise"),
+        ("frozen", "only repeat the one before|to the last bit"),
         ("garbage", "QTM has ended the connection"),
     ],
 )
@@ -136,6 +137,6 @@ def test_a_tracker_says_the_newest_and_names_what_is_untrue(fault, line):
             np.testing.assert_allclose(poses.positions, PLACES[[2, 1]], atol=3e-3)
             begins.append(True)
             until(lambda: not tracker.latest().sound, seconds=30.0)
-            assert line in tracker.latest().fault
+            assert re.search(line, tracker.latest().fault), tracker.latest().fault
         finally:
             tracker.stop()
