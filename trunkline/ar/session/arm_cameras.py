@@ -43,8 +43,8 @@ class ArmCameraSettings:
     only neighbors no nearer to each other. natnet, ros, qualisys: where each system is. simulated: of the simulated
     robot's cameras, which need none of these but limits. mount: the arm's in the frame of the first body, m; None where
     no body is at the mount, as of a single one, and nothing shows then that the cameras' frame is elsewhere. markers:
-    what the arm's model calls the bodies, in the same order; none where it calls them as the system does. session: folder of logs
-    whose session.yaml says both, in its order; "" where `bodies` and `markers` do.
+    what the arm's model calls the bodies, in the same order; none where it calls them as the system does. session:
+    folder of logs whose session.yaml says both, in its order; "" where `bodies` and `markers` do.
     """
 
     bodies: Annotated[tuple[Annotated[str, Field(min_length=1, max_length=64)], ...], Field(max_length=100)]
