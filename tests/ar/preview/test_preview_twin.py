@@ -78,8 +78,8 @@ def test_poses_of_the_arm_move_the_tip_that_is_stated_and_not_its_radius():
     knows = replace(made, lacking=replace(LACKING, residual_map=everywhere(list(shift))))
     beyond = replace(knows, lacking=replace(knows.lacking, pull=0.0))  # plans take the shift there as well
     stated = []
-    for robot in (made, knows, beyond):
-        tip = robot.tip_uncertainty(trajectory, None)
+    for robot, session in ((made, None), (knows, None), (beyond, None), (made, everywhere(list(shift)))):
+        tip = robot.tip_uncertainty(trajectory, None, session)
         assert isinstance(tip, TipUnknown if robot is beyond else TipUncertainty)
         foreseen = preview(twin, trajectory, made.uncertainty, None, 2, tip=tip)
         stated.append(foreseen.stated)
@@ -90,6 +90,8 @@ def test_poses_of_the_arm_move_the_tip_that_is_stated_and_not_its_radius():
     np.testing.assert_allclose(stated[1].tips - stated[0].tips, np.tile(expected, (len(stated[0].tips), 1)), atol=1e-6)
     np.testing.assert_array_equal(stated[1].radii, stated[0].radii)
     np.testing.assert_array_equal(stated[2].tips, stated[1].tips)
+    np.testing.assert_array_equal(stated[3].tips, stated[1].tips)
+    np.testing.assert_array_equal(stated[3].radii, stated[0].radii)  # a few rests of one session make none surer
     assert len(stated[2].radii) == 0
 
 

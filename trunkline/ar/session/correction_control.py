@@ -4,6 +4,7 @@ Until it ends, the core hears that the plan still runs. So all that holds the ro
 grips let go, a stop, silence, a fault. What ends it leaves the robot where it is; nothing begins it anew.
 """
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -12,6 +13,7 @@ import numpy as np
 from trunkline.ar.correction.correction import CorrectionSettings
 from trunkline.ar.correction.rest import RestWatch
 from trunkline.ar.session.arm_cameras import MeasuredArm
+from trunkline.ar.session.correction_rests import MOST, MeasuredRest
 from trunkline.ar.session.correction_steps import CorrectionAnswer, CorrectionOrder
 from trunkline.ar.session.robot_process import RobotState
 from trunkline.ar.teleop.base_frames import base_frames
@@ -31,6 +33,7 @@ class CorrectionControl:
 
     Attributes:
         words: of the last correction or the one that goes on, in one line; "" where there is none.
+        rests: that corrections of the session have measured, where the stream and the mount's place were sound.
     """
 
     def __init__(
@@ -46,6 +49,7 @@ class CorrectionControl:
         self._unchecked = False  # that no body is at the mount has been told
         self._submit, self._start, self._stop, self._event = submit, start, stop, event
         self._serial = 0
+        self.rests: deque[MeasuredRest] = deque(maxlen=MOST)
         self.forget()
 
     def bounds(self, target: tuple[float, float, float]) -> CorrectionBounds:
@@ -199,6 +203,7 @@ class CorrectionControl:
             return self.end(reason)
         if self._errors[-1] > bounds.astray:
             return self.end(self._too_far(self._errors[-1]))
+        self.rests.append(MeasuredRest(self._plan.joints[-1], self._here, tip))
         self._phase, self._waited, self._answer = "asks", 0.0, None
         self.words = f"the tip is {1e3 * self._errors[-1]:.1f} mm off"
         self._submit(CorrectionOrder(

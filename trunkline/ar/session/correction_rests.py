@@ -1,0 +1,69 @@
+"""What corrections have measured, from which the next plan begins: rests at known commands, and where the tip was.
+
+By how far the tip rests beside the twin's is a Gaussian process (`trunkline/kinematics/residual/residual_map.py`), here
+conditioned on these rests as well. Far from them it tells nothing new, and plans are as before. What a preview states
+of how far the tip may be off stays the package's: a few rests of one session are no measure of that.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from trunkline.ar.teleop.base_frames import base_frames
+from trunkline.frames import STANDARD_GRAVITY
+from trunkline.kinematics.residual.residual_map import ResidualMap, RestingPoses
+from trunkline.model.statics.chain import Chain
+from trunkline.model.statics.equilibria import actuated
+
+MOST = 60  # rests, the newest: a plan is made with them within milliseconds
+DOWN = np.array([0.0, 0.0, -STANDARD_GRAVITY])  # m/s²
+
+
+@dataclass(frozen=True)
+class MeasuredRest:
+    """The robot rests at `joints` (7,), rad, and `commands` (K,), m, its tip measured at `tip` (3,), m, in its base."""
+
+    joints: np.ndarray
+    commands: np.ndarray
+    tip: np.ndarray
+
+
+def learnt_from(
+    rests: Sequence[MeasuredRest],
+    chain: Chain,
+    mount_offset: float,
+    before: ResidualMap | None,
+    lean: Rotation | None = None,
+) -> ResidualMap | None:
+    """What is learnt of the arm `before` these rests, and by them, beside a twin that leans on its mount by `lean`."""
+    if not rests:
+        return before
+    places, bases = base_frames(np.array([rest.joints for rest in rests]), mount_offset)
+    tips = np.einsum("nji,nj->ni", bases, np.array([rest.tip for rest in rests]) - places)
+    gravity = np.einsum("nji,j->ni", bases, DOWN)
+    return learnt_in_base(chain, np.array([rest.commands for rest in rests]), gravity, tips, before, lean)
+
+
+def learnt_in_base(
+    chain: Chain,
+    commands: np.ndarray,
+    gravity: np.ndarray,
+    tips: np.ndarray,
+    before: ResidualMap | None = None,
+    lean: Rotation | None = None,
+) -> ResidualMap | None:
+    """As `learnt_from`. Where the twin finds no rest, nothing is learnt.
+
+    Args:
+        commands: m (N, K). gravity: m/s², tips: measured, m, both in the arm's base frame. Shapes (N, 3).
+    """
+    lean = lean or Rotation.identity()
+    twin = actuated(chain.smooth, commands, lean.inv().apply(gravity))
+    residuals = tips - lean.apply(twin.position)
+    rested = twin.converged & np.isfinite(residuals).all(axis=1)
+    if not rested.any():
+        return before
+    poses, residuals = RestingPoses.of(chain, twin, gravity)[rested], residuals[rested]
+    return ResidualMap.supposed(poses, residuals, chain.length) if before is None else before.extended(poses, residuals)
