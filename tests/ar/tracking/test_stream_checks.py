@@ -165,6 +165,27 @@ def test_where_only_neighbors_distances_are_known_the_arm_reaches_as_far_as_all_
     assert "farther away than the arm reaches" in run(away(1.0), expected)[0].fault
 
 
+@pytest.mark.parametrize("order", [[0, 1, 2, 4, 3, 5, 6], [0, 1, 3, 4, 2, 5, 6]])
+@pytest.mark.parametrize("gap", [0, 3])
+def test_labels_that_are_exchanged_are_named_where_no_distances_are_known(order, gap):
+    """Also after a short gap; those that are put right within LASTS are none."""
+    wrong, unknown = np.flatnonzero(np.array(order) != np.arange(7)), ExpectedBodies(NAMES, True)
+
+    def exchanged(frame, _):
+        tracked = np.ones(7, bool) if frame.number >= BEGINS + gap else ~np.isin(np.arange(7), wrong)
+        return replace(frame, positions=frame.positions[order], quaternions=frame.quaternions[order], tracked=tracked)
+
+    checks, taken = run(exchanged, unknown)
+    words = " and ".join(f"'marker_{body}'" for body in wrong)
+    assert checks.fault == (
+        f"'marker_{wrong[0]}': found the labels {words} taken for each other, expected measured poses"
+    )
+    assert np.flatnonzero(np.isnan(taken[BEGINS + gap].positions[:, 0])).tolist() == wrong.tolist()
+    checks, taken = run(exchanged, unknown, until=BEGINS + gap + round(LASTS / STEP) - 1)
+    assert checks.fault == ""
+    assert np.isfinite(taken[-1].positions).all()
+
+
 def test_where_no_body_marks_the_base_distances_count_from_the_mount():
     mount, usual = places(0.0)[0], USUAL
     expected = ExpectedBodies(NAMES[1:], False, mount, usual)

@@ -11,7 +11,8 @@ are those by which `ingest` reads logs (`trunkline/recordings/cleaning/`):
 
 - no measurement: at the origin, at another body's place, farther than cameras see or the arm reaches (`unmeasured`);
 - stale: the same to the last bit as in the frame before (`stale_samples`);
-- exchanged labels (`find_label_swaps`), and a body that is elsewhere by its distances to its neighbors (`misplaced`);
+- exchanged labels (`find_label_swaps`; here also by bodies that are suddenly where others just were), and a body that
+  is elsewhere by its distances to its neighbors (`misplaced`);
 - no rotation (`is_rotation`).
 
 Of the stream alone: silence, frames that do not count up or whose stamps do not, and frames that come later than they
@@ -42,6 +43,8 @@ SEARCHES = (
     0.25  # s for which they are, once a body came nearer to where another was; a search takes longer than a frame
 )
 LASTS = 0.1  # s after which an objection is a fault; outliers last for a frame or two
+JUST = 0.1  # s since bodies were where labels are exchanged
+THERE = 0.3  # of the distance of two bodies, within which one is where the other was
 DRIFT = 2e-4  # by which clocks may differ in rate; quartzes differ by less
 AGE = "age"  # the rule that objects to frames that come late
 STREAM = ""  # in place of a body, for objections to the stream as a whole
@@ -80,6 +83,8 @@ class StreamChecks:
         self._counted: deque[tuple[float, int]] = deque()  # of the last second: when each frame came, and its number
         self._window: deque[np.ndarray] = deque(maxlen=WINDOW)
         self._search, self._places = math.inf, np.full((len(expected.names), 3), np.nan)  # from the first frame on
+        self._placed = np.full(len(expected.names), -np.inf)  # s, when each body was there
+        self._labels = np.arange(len(expected.names))  # of each label the body that has it
         usual = expected.distances
         self._least = math.inf if usual is None else limits.distance * float(np.nanmax(usual[0]))
         self._names = expected.names if expected.marked_base else ("base", *expected.names)  # as in `distances`
@@ -167,7 +172,8 @@ class StreamChecks:
         self._drop(now, "rotation", frame.tracked & ~rotation, "a NaN, zero or unnormalised quaternion,")
         positions[~(finite & rotation)] = np.nan
         self._window.append(positions.copy())
-        crossed = self._crossed(positions)
+        crossed = self._crossed(now, positions)
+        self._drop_exchanged(now, "exchanged", self._labels != np.arange(len(names)))
         if crossed or self._search == math.inf:
             self._search = now + SEARCHES
         if crossed or now - self._looked >= LOOKS:
@@ -194,18 +200,35 @@ class StreamChecks:
         bodies = {
             self._names[body]: text for body, text in misplaced(distances, usual, self._names, self._least).items()
         }
-        swapped = self._dropped.get("swap", set())
+        swapped = self._dropped.get("swap", set()) | self._dropped["exchanged"]
         self._object(now, "misplaced", {name: bodies[name] for name in bodies if name not in swapped})
         return set(bodies) & set(self._expected.names)
 
-    def _crossed(self, positions: np.ndarray) -> bool:
+    def _drop_exchanged(self, now: float, rule: str, exchanged: np.ndarray) -> None:
+        """Labels (B,) that are on other bodies."""
+        others = " and ".join(repr(self._expected.names[body]) for body in np.flatnonzero(exchanged))
+        self._dropped[rule] = self._drop(now, rule, exchanged, f"the labels {others} taken for each other,")
+
+    def _crossed(self, now: float, positions: np.ndarray) -> bool:
         """Whether a body (B, 3) m is nearer to where another was last than to where it was itself."""
         apart = np.linalg.norm(positions[:, None] - self._places, axis=-1)
+        self._relabel(now, apart)
         both = np.isfinite(np.diagonal(apart))
         nearest = np.argmin(np.where(np.isfinite(apart), apart, np.inf), axis=1)
         visible = np.isfinite(positions[:, 0])
-        self._places[visible] = positions[visible]
+        self._places[visible], self._placed[visible] = positions[visible], now
         return bool(np.any(nearest[both] != np.flatnonzero(both)))
+
+    def _relabel(self, now: float, apart: np.ndarray) -> None:
+        """Which body each label is on, by distances (B, B), m, of labels now from where others just were: bodies move
+        no way so fast, several at once, and end where others were."""
+        between = np.linalg.norm(self._places[:, None] - self._places, axis=-1)
+        just = now - self._placed <= JUST
+        there = (apart < THERE * between) & just & just[:, None]
+        moved = np.flatnonzero(there.any(axis=1) & there.any(axis=0))
+        before = there[moved].argmax(axis=1)
+        if np.array_equal(np.sort(before), moved):
+            self._labels[moved] = self._labels[before]
 
     def _look(self, now: float) -> None:
         """At the window, for what a single frame does not show."""
@@ -222,8 +245,7 @@ class StreamChecks:
             for swap in find_label_swaps(places[-SWAPPED:], expected.distances, expected.marked_base):
                 swapped[list(swap.bodies)] |= swap.frames[-1]
             swapped = swapped[len(swapped) - len(expected.names) :]
-            others = " and ".join(repr(expected.names[body]) for body in np.flatnonzero(swapped))
-            self._dropped["swap"] = self._drop(now, "swap", swapped, f"the labels {others} taken for each other,")
+            self._drop_exchanged(now, "swap", swapped)
         for flagged, words in unmeasured(places, expected.marked_base, self._paths):
             flagged = flagged[-1, places.shape[1] - len(expected.names) :]
             self._dropped[words] = self._drop(now, words, flagged, f"poses {words}")
