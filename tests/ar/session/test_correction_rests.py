@@ -15,9 +15,11 @@ from tests.ar.teleop.test_plan import MOUNT, OFFSET, START, request
 from trunkline.ar.preview.grasp_preview import GraspPreviewer
 from trunkline.ar.session.correction_rests import MOST, MeasuredRest, learnt_from, learnt_in_base
 from trunkline.ar.session.correction_steps import DOWN, CorrectionSteps
-from trunkline.ar.session.previewer import Order, PreviewPlanner
+from trunkline.ar.session.follow import FollowControl
+from trunkline.ar.session.previewer import FollowRequest, Order, PreviewPlanner
 from trunkline.ar.teleop.base_frames import base_frames
-from trunkline.ar.teleop.messages import Pose
+from trunkline.ar.teleop.following import KNOT
+from trunkline.ar.teleop.messages import Pose, Target
 from trunkline.kinematics.residual.residual_map import ResidualMap, RestingPoses
 from trunkline.model.statics.equilibria import actuated
 
@@ -194,3 +196,28 @@ def test_a_rest_that_ends_the_correction_tells_nothing(wrong):
 
 def test_the_newest_are_kept():
     assert Correcting().controller.correction.rests.maxlen == MOST
+
+
+@pytest.mark.parametrize(("slow", "speed", "share"), [(0.01, 0.0, 1.0), (0.01, 0.01, 1.0), (0.01, 0.015, 0.5),
+                                                      (0.01, 0.02, 0.0), (0.0, 0.0, 0.0)])  # fmt: skip
+def test_as_it_follows_slowly_targets_are_sought_by_what_corrections_measured(slow, speed, share):
+    orders, rests = [], (MeasuredRest(START, pulled(0.02, 0, 0), TARGET),)
+    control, targets = FollowControl(orders.append, lambda age, axes: None, slow), request(MOUNT, tuple(TARGET)).targets
+    for knot in range(10):
+        tip = Target((TARGET[0] + speed * KNOT * knot, *map(float, TARGET[1:])))
+        control.seek(replace(targets, tip=tip), START, EMPTY, rests)
+        control.advance(KNOT)
+    assert [order.share for order in orders] == pytest.approx([0.0] * 5 + [share] * 5)
+    assert [order.rests for order in orders] == [rests if order.share else () for order in orders]
+
+
+def test_a_share_of_what_was_measured_moves_what_is_sought_by_as_much():
+    planning = PreviewPlanner(PLANNER, made().foresight, ())
+    first = planned(TARGET)
+    rest = MeasuredRest(first.joints[-1], first.commands[-1],
+                        tip_at(CHAIN, first.joints[-1], first.commands[-1]) + [5e-3, 0.0, 0.0])  # fmt: skip
+    targets, off = request(MOUNT, tuple(map(float, TARGET))).targets, []
+    for share in (0.0, 0.5, 1.0):
+        (answer,) = planning.answers(FollowRequest(1, targets, first.joints[-1], EMPTY, (rest,), share))
+        off.append(tip_at(CHAIN, answer.axes[:7], answer.axes[7:])[0] - TARGET[0])
+    np.testing.assert_allclose(off, [0.0, -2.5e-3, -5e-3], atol=0.7e-3)

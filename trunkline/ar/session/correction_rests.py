@@ -36,14 +36,16 @@ def learnt_from(
     mount_offset: float,
     before: ResidualMap | None,
     lean: Rotation | None = None,
+    share: float = 1.0,
 ) -> ResidualMap | None:
-    """What is learnt of the arm `before` these rests, and by them, beside a twin that leans on its mount by `lean`."""
-    if not rests:
+    """What is learnt of the arm `before` these rests, and by them, beside a twin that leans on its mount by `lean`.
+    share: by which what they add counts, 0 to 1."""
+    if not rests or share <= 0:
         return before
     places, bases = base_frames(np.array([rest.joints for rest in rests]), mount_offset)
     tips = np.einsum("nji,nj->ni", bases, np.array([rest.tip for rest in rests]) - places)
     gravity = np.einsum("nji,j->ni", bases, DOWN)
-    return learnt_in_base(chain, np.array([rest.commands for rest in rests]), gravity, tips, before, lean)
+    return learnt_in_base(chain, np.array([rest.commands for rest in rests]), gravity, tips, before, lean, share)
 
 
 def learnt_in_base(
@@ -53,6 +55,7 @@ def learnt_in_base(
     tips: np.ndarray,
     before: ResidualMap | None = None,
     lean: Rotation | None = None,
+    share: float = 1.0,
 ) -> ResidualMap | None:
     """As `learnt_from`. Where the twin finds no rest, nothing is learnt.
 
@@ -66,4 +69,7 @@ def learnt_in_base(
     if not rested.any():
         return before
     poses, residuals = RestingPoses.of(chain, twin, gravity)[rested], residuals[rested]
-    return ResidualMap.supposed(poses, residuals, chain.length) if before is None else before.extended(poses, residuals)
+    if before is None:
+        return ResidualMap.supposed(poses, share * residuals, chain.length)
+    foreseen = before.mean(poses)
+    return before.extended(poses, foreseen + share * (residuals - foreseen))
