@@ -61,12 +61,28 @@ def test_the_next_plan_ends_nearer_where_a_plan_was_corrected_and_near_there(nam
     again = error(arm, planned(TARGET, learnt), TARGET)
     print(f"there: {1e3 * before:.2f} mm, then {1e3 * again:.2f} mm")
     assert before > 1e-3
-    assert again < 0.5 * before
+    assert again < 0.1 * before
     for aside in ([8e-3, 0, 0], [0, -8e-3, 0], [0, 0, 5e-3]):
         near = TARGET + np.array(aside)
         without, with_it = error(arm, planned(near), near), error(arm, planned(near, learnt), near)
         print(f"near there: {1e3 * without:.2f} mm, then {1e3 * with_it:.2f} mm")
-        assert with_it < 0.85 * without
+        assert with_it < 0.4 * without
+
+
+def test_a_rest_where_a_cable_that_is_let_out_stops_the_twin_alone_tells_nothing():
+    """Of soft cables: as the steps pull farther, the twin bends until the second cable holds it. The residual falls
+    from 3.1 to 1.8 mm by that alone, and would make plans near there gain a fifth, as they hold no such cable."""
+    arm, first = ARMS["soft cables"], planned(TARGET)
+    rests = corrected(arm, first, TARGET)
+    commands, turn = np.array([rest.commands for rest in rests]), base_frames(rests[0].joints, OFFSET)[1]
+    twins, arms = (actuated(chain, commands, DOWN @ turn).tensions[:, 1] for chain in (CHAIN, arm))
+    assert twins[0] == pytest.approx(0, abs=1e-3)
+    assert twins[-1] > 0.03
+    assert (arms == 0).all()
+    learnt = learnt_from(rests, CHAIN, OFFSET, None)
+    assert 1 <= len(learnt.poses) < len(rests)
+    package = ResidualMap.supposed(learnt.poses, learnt.residuals, CHAIN.length)
+    assert learnt_from(rests[-1:], CHAIN, OFFSET, package) is package
 
 
 def test_far_from_there_plans_are_as_before():

@@ -3,6 +3,10 @@
 By how far the tip rests beside the twin's is a Gaussian process (`trunkline/kinematics/residual/residual_map.py`), here
 conditioned on these rests as well. Far from them it tells nothing new, and plans are as before. What a preview states
 of how far the tip may be off stays the package's: a few rests of one session are no measure of that.
+
+As the steps of a correction pull farther, a twin that bends more than the arm comes to be held by a cable that is let
+out, which in the arm is still loose. The residual then seems to vanish, by a cable that the process counts as none and
+that no plan holds taut. Such a rest tells nothing.
 """
 
 from collections.abc import Sequence
@@ -18,6 +22,7 @@ from trunkline.model.statics.chain import Chain
 from trunkline.model.statics.equilibria import actuated
 
 MOST = 60  # rests, the newest: a plan is made with them within milliseconds
+TAUT = 0.01  # of the largest tension, from which on a cable that is let out moves the twin's tip, by some 0.1 mm
 DOWN = np.array([0.0, 0.0, -STANDARD_GRAVITY])  # m/s²
 
 
@@ -57,7 +62,7 @@ def learnt_in_base(
     lean: Rotation | None = None,
     share: float = 1.0,
 ) -> ResidualMap | None:
-    """As `learnt_from`. Where the twin finds no rest, nothing is learnt.
+    """As `learnt_from`. Where the twin finds no rest, or is held by a cable longer than straight, nothing is learnt.
 
     Args:
         commands: m (N, K). gravity: m/s², tips: measured, m, both in the arm's base frame. Shapes (N, 3).
@@ -65,10 +70,12 @@ def learnt_in_base(
     lean = lean or Rotation.identity()
     twin = actuated(chain.smooth, commands, lean.inv().apply(gravity))
     residuals = tips - lean.apply(twin.position)
-    rested = twin.converged & np.isfinite(residuals).all(axis=1)
-    if not rested.any():
+    taut = twin.tensions > TAUT * twin.tensions.max(axis=1, keepdims=True)
+    stopped = (taut & (commands > chain.straight_lengths)).any(axis=1)
+    tells = twin.converged & np.isfinite(residuals).all(axis=1) & ~stopped
+    if not tells.any():
         return before
-    poses, residuals = RestingPoses.of(chain, twin, gravity)[rested], residuals[rested]
+    poses, residuals = RestingPoses.of(chain, twin, gravity)[tells], residuals[tells]
     if before is None:
         return ResidualMap.supposed(poses, share * residuals, chain.length)
     foreseen = before.mean(poses)
