@@ -4,9 +4,9 @@ By how far the tip rests beside the twin's is a Gaussian process (`trunkline/kin
 conditioned on these rests as well. Far from them it tells nothing new, and plans are as before. What a preview states
 of how far the tip may be off stays the package's: a few rests of one session are no measure of that.
 
-As the steps of a correction pull farther, a twin that bends more than the arm comes to be held by a cable that is let
-out, which in the arm is still loose. The residual then seems to vanish, by a cable that the process counts as none and
-that no plan holds taut. Such a rest tells nothing.
+As the steps of a correction pull farther, a twin that bends more than the arm comes to be stopped by its last loose
+cable, which is still loose in the arm. So the residual seems to vanish along the steps; but no plan leaves tension that
+all cables of a section share, and the process counts a cable that is let out as none. Such a rest tells nothing.
 """
 
 from collections.abc import Sequence
@@ -17,12 +17,13 @@ from scipy.spatial.transform import Rotation
 
 from trunkline.ar.teleop.base_frames import base_frames
 from trunkline.frames import STANDARD_GRAVITY
+from trunkline.kinematics.dataset.sampling import sections
 from trunkline.kinematics.residual.residual_map import ResidualMap, RestingPoses
 from trunkline.model.statics.chain import Chain
 from trunkline.model.statics.equilibria import actuated
 
 MOST = 60  # rests, the newest: a plan is made with them within milliseconds
-TAUT = 0.01  # of the largest tension, from which on a cable that is let out moves the twin's tip, by some 0.1 mm
+SHARED = 0.01  # of the largest tension: where all cables of a section have more, it moves the twin's tip by some 0.1 mm
 DOWN = np.array([0.0, 0.0, -STANDARD_GRAVITY])  # m/s²
 
 
@@ -62,7 +63,7 @@ def learnt_in_base(
     lean: Rotation | None = None,
     share: float = 1.0,
 ) -> ResidualMap | None:
-    """As `learnt_from`. Where the twin finds no rest, or is held by a cable longer than straight, nothing is learnt.
+    """As `learnt_from`. Where the twin finds no rest, or with tension that a section's cables share, nothing is learnt.
 
     Args:
         commands: m (N, K). gravity: m/s², tips: measured, m, both in the arm's base frame. Shapes (N, 3).
@@ -70,8 +71,8 @@ def learnt_in_base(
     lean = lean or Rotation.identity()
     twin = actuated(chain.smooth, commands, lean.inv().apply(gravity))
     residuals = tips - lean.apply(twin.position)
-    taut = twin.tensions > TAUT * twin.tensions.max(axis=1, keepdims=True)
-    stopped = (taut & (commands > chain.straight_lengths)).any(axis=1)
+    taut = twin.tensions > SHARED * twin.tensions.max(axis=1, keepdims=True)
+    stopped = np.any([taut[:, section].all(axis=1) for section in sections(chain) if len(section) > 2], axis=0)
     tells = twin.converged & np.isfinite(residuals).all(axis=1) & ~stopped
     if not tells.any():
         return before
