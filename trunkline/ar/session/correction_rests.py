@@ -68,9 +68,9 @@ def learnt_in_base(
     Args:
         commands: m (N, K). gravity: m/s², tips: measured, m, both in the arm's base frame. Shapes (N, 3).
     """
-    lean = lean or Rotation.identity()
-    twin = actuated(chain.smooth, commands, lean.inv().apply(gravity))
-    residuals = tips - lean.apply(twin.position)
+    by = Rotation.identity() if lean is None else lean
+    twin = actuated(chain.smooth, commands, by.inv().apply(gravity))
+    residuals = tips - by.apply(twin.position)
     taut = twin.tensions > SHARED * twin.tensions.max(axis=1, keepdims=True)
     stopped = np.any([taut[:, section].all(axis=1) for section in sections(chain) if len(section) > 2], axis=0)
     tells = twin.converged & np.isfinite(residuals).all(axis=1) & ~stopped

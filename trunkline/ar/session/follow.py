@@ -15,6 +15,7 @@ from trunkline.ar.teleop.trajectory import JOINTS
 PLANNER_TIMEOUT = 1.0  # s without an answer of the process that plans; a busy machine answers within 0.5
 ROUNDING = 1e-6  # s, of a sum of ticks
 PACE = 0.5  # s over which the speed of the tip's target is taken: a hand trembles by a millimetre within less
+PLACES = round(PACE / KNOT) + 1
 
 
 class FollowControl:
@@ -38,7 +39,7 @@ class FollowControl:
         self._times: dict[int, float] = {}  # of what is being sought
         self._pending: list[tuple[float, np.ndarray | None]] = []  # before the robot may follow
         self._near: np.ndarray | None = None
-        self._places: deque[np.ndarray] = deque(maxlen=round(PACE / KNOT) + 1)  # of the tip's target, m
+        self._places: deque[np.ndarray] = deque(maxlen=PLACES)  # of the tip's target, m
 
     @property
     def fault(self) -> str:
@@ -72,7 +73,7 @@ class FollowControl:
             self._places.clear()
             return 0.0
         self._places.append(np.array(targets.tip.position))
-        if not self._slow or len(self._places) < self._places.maxlen:
+        if not self._slow or len(self._places) < PLACES:
             return 0.0
         speed = float(np.linalg.norm(self._places[-1] - self._places[0])) / PACE
         return float(np.clip(2 - speed / self._slow, 0.0, 1.0))
