@@ -6,22 +6,30 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.ar.session.test_correction_control import Correcting
+from tests.ar.session.test_controller import BASE
+from tests.ar.session.test_correction_control import SETTINGS, Correcting
 from tests.ar.session.test_correction_steps import ARMS, BEYOND, CHAIN, PLANNER, order, pulled
 from tests.ar.session.test_correction_steps import WORLD as EMPTY
 from tests.ar.session.test_preview_process import made
 from tests.ar.session.test_preview_process import order as asked
 from tests.ar.teleop.test_plan import MOUNT, OFFSET, START, request
+from tests.support.live import patient
+from tests.support.operator import PACKAGE, Everywhere
 from trunkline.ar.preview.grasp_preview import GraspPreviewer
+from trunkline.ar.session.controller import SessionController
 from trunkline.ar.session.correction_rests import MOST, MeasuredRest, learnt_from, learnt_in_base
 from trunkline.ar.session.correction_steps import DOWN, CorrectionSteps
-from trunkline.ar.session.previewer import Order, PreviewPlanner
+from trunkline.ar.session.follow import FollowControl
+from trunkline.ar.session.previewer import FollowRequest, Order, PreviewPlanner
 from trunkline.ar.teleop.base_frames import base_frames
-from trunkline.ar.teleop.messages import Pose
+from trunkline.ar.teleop.core import Teleoperation
+from trunkline.ar.teleop.following import KNOT
+from trunkline.ar.teleop.messages import Pose, Target
 from trunkline.kinematics.residual.residual_map import ResidualMap, RestingPoses
 from trunkline.model.statics.equilibria import actuated
 
 PLACE, TURN = base_frames(START, OFFSET)
+BY_A_CABLE = pulled(0.02, -0.05, -0.05)  # the others are loose
 TARGET = np.array(MOUNT) + TURN @ actuated(CHAIN, pulled(0.02, 0, 0)[None], DOWN @ TURN).position[0]
 
 
@@ -59,12 +67,28 @@ def test_the_next_plan_ends_nearer_where_a_plan_was_corrected_and_near_there(nam
     again = error(arm, planned(TARGET, learnt), TARGET)
     print(f"there: {1e3 * before:.2f} mm, then {1e3 * again:.2f} mm")
     assert before > 1e-3
-    assert again < 0.5 * before
+    assert again < 0.1 * before
     for aside in ([8e-3, 0, 0], [0, -8e-3, 0], [0, 0, 5e-3]):
         near = TARGET + np.array(aside)
         without, with_it = error(arm, planned(near), near), error(arm, planned(near, learnt), near)
         print(f"near there: {1e3 * without:.2f} mm, then {1e3 * with_it:.2f} mm")
-        assert with_it < 0.85 * without
+        assert with_it < 0.4 * without
+
+
+def test_a_rest_where_a_loose_cable_stops_the_twin_alone_tells_nothing():
+    """Of soft cables: as the steps pull farther, the twin bends until the second cable holds it. The residual falls
+    from 3.1 to 1.8 mm by that alone, and would make plans near there gain a fifth, as they hold no such cable."""
+    arm, first = ARMS["soft cables"], planned(TARGET)
+    rests = corrected(arm, first, TARGET)
+    commands, turn = np.array([rest.commands for rest in rests]), base_frames(rests[0].joints, OFFSET)[1]
+    twins, arms = (actuated(chain, commands, DOWN @ turn).tensions[:, 1] for chain in (CHAIN, arm))
+    assert twins[0] == pytest.approx(0, abs=1e-3)
+    assert twins[-1] > 0.03
+    assert (arms == 0).all()
+    learnt = learnt_from(rests, CHAIN, OFFSET, None)
+    assert 1 <= len(learnt.poses) < len(rests)
+    package = ResidualMap.supposed(learnt.poses, learnt.residuals, CHAIN.length)
+    assert learnt_from(rests[-1:], CHAIN, OFFSET, package) is package
 
 
 def test_far_from_there_plans_are_as_before():
@@ -75,7 +99,7 @@ def test_far_from_there_plans_are_as_before():
 
 def test_rests_are_added_to_what_the_package_has_learnt():
     shift, measured = np.array([[0.0, 2e-3, 0.0]]), np.array([3e-3, 0.0, 0.0])
-    commands = pulled(0.02, 0, 0)
+    commands = BY_A_CABLE
     tip = PLACE + TURN @ (actuated(CHAIN, commands[None], DOWN @ TURN).position[0] + measured)
     package = ResidualMap.supposed(RestingPoses(np.array([[0.0, 0.03, 0.0]]), DOWN[None]), shift, CHAIN.length)
     assert learnt_from((), CHAIN, OFFSET, package) is package
@@ -84,12 +108,14 @@ def test_rests_are_added_to_what_the_package_has_learnt():
     np.testing.assert_array_equal(both.residuals[: len(package.poses)], package.residuals)
     np.testing.assert_array_equal(both.numbers, package.numbers)
     assert np.linalg.norm(both.mean(there)[0] - measured) < 0.3e-3
+    half = learnt_from([MeasuredRest(START, commands, tip)], CHAIN, OFFSET, package, share=0.5)
+    np.testing.assert_allclose(half.mean(there), (package.mean(there) + both.mean(there)) / 2, atol=1e-9)
 
 
 def test_beside_a_twin_that_leans_as_the_arm_does_nothing_is_left():
     """Else a preview, whose twin leans already, would have it twice."""
     lean = Rotation.from_rotvec([0.03, 0.0, 0.0])
-    commands = pulled(0.02, 0, 0)[None]
+    commands = BY_A_CABLE[None]
     tips = lean.apply(actuated(CHAIN, commands, lean.inv().apply(DOWN)).position)
     assert np.linalg.norm(learnt_in_base(CHAIN, commands, DOWN[None], tips, None, lean).residuals) < 1e-9
     assert np.linalg.norm(learnt_in_base(CHAIN, commands, DOWN[None], tips).residuals) > 3e-3
@@ -120,12 +146,12 @@ def test_plan_and_preview_begin_from_what_was_measured(monkeypatch, hangs):
     np.testing.assert_allclose(heard[1].residuals, [measured - leaning], atol=1e-6)
 
 
-def orders_of(session):
-    """Those of plans, from now on."""
+def orders_of(session, kind=Order):
+    """Those of plans, from now on, or of another kind."""
     submit, orders = session.planning.submit, []
 
     def hear(order):
-        if isinstance(order, Order):
+        if isinstance(order, kind):
             orders.append(order)
         submit(order)
 
@@ -157,6 +183,28 @@ def test_the_next_order_has_what_corrections_have_measured():
     for rest, off in zip(second.rests, (5.1e-3, 3.1e-3, 1.1e-3), strict=True):
         assert np.linalg.norm(rest.tip - first.correction.target) == pytest.approx(off, abs=1e-6)
         np.testing.assert_array_equal(rest.joints, session.planning.plans[0].joints[-1])
+
+
+@pytest.mark.parametrize("slow", [0.0, 0.01])
+def test_as_it_follows_the_controller_sends_them_where_its_settings_have_a_speed(slow):
+    session = Correcting()
+    orders = orders_of(session, FollowRequest)
+    session.controller = SessionController(
+        Teleoperation(patient(), Everywhere(), PACKAGE, OFFSET), session.robot, session.planning, EMPTY, 0.1,
+        session.log, 0.0, session.cameras, replace(SETTINGS, slow=slow),
+    )  # fmt: skip
+    session.controller.control(BASE)
+    rest = MeasuredRest(START, pulled(0.02, 0, 0), TARGET)
+    session.controller.correction.rests.append(rest)
+    session.aimed()
+    session.right = {"grip": 1.0, "stick_pressed": 1.0}
+    session.until(lambda intent: intent.motion == "follow")
+    session.right = {"grip": 1.0}
+    session.wait(1.0)
+    assert (orders[-1].rests, orders[-1].share) == (((rest,), 1.0) if slow else ((), 0.0))
+    frozen(session)
+    session.wait(0.3)
+    assert orders[-1].rests == ()
 
 
 def frozen(session):
@@ -194,3 +242,28 @@ def test_a_rest_that_ends_the_correction_tells_nothing(wrong):
 
 def test_the_newest_are_kept():
     assert Correcting().controller.correction.rests.maxlen == MOST
+
+
+@pytest.mark.parametrize(("slow", "speed", "share"), [(0.01, 0.0, 1.0), (0.01, 0.01, 1.0), (0.01, 0.015, 0.5),
+                                                      (0.01, 0.02, 0.0), (0.0, 0.0, 0.0)])  # fmt: skip
+def test_as_it_follows_slowly_targets_are_sought_by_what_corrections_measured(slow, speed, share):
+    orders, rests = [], (MeasuredRest(START, pulled(0.02, 0, 0), TARGET),)
+    control, targets = FollowControl(orders.append, lambda age, axes: None, slow), request(MOUNT, tuple(TARGET)).targets
+    for knot in range(10):
+        tip = Target((TARGET[0] + speed * KNOT * knot, *map(float, TARGET[1:])))
+        control.seek(replace(targets, tip=tip), START, EMPTY, rests)
+        control.advance(KNOT)
+    assert [order.share for order in orders] == pytest.approx([0.0] * 5 + [share] * 5)
+    assert [order.rests for order in orders] == [rests if order.share else () for order in orders]
+
+
+def test_a_share_of_what_was_measured_moves_what_is_sought_by_as_much():
+    planning = PreviewPlanner(PLANNER, made().foresight, ())
+    first = planned(TARGET)
+    rest = MeasuredRest(first.joints[-1], first.commands[-1],
+                        tip_at(CHAIN, first.joints[-1], first.commands[-1]) + [5e-3, 0.0, 0.0])  # fmt: skip
+    targets, off = request(MOUNT, tuple(map(float, TARGET))).targets, []
+    for share in (0.0, 0.5, 1.0):
+        (answer,) = planning.answers(FollowRequest(1, targets, first.joints[-1], EMPTY, (rest,), share))
+        off.append(tip_at(CHAIN, answer.axes[:7], answer.axes[7:])[0] - TARGET[0])
+    np.testing.assert_allclose(off, [0.0, -2.5e-3, -5e-3], atol=0.7e-3)

@@ -3,6 +3,10 @@
 By how far the tip rests beside the twin's is a Gaussian process (`trunkline/kinematics/residual/residual_map.py`), here
 conditioned on these rests as well. Far from them it tells nothing new, and plans are as before. What a preview states
 of how far the tip may be off stays the package's: a few rests of one session are no measure of that.
+
+As the steps of a correction pull farther, a twin that bends more than the arm comes to be stopped by its last loose
+cable, which is still loose in the arm. So the residual seems to vanish along the steps; but no plan leaves tension that
+all cables of a section share, and the process counts a cable that is let out as none. Such a rest tells nothing.
 """
 
 from collections.abc import Sequence
@@ -13,11 +17,13 @@ from scipy.spatial.transform import Rotation
 
 from trunkline.ar.teleop.base_frames import base_frames
 from trunkline.frames import STANDARD_GRAVITY
+from trunkline.kinematics.dataset.sampling import sections
 from trunkline.kinematics.residual.residual_map import ResidualMap, RestingPoses
 from trunkline.model.statics.chain import Chain
 from trunkline.model.statics.equilibria import actuated
 
 MOST = 60  # rests, the newest: a plan is made with them within milliseconds
+SHARED = 0.01  # of the largest tension: where all cables of a section have more, it moves the twin's tip by some 0.1 mm
 DOWN = np.array([0.0, 0.0, -STANDARD_GRAVITY])  # m/s²
 
 
@@ -36,14 +42,16 @@ def learnt_from(
     mount_offset: float,
     before: ResidualMap | None,
     lean: Rotation | None = None,
+    share: float = 1.0,
 ) -> ResidualMap | None:
-    """What is learnt of the arm `before` these rests, and by them, beside a twin that leans on its mount by `lean`."""
-    if not rests:
+    """What is learnt of the arm `before` these rests, and by them, beside a twin that leans on its mount by `lean`.
+    share: by which what they add counts, 0 to 1."""
+    if not rests or share <= 0:
         return before
     places, bases = base_frames(np.array([rest.joints for rest in rests]), mount_offset)
     tips = np.einsum("nji,nj->ni", bases, np.array([rest.tip for rest in rests]) - places)
     gravity = np.einsum("nji,j->ni", bases, DOWN)
-    return learnt_in_base(chain, np.array([rest.commands for rest in rests]), gravity, tips, before, lean)
+    return learnt_in_base(chain, np.array([rest.commands for rest in rests]), gravity, tips, before, lean, share)
 
 
 def learnt_in_base(
@@ -53,17 +61,23 @@ def learnt_in_base(
     tips: np.ndarray,
     before: ResidualMap | None = None,
     lean: Rotation | None = None,
+    share: float = 1.0,
 ) -> ResidualMap | None:
-    """As `learnt_from`. Where the twin finds no rest, nothing is learnt.
+    """As `learnt_from`. Where the twin finds no rest, or with tension that a section's cables share, nothing is learnt.
 
     Args:
         commands: m (N, K). gravity: m/s², tips: measured, m, both in the arm's base frame. Shapes (N, 3).
     """
-    lean = lean or Rotation.identity()
-    twin = actuated(chain.smooth, commands, lean.inv().apply(gravity))
-    residuals = tips - lean.apply(twin.position)
-    rested = twin.converged & np.isfinite(residuals).all(axis=1)
-    if not rested.any():
+    by = Rotation.identity() if lean is None else lean
+    twin = actuated(chain.smooth, commands, by.inv().apply(gravity))
+    residuals = tips - by.apply(twin.position)
+    taut = twin.tensions > SHARED * twin.tensions.max(axis=1, keepdims=True)
+    stopped = np.any([taut[:, section].all(axis=1) for section in sections(chain) if len(section) > 2], axis=0)
+    tells = twin.converged & np.isfinite(residuals).all(axis=1) & ~stopped
+    if not tells.any():
         return before
-    poses, residuals = RestingPoses.of(chain, twin, gravity)[rested], residuals[rested]
-    return ResidualMap.supposed(poses, residuals, chain.length) if before is None else before.extended(poses, residuals)
+    poses, residuals = RestingPoses.of(chain, twin, gravity)[tells], residuals[tells]
+    if before is None:
+        return ResidualMap.supposed(poses, share * residuals, chain.length)
+    foreseen = before.mean(poses)
+    return before.extended(poses, foreseen + share * (residuals - foreseen))
