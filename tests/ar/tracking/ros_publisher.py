@@ -23,7 +23,7 @@ from trunkline.ar.tracking import ros_messages as ros
 
 NAMES = ("base", "middle", "tip")
 PLACES = np.array([[1.0, 2.0, 3.0], [1.0, 2.0, 2.8], [1.1, 2.0, 2.6]])
-TURNED = (0.5, 0.5, -0.5, 0.5)  # wxyz
+TURNED = (2 / 11, 1 / 11, -4 / 11, 10 / 11)  # wxyz, each another number
 TOPICS = {"geometry_msgs/PoseStamped": "/poses/{body}", "tf2_msgs/TFMessage": "/tf"}
 RATE = 120.0
 

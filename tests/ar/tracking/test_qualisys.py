@@ -86,14 +86,17 @@ def test_a_source_receives_the_named_bodies_in_m_and_turned_as_qtm_has_them():
     assert (second.number, second.tracked.tolist()) == (9, [True, False])
 
 
-def test_a_body_that_qtm_does_not_track_a_mute_server_and_none_at_all_are_refused(monkeypatch):
-    monkeypatch.setattr(qualisys, "ANSWERS", 0.5)
+def test_a_body_that_qtm_does_not_track_no_measurement_and_a_mute_or_absent_server_are_refused(monkeypatch):
+    monkeypatch.setattr(qualisys, "ANSWERS", 1.0)
     with qtm(STREAMED) as server:
         settings = QualisysSettings(LOOPBACK, server.port)
         with pytest.raises(InputError) as error:
             QualisysSource(settings, ("base", "tp"))
         reason = "found the 6D bodies other, tip, base, expected 'tp' once, did you mean 'tip'?"
         assert str(error.value) == f"QTM at 127.0.0.1: {reason}"
+        with pytest.raises(InputError) as error:
+            QualisysSource(settings, NAMES)
+        assert str(error.value) == "QTM at 127.0.0.1: found no frame, expected a measurement or a preview to run"
         server.answers = False
         silent = f"found no answer at port {server.port}, expected QTM's real-time server"
         with pytest.raises(InputError) as error:

@@ -190,7 +190,10 @@ def with_session(settings: ArmCameraSettings) -> ArmCameraSettings:
     """
     if not settings.session:
         return settings
-    session = read_session(Path(settings.session))
+    try:
+        session = read_session(Path(settings.session))
+    except InputError as error:
+        raise InputError(f"cameras.session: {error}") from error
     where = f"cameras.session: {settings.session}/session.yaml"
     if not isinstance(session.base, str):
         raise InputError(f"{where}: found a fixed base, expected the name of the body at the mount")

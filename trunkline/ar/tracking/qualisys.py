@@ -59,7 +59,8 @@ class QualisysSource:
         except (InputError, OSError, TimeoutError, ElementTree.ParseError, qtm_rt.QRTCommandException) as error:
             self.close()
             silent = f"found no answer at port {settings.port}, expected QTM's real-time server"
-            reason = silent if isinstance(error, OSError | TimeoutError) else str(error)
+            other = f"found the answer {error}, expected that of QTM's real-time server"
+            reason = error if isinstance(error, InputError) else silent if isinstance(error, OSError) else other
             raise InputError(f"{where}: {reason}") from error
 
     def receive(self, seconds: float) -> CameraFrame | None:
@@ -94,7 +95,10 @@ class QualisysSource:
                 streamed = ", ".join(bodies) or "none"
                 raise InputError(f"found the 6D bodies {streamed}, expected {name!r} once{nearest(name, bodies)}")
         self._rows, self._bodies = [bodies.index(name) for name in names], len(bodies)
-        await connection.stream_frames(components=["6d"], on_packet=self._take)
+        try:
+            await connection.stream_frames(components=["6d"], on_packet=self._take)
+        except TimeoutError as error:
+            raise InputError("found no frame, expected a measurement or a preview to run") from error
 
     async def _wait(self, seconds: float) -> None:
         self._came.clear()
