@@ -24,7 +24,7 @@ class Result:
     set delay before; worst_mm: its 95th percentile. robot_mm: median distance of the tip from where the operator's rays
     wanted it then: what is left when the operator's own lag and aim are taken out. probability: that the preview gave
     to the plan that was confirmed. agreed: 1 if it was at least a half for a success, or less for a failure, else 0.
-    path_pct: median distance between the robot's tip and the nominal preview's, % of the arm's length. plan_end_mm: from
+    path_pct: median distance between the robot's tip and the nominal preview's, % of length. plan_end_mm: from
     the preview's tip at its end to the tip target. radius_mm: within which the preview had stated that the tip ends;
     at_end_mm, after_2s_mm, after_10s_mm: of the robot's tip from where that has it then, when the execution had ended
     and so long after it, with nothing in the way; touching_mm: likewise when it had ended, beside the object.

@@ -157,7 +157,7 @@ class PreviewPlanner:
         preview breaks off is refused, as it could never be confirmed."""
         try:
             if isinstance(order, FollowRequest):
-                planner = replace(self.planner, residual_map=self._learnt(order.rests, None, order.share))
+                planner = self._knowing(order.rests, order.share)
                 yield FollowAnswer(order.serial, *sought(planner, order.targets, order.joints, order.world))
             elif isinstance(order, CorrectionOrder):
                 yield self._corrections.answer(order)
@@ -178,8 +178,7 @@ class PreviewPlanner:
         if order.hangs is not None:
             beside = float(order.hangs[1])
         try:
-            planner = replace(self.planner, residual_map=self._learnt(order.rests))
-            plan = planner.plan(request, order.world, order.joints, order.commands, beside)
+            plan = self._knowing(order.rests).plan(request, order.world, order.joints, order.commands, beside)
         except InputError as error:
             yield PlanAnswer(PlanReport(serial, refused=str(error)))
             return
@@ -208,6 +207,10 @@ class PreviewPlanner:
             self.prediction = prediction
             target = None if request.targets.object else np.array(request.targets.tip.position)
             yield PredictionAnswer(serial, prediction_message(digest, prediction, target))
+
+    def _knowing(self, rests: tuple[MeasuredRest, ...], share: float = 1.0) -> Planner:
+        """The planner that begins from `rests` as well, which count by `share`."""
+        return replace(self.planner, residual_map=self._learnt(rests, None, share)) if rests else self.planner
 
     def _learnt(
         self, rests: tuple[MeasuredRest, ...], lean: Rotation | None = None, share: float = 1.0
