@@ -46,7 +46,8 @@ class CorrectionSettings:
     in a step. steepest: m of the tip's way for 1 m of one motor's, from which on the arm is near snapping through.
     astray: m that the tip may be off: beyond, the twin or the cameras are wrong, which no step mends. misplaced: m that
     the cameras may see the arm's mount from where the joints have it: beyond, the pose of their frame is wrong. slow:
-    m/s of targets that are followed, up to which what was measured at rest counts; 0 for never."""
+    m/s of targets that are followed, up to which what was measured at rest counts; 0 for never, as cables that go on
+    rubbing leave the lab's arm farther off than what rests tell mends (`python -m qualification.revisited`)."""
 
     tolerance: Metres = 0.8e-3
     steps: Annotated[int, Field(ge=1, le=20)] = 5
