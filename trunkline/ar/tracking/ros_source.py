@@ -19,7 +19,7 @@ from trunkline.ar.tracking.tracker import CameraFrame
 from trunkline.errors import InputError, nearest
 from trunkline.recordings.logs.messages import POSES, READING, DecodedPoses
 
-COMES = 5.0  # s within which each body has to come once: knowing each other takes DDS a second or two
+COMES = 10.0  # s within which each body has to come once: a participant that was not heard announces itself every 8 s
 NEWEST = 256  # messages of a topic that wait to be heard
 # Of a sensor's data: a reader by best effort hears reliable publishers too, one that is reliable hears no others.
 SENSOR_DATA = Qos(Policy.Reliability.BestEffort, Policy.Durability.Volatile, Policy.History.KeepLast(NEWEST))
