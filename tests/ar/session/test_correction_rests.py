@@ -6,25 +6,18 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.ar.session.test_controller import BASE
-from tests.ar.session.test_correction_control import SETTINGS, Correcting
+from tests.ar.session.test_correction_control import Correcting
 from tests.ar.session.test_correction_steps import ARMS, BEYOND, CHAIN, PLANNER, order, pulled
 from tests.ar.session.test_correction_steps import WORLD as EMPTY
 from tests.ar.session.test_preview_process import made
 from tests.ar.session.test_preview_process import order as asked
 from tests.ar.teleop.test_plan import MOUNT, OFFSET, START, request
-from tests.support.live import patient
-from tests.support.operator import PACKAGE, Everywhere
 from trunkline.ar.preview.grasp_preview import GraspPreviewer
-from trunkline.ar.session.controller import SessionController
 from trunkline.ar.session.correction_rests import MOST, MeasuredRest, learnt_from, learnt_in_base
 from trunkline.ar.session.correction_steps import DOWN, CorrectionSteps
-from trunkline.ar.session.follow import FollowControl
-from trunkline.ar.session.previewer import FollowRequest, Order, PreviewPlanner
+from trunkline.ar.session.previewer import Order, PreviewPlanner
 from trunkline.ar.teleop.base_frames import base_frames
-from trunkline.ar.teleop.core import Teleoperation
-from trunkline.ar.teleop.following import KNOT
-from trunkline.ar.teleop.messages import Pose, Target
+from trunkline.ar.teleop.messages import Pose
 from trunkline.kinematics.residual.residual_map import ResidualMap, RestingPoses
 from trunkline.model.statics.equilibria import actuated
 
@@ -108,8 +101,6 @@ def test_rests_are_added_to_what_the_package_has_learnt():
     np.testing.assert_array_equal(both.residuals[: len(package.poses)], package.residuals)
     np.testing.assert_array_equal(both.numbers, package.numbers)
     assert np.linalg.norm(both.mean(there)[0] - measured) < 0.3e-3
-    half = learnt_from([MeasuredRest(START, commands, tip)], CHAIN, OFFSET, package, share=0.5)
-    np.testing.assert_allclose(half.mean(there), (package.mean(there) + both.mean(there)) / 2, atol=1e-9)
 
 
 def test_beside_a_twin_that_leans_as_the_arm_does_nothing_is_left():
@@ -185,28 +176,6 @@ def test_the_next_order_has_what_corrections_have_measured():
         np.testing.assert_array_equal(rest.joints, session.planning.plans[0].joints[-1])
 
 
-@pytest.mark.parametrize("slow", [0.0, 0.01])
-def test_as_it_follows_the_controller_sends_them_where_its_settings_have_a_speed(slow):
-    session = Correcting()
-    orders = orders_of(session, FollowRequest)
-    session.controller = SessionController(
-        Teleoperation(patient(), Everywhere(), PACKAGE, OFFSET), session.robot, session.planning, EMPTY, 0.1,
-        session.log, 0.0, session.cameras, replace(SETTINGS, slow=slow),
-    )  # fmt: skip
-    session.controller.control(BASE)
-    rest = MeasuredRest(START, pulled(0.02, 0, 0), TARGET)
-    session.controller.correction.rests.append(rest)
-    session.aimed()
-    session.right = {"grip": 1.0, "stick_pressed": 1.0}
-    session.until(lambda intent: intent.motion == "follow")
-    session.right = {"grip": 1.0}
-    session.wait(1.0)
-    assert (orders[-1].rests, orders[-1].share) == (((rest,), 1.0) if slow else ((), 0.0))
-    frozen(session)
-    session.wait(0.3)
-    assert orders[-1].rests == ()
-
-
 def frozen(session):
     session.cameras.fault = "'unit_08' has not moved"
 
@@ -242,28 +211,3 @@ def test_a_rest_that_ends_the_correction_tells_nothing(wrong):
 
 def test_the_newest_are_kept():
     assert Correcting().controller.correction.rests.maxlen == MOST
-
-
-@pytest.mark.parametrize(("slow", "speed", "share"), [(0.01, 0.0, 1.0), (0.01, 0.01, 1.0), (0.01, 0.015, 0.5),
-                                                      (0.01, 0.02, 0.0), (0.0, 0.0, 0.0)])  # fmt: skip
-def test_as_it_follows_slowly_targets_are_sought_by_what_corrections_measured(slow, speed, share):
-    orders, rests = [], (MeasuredRest(START, pulled(0.02, 0, 0), TARGET),)
-    control, targets = FollowControl(orders.append, lambda age, axes: None, slow), request(MOUNT, tuple(TARGET)).targets
-    for knot in range(10):
-        tip = Target((TARGET[0] + speed * KNOT * knot, *map(float, TARGET[1:])))
-        control.seek(replace(targets, tip=tip), START, EMPTY, rests)
-        control.advance(KNOT)
-    assert [order.share for order in orders] == pytest.approx([0.0] * 5 + [share] * 5)
-    assert [order.rests for order in orders] == [rests if order.share else () for order in orders]
-
-
-def test_a_share_of_what_was_measured_moves_what_is_sought_by_as_much():
-    planning = PreviewPlanner(PLANNER, made().foresight, ())
-    first = planned(TARGET)
-    rest = MeasuredRest(first.joints[-1], first.commands[-1],
-                        tip_at(CHAIN, first.joints[-1], first.commands[-1]) + [5e-3, 0.0, 0.0])  # fmt: skip
-    targets, off = request(MOUNT, tuple(map(float, TARGET))).targets, []
-    for share in (0.0, 0.5, 1.0):
-        (answer,) = planning.answers(FollowRequest(1, targets, first.joints[-1], EMPTY, (rest,), share))
-        off.append(tip_at(CHAIN, answer.axes[:7], answer.axes[7:])[0] - TARGET[0])
-    np.testing.assert_allclose(off, [0.0, -2.5e-3, -5e-3], atol=0.7e-3)

@@ -45,9 +45,7 @@ class CorrectionSettings:
     """tolerance: m from the target, within which the tip has arrived. steps: at most. longest: m, change of commands
     in a step. steepest: m of the tip's way for 1 m of one motor's, from which on the arm is near snapping through.
     astray: m that the tip may be off: beyond, the twin or the cameras are wrong, which no step mends. misplaced: m that
-    the cameras may see the arm's mount from where the joints have it: beyond, the pose of their frame is wrong. slow:
-    m/s of targets that are followed, up to which what was measured at rest counts; 0 for never, as cables that go on
-    rubbing leave the lab's arm farther off than what rests tell mends (`python -m qualification.revisited`)."""
+    the cameras may see the arm's mount from where the joints have it: beyond, the pose of their frame is wrong."""
 
     tolerance: Metres = 0.8e-3
     steps: Annotated[int, Field(ge=1, le=20)] = 5
@@ -55,7 +53,6 @@ class CorrectionSettings:
     steepest: Annotated[float, Field(gt=0, le=1000)] = 15.0
     astray: Metres = 30e-3
     misplaced: Metres = 5e-3
-    slow: Annotated[float, Field(ge=0, le=1)] = 0.0
 
 
 class TipCorrection:

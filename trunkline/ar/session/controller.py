@@ -135,8 +135,7 @@ class SessionController:
         self._stop, self._fault, self._shown_digest, self._since, self._believed = False, "", "", 0.0, ""
         self._requested, self._ordered, self._started, self._ran = 0, False, "", False
         self._logged: tuple = ()
-        slow = (correction or CorrectionSettings()).slow
-        self._follow = FollowControl(previewer.submit, robot.hear, slow)
+        self._follow = FollowControl(previewer.submit, robot.hear)
         self.cameras, self.arm = cameras, None
         self.camera_alignment, self.hanging = camera_alignment, hanging
         self.aligned: CamerasAligned | None = None  # the last that was computed
@@ -287,7 +286,7 @@ class SessionController:
             self._ask(intent, robot_state, hands.correct)
             self._follow.advance(dt / len(steps))
             if intent.mode == "follow":
-                self._follow.seek(intent.targets, robot_state.joints, self.world, self._rests)
+                self._follow.seek(intent.targets, robot_state.joints, self.world)
             else:
                 self._follow.end()
             self._drive(intent)

@@ -42,16 +42,14 @@ def learnt_from(
     mount_offset: float,
     before: ResidualMap | None,
     lean: Rotation | None = None,
-    share: float = 1.0,
 ) -> ResidualMap | None:
-    """What is learnt of the arm `before` these rests, and by them, beside a twin that leans on its mount by `lean`.
-    share: by which what they add counts, 0 to 1."""
-    if not rests or share <= 0:
+    """What is learnt of the arm `before` these rests, and by them, beside a twin that leans on its mount by `lean`."""
+    if not rests:
         return before
     places, bases = base_frames(np.array([rest.joints for rest in rests]), mount_offset)
     tips = np.einsum("nji,nj->ni", bases, np.array([rest.tip for rest in rests]) - places)
     gravity = np.einsum("nji,j->ni", bases, DOWN)
-    return learnt_in_base(chain, np.array([rest.commands for rest in rests]), gravity, tips, before, lean, share)
+    return learnt_in_base(chain, np.array([rest.commands for rest in rests]), gravity, tips, before, lean)
 
 
 def learnt_in_base(
@@ -61,7 +59,6 @@ def learnt_in_base(
     tips: np.ndarray,
     before: ResidualMap | None = None,
     lean: Rotation | None = None,
-    share: float = 1.0,
 ) -> ResidualMap | None:
     """As `learnt_from`. Where the twin finds no rest, or with tension that a section's cables share, nothing is learnt.
 
@@ -77,7 +74,4 @@ def learnt_in_base(
     if not tells.any():
         return before
     poses, residuals = RestingPoses.of(chain, twin, gravity)[tells], residuals[tells]
-    if before is None:
-        return ResidualMap.supposed(poses, share * residuals, chain.length)
-    foreseen = before.mean(poses)
-    return before.extended(poses, foreseen + share * (residuals - foreseen))
+    return ResidualMap.supposed(poses, residuals, chain.length) if before is None else before.extended(poses, residuals)

@@ -1,11 +1,9 @@
 """What moving targets ask of a robot that follows them: sought by the process that plans, heard by the robot."""
 
-from collections import deque
 from collections.abc import Callable
 
 import numpy as np
 
-from trunkline.ar.session.correction_rests import MeasuredRest
 from trunkline.ar.session.previewer import FollowAnswer, FollowRequest
 from trunkline.ar.teleop.following import KNOT
 from trunkline.ar.teleop.messages import Targets, World
@@ -14,22 +12,16 @@ from trunkline.ar.teleop.trajectory import JOINTS
 
 PLANNER_TIMEOUT = 1.0  # s without an answer of the process that plans; a busy machine answers within 0.5
 ROUNDING = 1e-6  # s, of a sum of ticks
-PACE = 0.5  # s over which the speed of the tip's target is taken: a hand trembles by a millimetre within less
-PLACES = round(PACE / KNOT) + 1
 
 
 class FollowControl:
-    """`order` asks for axes; `hear` takes them, with the s since their targets. slow: m/s of the tip's target, up to
-    which what corrections have measured counts in full, and from twice that on not at all; 0 for never. refused: why
-    the newest targets are not followed, "" where they are."""
+    """`order` asks for axes; `hear` takes them, with the s since their targets. refused: why the newest targets are
+    not followed, "" where they are."""
 
     def __init__(
-        self,
-        order: Callable[[FollowRequest], None],
-        hear: Callable[[float, np.ndarray | None], None],
-        slow: float = 0.0,
+        self, order: Callable[[FollowRequest], None], hear: Callable[[float, np.ndarray | None], None]
     ) -> None:
-        self._order, self._hear, self._slow = order, hear, slow
+        self._order, self._hear = order, hear
         self._now, self._serial = 0.0, 0
         self.end()
 
@@ -39,7 +31,6 @@ class FollowControl:
         self._times: dict[int, float] = {}  # of what is being sought
         self._pending: list[tuple[float, np.ndarray | None]] = []  # before the robot may follow
         self._near: np.ndarray | None = None
-        self._places: deque[np.ndarray] = deque(maxlen=PLACES)  # of the tip's target, m
 
     @property
     def fault(self) -> str:
@@ -52,31 +43,14 @@ class FollowControl:
         """Let `dt` s pass."""
         self._now += dt
 
-    def seek(
-        self, targets: Targets | None, joints: np.ndarray, world: World, rests: tuple[MeasuredRest, ...] = ()
-    ) -> None:
-        """Every KNOT s, what `targets` ask for, near what was found last, at first near `joints` (7,), rad; where they
-        move slowly, by what corrections have measured at `rests`."""
+    def seek(self, targets: Targets | None, joints: np.ndarray, world: World) -> None:
+        """Every KNOT s, what `targets` ask for, near what was found last, at first near `joints` (7,), rad."""
         if self._now < self._last + KNOT - ROUNDING:
             return
         self._serial, self._last = self._serial + 1, self._now
         self._times[self._serial] = self._now
         near = joints if self._near is None else self._near
-        share = self._share(targets)
-        self._order(FollowRequest(
-            self._serial, None if why_not(targets) else targets, near, world, rests if share else (), share
-        ))  # fmt: skip
-
-    def _share(self, targets: Targets | None) -> float:
-        """By which corrections count at the speed of the tip's target, 0 while that is not known."""
-        if targets is None:
-            self._places.clear()
-            return 0.0
-        self._places.append(np.array(targets.tip.position))
-        if not self._slow or len(self._places) < PLACES:
-            return 0.0
-        speed = float(np.linalg.norm(self._places[-1] - self._places[0])) / PACE
-        return float(np.clip(2 - speed / self._slow, 0.0, 1.0))
+        self._order(FollowRequest(self._serial, None if why_not(targets) else targets, near, world))
 
     def begin(self) -> None:
         """The robot follows from now on, and hears what was found so far."""

@@ -54,14 +54,12 @@ class Order:
 @dataclass(frozen=True)
 class FollowRequest:
     """What `targets` ask of a robot that follows is asked for, the nearest to `joints` (7,), rad; targets None: nothing
-    that it may follow. rests: that corrections have measured, which count by `share`, 0 to 1."""
+    that it may follow."""
 
     serial: int
     targets: Targets | None
     joints: np.ndarray
     world: World
-    rests: tuple[MeasuredRest, ...] = ()
-    share: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -157,8 +155,7 @@ class PreviewPlanner:
         preview breaks off is refused, as it could never be confirmed."""
         try:
             if isinstance(order, FollowRequest):
-                planner = self._knowing(order.rests, order.share)
-                yield FollowAnswer(order.serial, *sought(planner, order.targets, order.joints, order.world))
+                yield FollowAnswer(order.serial, *sought(self.planner, order.targets, order.joints, order.world))
             elif isinstance(order, CorrectionOrder):
                 yield self._corrections.answer(order)
             else:
@@ -208,18 +205,16 @@ class PreviewPlanner:
             target = None if request.targets.object else np.array(request.targets.tip.position)
             yield PredictionAnswer(serial, prediction_message(digest, prediction, target))
 
-    def _knowing(self, rests: tuple[MeasuredRest, ...], share: float = 1.0) -> Planner:
-        """The planner that begins from `rests` as well, which count by `share`."""
-        return replace(self.planner, residual_map=self._learnt(rests, None, share)) if rests else self.planner
+    def _knowing(self, rests: tuple[MeasuredRest, ...]) -> Planner:
+        """The planner that begins from `rests` as well."""
+        return replace(self.planner, residual_map=self._learnt(rests)) if rests else self.planner
 
-    def _learnt(
-        self, rests: tuple[MeasuredRest, ...], lean: Rotation | None = None, share: float = 1.0
-    ) -> ResidualMap | None:
+    def _learnt(self, rests: tuple[MeasuredRest, ...], lean: Rotation | None = None) -> ResidualMap | None:
         """Of the arm, beside a twin that leans by `lean`."""
         planner = self.planner
         if planner.chain is None:
             return planner.residual_map
-        return learnt_from(rests, planner.chain, planner.mount_offset, planner.residual_map, lean, share)
+        return learnt_from(rests, planner.chain, planner.mount_offset, planner.residual_map, lean)
 
     def prepare(self, order: Order) -> None:
         """Compose its twin, which the next order takes, where nothing has changed."""
