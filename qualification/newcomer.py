@@ -40,9 +40,10 @@ GOAL = 120.0  # s
 MODE = "document.querySelector('#mode').dataset.mode"
 SHOWN = "Boolean(globalThis.trunkline?.loaded && trunkline.frame && trunkline.state)"
 CONTROLS = "Boolean(trunkline.wire?.controls)"
-INSIDE = "trunkline.state?.targets?.tip?.reach === 'inside' && trunkline.state?.targets?.rigid?.reach === 'inside'"
-OFFERED = "['rigid', 'tip'].some((name) => trunkline.state?.targets?.[name]?.offer) || Boolean(trunkline.prediction?.offer)"
-MARKED = "Boolean(trunkline.state?.targets?.thing)"
+INSIDE = "['rigid', 'tip'].every((name) => trunkline.state?.targets?.[name]?.reach === 'inside')"
+AIM = "trunkline.state?.targets?"
+OFFERED = f"Boolean({AIM}.rigid?.offer || {AIM}.tip?.offer || trunkline.prediction?.offer)"
+MARKED = f"Boolean({AIM}.thing)"
 HELD = "trunkline.desktop.objects.length === 0"  # of those that are not held
 # where the tip's marker is in the window, and the object
 DRAGGED = """(() => {
