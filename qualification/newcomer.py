@@ -4,10 +4,10 @@
 
 The command is started, the address that it prints is opened in a headless Chromium that draws by software, and four
 things are done: a reach, by keys; a grasp, by dragging the tip's marker onto the cylinder; a motion that is stopped on
-its way; and the same motion after all. Each is aimed, its plan asked for, watched to its end and confirmed, and the grip
-held until the page says that the robot has arrived. Where the page says what to press besides, that is pressed, and
-counted: control was lost, the robot was stopped, it holds, or a point is offered. All is as a user has it: no setting is
-changed. A person reads besides. `--load` busy loops run beside it.
+its way; and the same motion after all. Each is aimed, its plan asked for, watched to its end and confirmed, and the
+grip held until the page says that the robot has arrived. Where the page says what to press besides, that is pressed,
+and counted: control was lost, the robot was stopped, it holds, or a point is offered. All is as a user has it: no
+setting is changed. A person reads besides. `--load` busy loops run beside it.
 """
 
 import asyncio
