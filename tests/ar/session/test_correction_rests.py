@@ -13,6 +13,7 @@ from tests.ar.session.test_preview_process import made
 from tests.ar.session.test_preview_process import order as asked
 from tests.ar.teleop.test_plan import MOUNT, OFFSET, START, request
 from trunkline.ar.preview.grasp_preview import GraspPreviewer
+from trunkline.ar.session import correction_rests
 from trunkline.ar.session.correction_rests import MOST, MeasuredRest, learnt_from, learnt_in_base
 from trunkline.ar.session.correction_steps import DOWN, CorrectionSteps
 from trunkline.ar.session.previewer import Order, PreviewPlanner
@@ -112,6 +113,14 @@ def test_beside_a_twin_that_leans_as_the_arm_does_nothing_is_left():
     assert np.linalg.norm(learnt_in_base(CHAIN, commands, DOWN[None], tips).residuals) > 3e-3
 
 
+def test_a_rest_to_which_the_twin_snaps_tells_nothing(monkeypatch):
+    rest = MeasuredRest(START, BY_A_CABLE, TARGET)
+    assert learnt_from([rest], CHAIN, OFFSET, None) is not None
+    snaps = lambda *args: replace(actuated(*args), snapped=np.ones(1, bool))  # noqa: E731
+    monkeypatch.setattr(correction_rests, "actuated", snaps)
+    assert learnt_from([rest], CHAIN, OFFSET, None) is None
+
+
 def test_what_is_not_finite_tells_nothing():
     nowhere = MeasuredRest(START, pulled(0.02, 0, 0), np.full(3, np.nan))
     assert learnt_from([nowhere], CHAIN, OFFSET, None) is None
@@ -180,24 +189,34 @@ def frozen(session):
     session.cameras.fault = "'unit_08' has not moved"
 
 
-def moved_frame(session):
-    session.cameras.align = lambda pose: None
-    session.controller.camera_alignment = type(
-        "Aligned", (), {"take": lambda self: Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)),
-                        "observe": lambda self, robot, arm: None}
-    )()  # fmt: skip
-
-
-@pytest.mark.parametrize("happens", [frozen, moved_frame])
-def test_nothing_begins_from_a_stream_that_is_not_sound_or_from_another_frame(happens):
+def test_nothing_begins_from_a_stream_that_is_not_sound():
     session = Correcting()
     orders = orders_of(session)
     session.executing().until(lambda intent: intent.mode == "aim")
     assert len(session.controller.correction.rests) == 3
-    happens(session)
+    frozen(session)
     again(session)
     assert orders[-1].rests == ()
     assert len(orders) == 2
+    session.cameras.fault = ""
+    session.wait(0.1)
+    assert len(session.controller._rests) == 3  # a stream that was late is relied on again
+
+
+def test_where_the_cameras_are_aligned_anew_what_they_measured_is_in_their_new_frame():
+    session, half = Correcting(), np.sqrt(0.5)
+    orders = orders_of(session)
+    session.executing().until(lambda intent: intent.mode == "aim")
+    before = [rest.tip for rest in session.controller.correction.rests]
+    session.cameras.pose = Pose((0.1, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+    session.cameras.align = lambda pose: None
+    session.controller.camera_alignment = type(
+        "Aligned", (), {"take": lambda self: Pose((0.1, 0.2, 0.0), (half, 0.0, 0.0, half)),
+                        "observe": lambda self, robot, arm: None}
+    )()  # fmt: skip
+    again(session)
+    after = [(0.1 - y, 0.2 + x - 0.1, z) for x, y, z in before]  # by a quarter about z
+    np.testing.assert_allclose([rest.tip for rest in orders[-1].rests], after, atol=1e-12)
 
 
 @pytest.mark.parametrize("wrong", ["mount", "shift"])

@@ -1,6 +1,7 @@
 """Topics of ROS 2 as a source of poses: their bytes are those of ROS, a driver in another process is heard by DDS, and
 what it says untruly is named; and single bodies are put together to frames."""
 
+import itertools
 import os
 import re
 import signal
@@ -112,11 +113,12 @@ def test_the_kinds_are_those_that_logs_have():
         ("off", "for the usual"),
         ("nan", "'tip': found a position that is not finite"),
         ("frame", "found 'tip' in the frame 'elsewhere', expected 'world'"),
+        ("frame of a topic", "found 'tip' in the frame 'elsewhere', expected 'world'"),
     ],
 )
 def test_what_is_published_untruly_is_named(fault, line):
     kind = "tf2_msgs/TFMessage" if fault == "frame" else "geometry_msgs/PoseStamped"
-    with published(kind, fault=fault) as driver:
+    with published(kind, fault=fault.removesuffix(" of a topic")) as driver:
         tracker = RosTracker(settings_of(kind), EXPECTED, PATIENT)
         try:
             tracker.connect()
@@ -128,6 +130,19 @@ def test_what_is_published_untruly_is_named(fault, line):
             assert re.search(line, tracker.latest().fault), tracker.latest().fault
         finally:
             tracker.stop()
+
+
+def test_a_body_that_no_topic_can_have_and_bodies_that_are_stamped_apart_are_refused(monkeypatch):
+    with pytest.raises(InputError, match="cameras.bodies: found 'unit 04', expected letters, digits and _, as a part"):
+        RosSource(settings_of("geometry_msgs/PoseStamped"), ("base", "unit 04"))
+    monkeypatch.setattr(ros_source, "COMES", 0.2)
+    stamps = itertools.count()
+    turn = np.array([1.0, 0.0, 0.0, 0.0])
+    monkeypatch.setattr(RosSource, "_messages", lambda self, seconds: [
+        [BodyPose(name, 2e-3 * next(stamps), np.zeros(3), turn)] for name in NAMES
+    ])  # fmt: skip
+    with pytest.raises(InputError, match="found each body stamped by itself, expected two of them within 1 ms"):
+        RosSource(settings_of("geometry_msgs/PoseStamped"), NAMES)
 
 
 @pytest.mark.realtime

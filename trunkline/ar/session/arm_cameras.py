@@ -224,7 +224,9 @@ def marker_positions(poses: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 
 def expected_bodies(names: Sequence[str], apart: np.ndarray) -> ExpectedBodies:
-    """Bodies from the mount on, of which neighbors are `apart`, m. Shape (B - 1,)."""
+    """Bodies from the mount on, of which neighbors are `apart`, m. Shape (B - 1,). A single one has no distances."""
+    if len(names) < 2:
+        return ExpectedBodies(tuple(names), True)
     distances, rows = np.full((len(names), len(names)), np.nan), np.arange(len(apart))
     distances[rows, rows + 1] = distances[rows + 1, rows] = apart
     return ExpectedBodies(tuple(names), True, None, distances)

@@ -32,12 +32,7 @@ public static class Unpacked {
     foreach (string path in digests.Names) {
       Require(path, files.TryGetValue(path, out var data) ? Digest(data) : "none", digests.Text(path));
     }
-    foreach (var file in files) {
-      if (file.Key != Manifest && !digests.Has(file.Key)) {
-        Require(file.Key, Digest(file.Value), "none");
-      }
-    }
-    return Digest(files[Manifest]);
+    return PartDigest(files, manifest);
   }
 
   /// <summary>The same of an app that brings some of the package's files: those that it brings are tested.</summary>
