@@ -1,6 +1,6 @@
 """What corrections leave for later: the first error where a plan begins from them, and the tip that follows by them.
 
-    python -m qualification.revisited [--targets 60]
+    python -m qualification.revisited [--targets 20]
 
 The lab's arm is corrected by its cameras at a tip of its own, as in `qualification.seen`. Then it hangs again and is
 sent there, or to tips of its own near there, at once: by commands that are made as a session makes them, without and
@@ -28,7 +28,7 @@ from trunkline.kinematics.ik.inputs import gravity_of, position_of
 from trunkline.kinematics.residual.residual_map import ResidualMap
 from upkeep.results import recorded
 
-TARGETS = 60
+TARGETS = 20
 APART = (0.0, 5e-3, 10e-3, 20e-3)  # m, of the pulls from where the arm was corrected
 SPEEDS = (5e-3, 10e-3, 20e-3, 40e-3, 80e-3)  # m/s, of targets that are followed
 PLACES = 9  # on their way at which commands are sought, linear between

@@ -69,6 +69,12 @@ def test_poses_of_the_arm_move_the_tip_that_is_stated_and_not_its_radius():
     uncertain = dry.tip_uncertainty(pull(dry.arm.copy().compile()), None)
     assert isinstance(uncertain, TipUncertainty)
     assert uncertain.unknown < 1e-6
+    elsewhere = replace(dry, lacking=replace(knows, residual_map=replace(
+        knows.residual_map, numbers=np.array([1.0, 1e-6, 1e-3, 1e-3, 1e3])
+    )))  # fmt: skip
+    without, session = (elsewhere.tip_uncertainty(pull(dry.arm.copy().compile()), None, learnt)
+                        for learnt in (None, knows.residual_map))  # fmt: skip
+    assert session.unknown == without.unknown > 0.5  # a few rests of one session make none surer
     drawn = uncertain.offsets(np.zeros(3), np.array([0.0, 0.0, -0.3]), 50, np.random.default_rng(0))
     assert np.linalg.norm(drawn, axis=1).max() < 1e-4 < np.linalg.norm(uncertain.friction)
     made = robot_model(CASES["rubbing"])

@@ -165,6 +165,8 @@ def test_a_session_that_names_no_such_arm_is_refused(recorded, before, after, re
     settings = replace(live().cameras, session=str(recorded), apart=(0.2, 0.1))
     with pytest.raises(InputError, match=rf"^cameras.session: .*session.yaml: .*{reason}"):
         real_cameras("natnet", settings)
+    with pytest.raises(InputError, match=r"^cameras.session: .*/absent: no such folder, expected a session"):
+        real_cameras("natnet", replace(settings, session=str(recorded / "absent")))
 
 
 def test_names_are_said_once():

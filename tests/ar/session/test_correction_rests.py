@@ -13,6 +13,7 @@ from tests.ar.session.test_preview_process import made
 from tests.ar.session.test_preview_process import order as asked
 from tests.ar.teleop.test_plan import MOUNT, OFFSET, START, request
 from trunkline.ar.preview.grasp_preview import GraspPreviewer
+from trunkline.ar.session import correction_rests
 from trunkline.ar.session.correction_rests import MOST, MeasuredRest, learnt_from, learnt_in_base
 from trunkline.ar.session.correction_steps import DOWN, CorrectionSteps
 from trunkline.ar.session.previewer import Order, PreviewPlanner
@@ -22,6 +23,7 @@ from trunkline.kinematics.residual.residual_map import ResidualMap, RestingPoses
 from trunkline.model.statics.equilibria import actuated
 
 PLACE, TURN = base_frames(START, OFFSET)
+BY_A_CABLE = pulled(0.02, -0.05, -0.05)  # the others are loose
 TARGET = np.array(MOUNT) + TURN @ actuated(CHAIN, pulled(0.02, 0, 0)[None], DOWN @ TURN).position[0]
 
 
@@ -59,12 +61,28 @@ def test_the_next_plan_ends_nearer_where_a_plan_was_corrected_and_near_there(nam
     again = error(arm, planned(TARGET, learnt), TARGET)
     print(f"there: {1e3 * before:.2f} mm, then {1e3 * again:.2f} mm")
     assert before > 1e-3
-    assert again < 0.5 * before
+    assert again < 0.1 * before
     for aside in ([8e-3, 0, 0], [0, -8e-3, 0], [0, 0, 5e-3]):
         near = TARGET + np.array(aside)
         without, with_it = error(arm, planned(near), near), error(arm, planned(near, learnt), near)
         print(f"near there: {1e3 * without:.2f} mm, then {1e3 * with_it:.2f} mm")
-        assert with_it < 0.85 * without
+        assert with_it < 0.4 * without
+
+
+def test_a_rest_where_a_loose_cable_stops_the_twin_alone_tells_nothing():
+    """Of soft cables: as the steps pull farther, the twin bends until the second cable holds it. The residual falls
+    from 3.1 to 1.8 mm by that alone, and would make plans near there gain a fifth, as they hold no such cable."""
+    arm, first = ARMS["soft cables"], planned(TARGET)
+    rests = corrected(arm, first, TARGET)
+    commands, turn = np.array([rest.commands for rest in rests]), base_frames(rests[0].joints, OFFSET)[1]
+    twins, arms = (actuated(chain, commands, DOWN @ turn).tensions[:, 1] for chain in (CHAIN, arm))
+    assert twins[0] == pytest.approx(0, abs=1e-3)
+    assert twins[-1] > 0.03
+    assert (arms == 0).all()
+    learnt = learnt_from(rests, CHAIN, OFFSET, None)
+    assert 1 <= len(learnt.poses) < len(rests)
+    package = ResidualMap.supposed(learnt.poses, learnt.residuals, CHAIN.length)
+    assert learnt_from(rests[-1:], CHAIN, OFFSET, package) is package
 
 
 def test_far_from_there_plans_are_as_before():
@@ -75,7 +93,7 @@ def test_far_from_there_plans_are_as_before():
 
 def test_rests_are_added_to_what_the_package_has_learnt():
     shift, measured = np.array([[0.0, 2e-3, 0.0]]), np.array([3e-3, 0.0, 0.0])
-    commands = pulled(0.02, 0, 0)
+    commands = BY_A_CABLE
     tip = PLACE + TURN @ (actuated(CHAIN, commands[None], DOWN @ TURN).position[0] + measured)
     package = ResidualMap.supposed(RestingPoses(np.array([[0.0, 0.03, 0.0]]), DOWN[None]), shift, CHAIN.length)
     assert learnt_from((), CHAIN, OFFSET, package) is package
@@ -89,10 +107,18 @@ def test_rests_are_added_to_what_the_package_has_learnt():
 def test_beside_a_twin_that_leans_as_the_arm_does_nothing_is_left():
     """Else a preview, whose twin leans already, would have it twice."""
     lean = Rotation.from_rotvec([0.03, 0.0, 0.0])
-    commands = pulled(0.02, 0, 0)[None]
+    commands = BY_A_CABLE[None]
     tips = lean.apply(actuated(CHAIN, commands, lean.inv().apply(DOWN)).position)
     assert np.linalg.norm(learnt_in_base(CHAIN, commands, DOWN[None], tips, None, lean).residuals) < 1e-9
     assert np.linalg.norm(learnt_in_base(CHAIN, commands, DOWN[None], tips).residuals) > 3e-3
+
+
+def test_a_rest_to_which_the_twin_snaps_tells_nothing(monkeypatch):
+    rest = MeasuredRest(START, BY_A_CABLE, TARGET)
+    assert learnt_from([rest], CHAIN, OFFSET, None) is not None
+    snaps = lambda *args: replace(actuated(*args), snapped=np.ones(1, bool))  # noqa: E731
+    monkeypatch.setattr(correction_rests, "actuated", snaps)
+    assert learnt_from([rest], CHAIN, OFFSET, None) is None
 
 
 def test_what_is_not_finite_tells_nothing():
@@ -120,12 +146,12 @@ def test_plan_and_preview_begin_from_what_was_measured(monkeypatch, hangs):
     np.testing.assert_allclose(heard[1].residuals, [measured - leaning], atol=1e-6)
 
 
-def orders_of(session):
-    """Those of plans, from now on."""
+def orders_of(session, kind=Order):
+    """Those of plans, from now on, or of another kind."""
     submit, orders = session.planning.submit, []
 
     def hear(order):
-        if isinstance(order, Order):
+        if isinstance(order, kind):
             orders.append(order)
         submit(order)
 
@@ -163,24 +189,34 @@ def frozen(session):
     session.cameras.fault = "'unit_08' has not moved"
 
 
-def moved_frame(session):
-    session.cameras.align = lambda pose: None
-    session.controller.camera_alignment = type(
-        "Aligned", (), {"take": lambda self: Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)),
-                        "observe": lambda self, robot, arm: None}
-    )()  # fmt: skip
-
-
-@pytest.mark.parametrize("happens", [frozen, moved_frame])
-def test_nothing_begins_from_a_stream_that_is_not_sound_or_from_another_frame(happens):
+def test_nothing_begins_from_a_stream_that_is_not_sound():
     session = Correcting()
     orders = orders_of(session)
     session.executing().until(lambda intent: intent.mode == "aim")
     assert len(session.controller.correction.rests) == 3
-    happens(session)
+    frozen(session)
     again(session)
     assert orders[-1].rests == ()
     assert len(orders) == 2
+    session.cameras.fault = ""
+    session.wait(0.1)
+    assert len(session.controller._rests) == 3  # a stream that was late is relied on again
+
+
+def test_where_the_cameras_are_aligned_anew_what_they_measured_is_in_their_new_frame():
+    session, half = Correcting(), np.sqrt(0.5)
+    orders = orders_of(session)
+    session.executing().until(lambda intent: intent.mode == "aim")
+    before = [rest.tip for rest in session.controller.correction.rests]
+    session.cameras.pose = Pose((0.1, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+    session.cameras.align = lambda pose: None
+    session.controller.camera_alignment = type(
+        "Aligned", (), {"take": lambda self: Pose((0.1, 0.2, 0.0), (half, 0.0, 0.0, half)),
+                        "observe": lambda self, robot, arm: None}
+    )()  # fmt: skip
+    again(session)
+    after = [(0.1 - y, 0.2 + x - 0.1, z) for x, y, z in before]  # by a quarter about z
+    np.testing.assert_allclose([rest.tip for rest in orders[-1].rests], after, atol=1e-12)
 
 
 @pytest.mark.parametrize("wrong", ["mount", "shift"])

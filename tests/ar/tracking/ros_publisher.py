@@ -23,7 +23,7 @@ from trunkline.ar.tracking import ros_messages as ros
 
 NAMES = ("base", "middle", "tip")
 PLACES = np.array([[1.0, 2.0, 3.0], [1.0, 2.0, 2.8], [1.1, 2.0, 2.6]])
-TURNED = (0.5, 0.5, -0.5, 0.5)  # wxyz
+TURNED = (2 / 11, 1 / 11, -4 / 11, 10 / 11)  # wxyz, each another number
 TOPICS = {"geometry_msgs/PoseStamped": "/poses/{body}", "tf2_msgs/TFMessage": "/tf"}
 RATE = 120.0
 
@@ -39,7 +39,7 @@ def header(stamp, frame):
 
 def pose(place):
     w, x, y, z = TURNED
-    return ros.Pose(ros.Point(*place), ros.Quaternion(x, y, z, w))
+    return ros.RosPose(ros.Point(*place), ros.Quaternion(x, y, z, w))
 
 
 def messages(kind, number, stamp, names, places, frames):
@@ -57,7 +57,7 @@ def messages(kind, number, stamp, names, places, frames):
         named, latency = [ros.NamedPose(*body) for body in bodies], [ros.LatencyInfo("cameras", 5)]
         more = (7, latency) if kind.endswith("V2") else ()
         return [(None, ros.TYPES[kind](heads[0], *more, named))]
-    marker = ros.Marker(0, 1, "m", ros.Point(0.0, 0.0, 0.0))
+    marker = ros.RosMarker(0, 1, "m", ros.Point(0.0, 0.0, 0.0))
     rows = [ros.RigidBody(name, [marker], at) for name, at in bodies]
     return [(None, ros.TYPES[kind](heads[0], number, rows))]
 

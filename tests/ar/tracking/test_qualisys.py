@@ -1,9 +1,11 @@
 """QTM as a source of poses, against a stand-in of its real-time server."""
 
 import re
+import struct
 import threading
 import time
 from contextlib import contextmanager
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -86,14 +88,17 @@ def test_a_source_receives_the_named_bodies_in_m_and_turned_as_qtm_has_them():
     assert (second.number, second.tracked.tolist()) == (9, [True, False])
 
 
-def test_a_body_that_qtm_does_not_track_a_mute_server_and_none_at_all_are_refused(monkeypatch):
-    monkeypatch.setattr(qualisys, "ANSWERS", 0.5)
+def test_a_body_that_qtm_does_not_track_no_measurement_and_a_mute_or_absent_server_are_refused(monkeypatch):
+    monkeypatch.setattr(qualisys, "ANSWERS", 1.0)
     with qtm(STREAMED) as server:
         settings = QualisysSettings(LOOPBACK, server.port)
         with pytest.raises(InputError) as error:
             QualisysSource(settings, ("base", "tp"))
         reason = "found the 6D bodies other, tip, base, expected 'tp' once, did you mean 'tip'?"
         assert str(error.value) == f"QTM at 127.0.0.1: {reason}"
+        with pytest.raises(InputError) as error:
+            QualisysSource(settings, NAMES)
+        assert str(error.value) == "QTM at 127.0.0.1: found no frame, expected a measurement or a preview to run"
         server.answers = False
         silent = f"found no answer at port {server.port}, expected QTM's real-time server"
         with pytest.raises(InputError) as error:
@@ -102,6 +107,18 @@ def test_a_body_that_qtm_does_not_track_a_mute_server_and_none_at_all_are_refuse
     with pytest.raises(InputError) as error:
         QualisysSource(settings, NAMES)
     assert str(error.value) == f"QTM at 127.0.0.1: {silent}"
+
+
+def test_a_frame_that_is_cut_short_is_named_and_a_matrix_that_turns_nothing_is_no_rotation():
+    source = QualisysSource.__new__(QualisysSource)
+    source._rows, source._bodies = [0, 1], 2
+    cut = SimpleNamespace(get_6d=lambda: struct.unpack("<d", b"1234"))
+    with pytest.raises(ValueError, match="found a frame of another layout .*, expected 6D bodies"):
+        source._frame(cut)
+    matrices = [SimpleNamespace(matrix=size * np.eye(3).ravel()) for size in (1.0, 2.0)]
+    packet = SimpleNamespace(get_6d=lambda: (None, [((0.0, 0.0, 0.0), matrix) for matrix in matrices]),
+                             timestamp=1, framenumber=1)  # fmt: skip
+    assert np.isnan(source._frame(packet).quaternions[:, 0]).tolist() == [False, True]
 
 
 def test_a_frame_of_other_bodies_and_the_end_of_the_connection_are_named():

@@ -1,6 +1,7 @@
 """Topics of ROS 2 as a source of poses: their bytes are those of ROS, a driver in another process is heard by DDS, and
 what it says untruly is named; and single bodies are put together to frames."""
 
+import itertools
 import os
 import re
 import signal
@@ -27,7 +28,7 @@ from trunkline.errors import InputError
 from trunkline.recordings.logs.definitions import KNOWN
 from trunkline.recordings.logs.messages import POSES, TOPIC_PER_BODY
 
-DOMAIN = 81
+DOMAIN = 81 + os.getpid() % 19  # apart from other runs of the tests on this machine
 URI = f"<CycloneDDS><Domain>{LOOPBACK}</Domain></CycloneDDS>"
 APART = np.linalg.norm(PLACES[:, None] - PLACES, axis=-1)
 EXPECTED = ExpectedBodies(NAMES, True, None, APART)
@@ -64,13 +65,16 @@ def test_the_bytes_are_those_of_ros(kind):
     name = kind.replace("/", "/msg/")
     if name not in store.types:
         store.register(get_types_from_msg(KNOWN[kind], name))
-    for _, message in messages(kind, 7, 12.5, NAMES, PLACES, ["world"] * 3):
+    for body, message in messages(kind, 7, 12.5, NAMES, PLACES, ["world"] * 3):
         data = message.serialize()
-        assert bytes(store.serialize_cdr(store.deserialize_cdr(data, name), name)) == data
-        poses = POSES[kind](TYPES[kind].deserialize(data))
-        assert np.unique(poses.time).tolist() == [12_500_000_000]
-        assert np.isin(poses.positions, PLACES).all()
-        np.testing.assert_array_equal(poses.orientations, np.tile(TURNED, (len(poses.orientations), 1)))
+        other = store.deserialize_cdr(data, name)
+        assert bytes(store.serialize_cdr(other, name)) == data
+        rows = slice(None) if body is None else [NAMES.index(body)]
+        for read in (other, TYPES[kind].deserialize(data)):
+            poses = POSES[kind](read)
+            assert np.unique(poses.time).tolist() == [12_500_000_000]
+            np.testing.assert_array_equal(poses.positions, PLACES[rows])
+            np.testing.assert_array_equal(poses.orientations, np.tile(TURNED, (len(PLACES[rows]), 1)))
 
 
 @pytest.mark.realtime
@@ -109,11 +113,12 @@ def test_the_kinds_are_those_that_logs_have():
         ("off", "for the usual"),
         ("nan", "'tip': found a position that is not finite"),
         ("frame", "found 'tip' in the frame 'elsewhere', expected 'world'"),
+        ("frame of a topic", "found 'tip' in the frame 'elsewhere', expected 'world'"),
     ],
 )
 def test_what_is_published_untruly_is_named(fault, line):
     kind = "tf2_msgs/TFMessage" if fault == "frame" else "geometry_msgs/PoseStamped"
-    with published(kind, fault=fault) as driver:
+    with published(kind, fault=fault.removesuffix(" of a topic")) as driver:
         tracker = RosTracker(settings_of(kind), EXPECTED, PATIENT)
         try:
             tracker.connect()
@@ -125,6 +130,19 @@ def test_what_is_published_untruly_is_named(fault, line):
             assert re.search(line, tracker.latest().fault), tracker.latest().fault
         finally:
             tracker.stop()
+
+
+def test_a_body_that_no_topic_can_have_and_bodies_that_are_stamped_apart_are_refused(monkeypatch):
+    with pytest.raises(InputError, match="cameras.bodies: found 'unit 04', expected letters, digits and _, as a part"):
+        RosSource(settings_of("geometry_msgs/PoseStamped"), ("base", "unit 04"))
+    monkeypatch.setattr(ros_source, "COMES", 0.2)
+    stamps = itertools.count()
+    turn = np.array([1.0, 0.0, 0.0, 0.0])
+    monkeypatch.setattr(RosSource, "_messages", lambda self, seconds: [
+        [BodyPose(name, 2e-3 * next(stamps), np.zeros(3), turn)] for name in NAMES
+    ])  # fmt: skip
+    with pytest.raises(InputError, match="found each body stamped by itself, expected two of them within 1 ms"):
+        RosSource(settings_of("geometry_msgs/PoseStamped"), NAMES)
 
 
 @pytest.mark.realtime

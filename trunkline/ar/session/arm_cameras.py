@@ -149,7 +149,7 @@ class SimulatedArmCameras(ArmCameras):
         cameras = settings.simulated
         turn = rotation_from_wxyz(np.array(cameras.quaternion)).inv()
         pose = _pose(turn, -turn.apply(np.array(cameras.origin)))
-        self._simulated = SimulatedTracker(cameras, _expected(names, apart), settings.limits)
+        self._simulated = SimulatedTracker(cameras, expected_bodies(names, apart), settings.limits)
         super().__init__(self._simulated, names, pose, np.array(tip[1], float) - self._places[-1], np.zeros(3))
         self.show(poses)
 
@@ -170,7 +170,7 @@ def real_cameras(kind: str, settings: ArmCameraSettings) -> ArmCameras:
     settings = with_session(settings)
     if not settings.bodies:
         raise InputError("cameras.bodies: found none, expected the names of the arm's rigid bodies in the stream")
-    expected, limits = _expected(settings.bodies, np.array(settings.apart)), settings.limits
+    expected, limits = expected_bodies(settings.bodies, np.array(settings.apart)), settings.limits
     if kind == "natnet":
         tracker: Tracker = NatNetTracker(settings.natnet, expected, limits)
     elif kind == "ros2":
@@ -190,7 +190,10 @@ def with_session(settings: ArmCameraSettings) -> ArmCameraSettings:
     """
     if not settings.session:
         return settings
-    session = read_session(Path(settings.session))
+    try:
+        session = read_session(Path(settings.session))
+    except InputError as error:
+        raise InputError(f"cameras.session: {error}") from error
     where = f"cameras.session: {settings.session}/session.yaml"
     if not isinstance(session.base, str):
         raise InputError(f"{where}: found a fixed base, expected the name of the body at the mount")
@@ -220,8 +223,10 @@ def marker_positions(poses: np.ndarray, places: np.ndarray) -> np.ndarray:
     return np.array([_place(pose, place) for pose, place in zip(poses, places, strict=True)])
 
 
-def _expected(names: Sequence[str], apart: np.ndarray) -> ExpectedBodies:
-    """Bodies from the mount on, of which neighbors are `apart`, m. Shape (B - 1,)."""
+def expected_bodies(names: Sequence[str], apart: np.ndarray) -> ExpectedBodies:
+    """Bodies from the mount on, of which neighbors are `apart`, m. Shape (B - 1,). A single one has no distances."""
+    if len(names) < 2:
+        return ExpectedBodies(tuple(names), True)
     distances, rows = np.full((len(names), len(names)), np.nan), np.arange(len(apart))
     distances[rows, rows + 1] = distances[rows + 1, rows] = apart
     return ExpectedBodies(tuple(names), True, None, distances)

@@ -87,7 +87,10 @@ class HandInput:
 
 
 class Cameras(Protocol):
-    """What sees the arm; simulated ones are shown where the robot's drawn bodies are, (N, 7)."""
+    """What sees the arm; simulated ones are shown where the robot's drawn bodies are, (N, 7). pose: of their frame, in
+    the base."""
+
+    pose: Pose
 
     def show(self, bodies: np.ndarray) -> None: ...
     def latest(self) -> MeasuredArm: ...
@@ -411,8 +414,8 @@ class SessionController:
             if self.cameras is not None and self.camera_alignment is not None:
                 pose = self.camera_alignment.take()  # here, as the robot rests and nothing is corrected
                 if pose is not None:
+                    self.correction.realign(self.cameras.pose, pose)
                     self.cameras.align(pose)
-                    self.correction.rests.clear()  # of the frame before
                     self._frame_by = self.aligned
             self._requested, self.report, self.plan, self.preview = request.serial, None, None, None
             self.prediction, self.pieces, self._shown_digest = None, [], ""

@@ -13,11 +13,11 @@ import numpy as np
 from trunkline.ar.correction.correction import CorrectionSettings
 from trunkline.ar.correction.rest import RestWatch
 from trunkline.ar.session.arm_cameras import MeasuredArm
-from trunkline.ar.session.correction_rests import MOST, MeasuredRest
+from trunkline.ar.session.correction_rests import MOST, MeasuredRest, realigned
 from trunkline.ar.session.correction_steps import CorrectionAnswer, CorrectionOrder
 from trunkline.ar.session.robot_process import RobotState
 from trunkline.ar.teleop.base_frames import base_frames
-from trunkline.ar.teleop.messages import ExecutorReport, World
+from trunkline.ar.teleop.messages import ExecutorReport, Pose, World
 from trunkline.ar.teleop.plan import CorrectionBounds, Plan
 
 PATIENCE = 20.0  # s in which the tip has to rest
@@ -33,7 +33,8 @@ class CorrectionControl:
 
     Attributes:
         words: of the last correction or the one that goes on, in one line; "" where there is none.
-        rests: that corrections of the session have measured, where the stream and the mount's place were sound.
+        rests: that corrections of the session have measured, where the cameras saw the mount where the joints have it
+            and the tip came nearer, or was at its target at once: else an arm that somebody leans on would count.
     """
 
     def __init__(
@@ -56,12 +57,17 @@ class CorrectionControl:
         """Of a plan whose tip target is there, m."""
         return CorrectionBounds(target, self._settings.steps, self._settings.longest, self._settings.astray)
 
+    def realign(self, before: Pose, after: Pose) -> None:
+        """The cameras' frame is not where it was `before` in the base, but `after`: nor is what was measured in it."""
+        self.rests = deque(realigned(self.rests, before, after), maxlen=MOST)
+
     def forget(self) -> None:
         """Another motion begins, or none was corrected."""
         self.words, self._phase, self._waited = "", "", 0.0
         self._plan: Plan | None = None
         self._digests: set[str] = set()  # of its steps
         self._errors: list[float] = []
+        self._measured: list[MeasuredRest] = []
         self._answer: CorrectionAnswer | None = None
         self._mounts: list[np.ndarray] = []  # as cameras see it at rest
         self._steps = 0  # after which the tip was measured
@@ -119,6 +125,8 @@ class CorrectionControl:
             self._stop()
         self._phase, self._answer = "", None
         off, steps = [1e3 * error for error in self._errors], self._steps
+        if off and self._mounts and (off[-1] < off[0] or off[0] <= 1e3 * self._settings.tolerance):
+            self.rests.extend(self._measured)
         if off and not self._mounts and not self._unchecked:
             self._unchecked, reason = True, f"{reason}; {UNCHECKED}"
         if steps > 0:
@@ -203,7 +211,7 @@ class CorrectionControl:
             return self.end(reason)
         if self._errors[-1] > bounds.astray:
             return self.end(self._too_far(self._errors[-1]))
-        self.rests.append(MeasuredRest(self._plan.joints[-1], self._here, tip))
+        self._measured.append(MeasuredRest(self._plan.joints[-1], self._here, tip))
         self._phase, self._waited, self._answer = "asks", 0.0, None
         self.words = f"the tip is {1e3 * self._errors[-1]:.1f} mm off"
         self._submit(CorrectionOrder(

@@ -175,8 +175,7 @@ class PreviewPlanner:
         if order.hangs is not None:
             beside = float(order.hangs[1])
         try:
-            planner = replace(self.planner, residual_map=self._learnt(order.rests))
-            plan = planner.plan(request, order.world, order.joints, order.commands, beside)
+            plan = self._knowing(order.rests).plan(request, order.world, order.joints, order.commands, beside)
         except InputError as error:
             yield PlanAnswer(PlanReport(serial, refused=str(error)))
             return
@@ -205,6 +204,10 @@ class PreviewPlanner:
             self.prediction = prediction
             target = None if request.targets.object else np.array(request.targets.tip.position)
             yield PredictionAnswer(serial, prediction_message(digest, prediction, target))
+
+    def _knowing(self, rests: tuple[MeasuredRest, ...]) -> Planner:
+        """The planner that begins from `rests` as well."""
+        return replace(self.planner, residual_map=self._learnt(rests)) if rests else self.planner
 
     def _learnt(self, rests: tuple[MeasuredRest, ...], lean: Rotation | None = None) -> ResidualMap | None:
         """Of the arm, beside a twin that leans by `lean`."""

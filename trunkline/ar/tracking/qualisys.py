@@ -9,6 +9,7 @@ body that is not tracked is NaN. Tested with a server written from the protocol'
 """
 
 import asyncio
+import struct
 import time
 import xml.etree.ElementTree as ElementTree
 from collections import deque
@@ -29,6 +30,7 @@ from trunkline.frames import wxyz_from_rotation
 
 ANSWERS = 3.0  # s in which the server has to answer each time
 MM, MICRO = 1e-3, 1e-6
+SQUARE = 1e-2  # by which axes of a turn may differ from right angles and from 1
 
 
 @dataclass(frozen=True)
@@ -56,11 +58,16 @@ class QualisysSource:
         self._loop, self._connection = asyncio.new_event_loop(), None
         try:
             self._loop.run_until_complete(asyncio.wait_for(self._begin(qtm_rt, settings, names), 4 * ANSWERS))
-        except (InputError, OSError, TimeoutError, ElementTree.ParseError, qtm_rt.QRTCommandException) as error:
+        except InputError as error:
             self.close()
-            silent = f"found no answer at port {settings.port}, expected QTM's real-time server"
-            reason = silent if isinstance(error, OSError | TimeoutError) else str(error)
+            raise InputError(f"{where}: {error}") from error
+        except OSError as error:
+            self.close()
+            reason = f"found no answer at port {settings.port}, expected QTM's real-time server"
             raise InputError(f"{where}: {reason}") from error
+        except (ElementTree.ParseError, qtm_rt.QRTCommandException) as error:
+            self.close()
+            raise InputError(f"{where}: found an answer that is none ({error}), expected its parameters") from error
 
     def receive(self, seconds: float) -> CameraFrame | None:
         if not self._packets and not self._fault:
@@ -94,7 +101,10 @@ class QualisysSource:
                 streamed = ", ".join(bodies) or "none"
                 raise InputError(f"found the 6D bodies {streamed}, expected {name!r} once{nearest(name, bodies)}")
         self._rows, self._bodies = [bodies.index(name) for name in names], len(bodies)
-        await connection.stream_frames(components=["6d"], on_packet=self._take)
+        try:
+            await connection.stream_frames(components=["6d"], on_packet=self._take)
+        except TimeoutError as error:
+            raise InputError("found no frame, expected a measurement or a preview to run") from error
 
     async def _wait(self, seconds: float) -> None:
         self._came.clear()
@@ -112,7 +122,10 @@ class QualisysSource:
         self._came.set()
 
     def _frame(self, packet) -> CameraFrame:
-        part = packet.get_6d()
+        try:
+            part = packet.get_6d()
+        except struct.error as error:
+            raise ValueError(f"found a frame of another layout ({error}), expected 6D bodies") from error
         if part is None or len(part[1]) != self._bodies:
             count = "none" if part is None else len(part[1])
             raise ValueError(f"found {count} of the 6D bodies in a frame, expected all {self._bodies}")
@@ -120,7 +133,8 @@ class QualisysSource:
         matrices = np.array([part[1][row][1].matrix for row in self._rows], float).reshape(-1, 3, 3)
         tracked = np.asarray(np.isfinite(positions).all(axis=1))
         quaternions = np.full((len(positions), 4), np.nan)
-        turned = tracked & np.isfinite(matrices).all(axis=(1, 2)) & (np.linalg.det(np.nan_to_num(matrices)) > 0)
+        square = np.abs(matrices @ matrices.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))  # NaN is none
+        turned = tracked & (square < SQUARE) & (np.linalg.det(np.nan_to_num(matrices)) > 0)
         if turned.any():
             turns = Rotation.from_matrix(matrices[turned].transpose(0, 2, 1))  # column by column
             quaternions[turned] = wxyz_from_rotation(turns)

@@ -39,7 +39,7 @@ class Quaternion(IdlStruct, typename="geometry_msgs::msg::dds_::Quaternion_"):
 
 
 @dataclass
-class Pose(IdlStruct, typename="geometry_msgs::msg::dds_::Pose_"):
+class RosPose(IdlStruct, typename="geometry_msgs::msg::dds_::Pose_"):
     position: Point
     orientation: Quaternion
 
@@ -47,7 +47,7 @@ class Pose(IdlStruct, typename="geometry_msgs::msg::dds_::Pose_"):
 @dataclass
 class PoseStamped(IdlStruct, typename="geometry_msgs::msg::dds_::PoseStamped_"):
     header: Header
-    pose: Pose
+    pose: RosPose
 
 
 @dataclass
@@ -71,7 +71,7 @@ class TFMessage(IdlStruct, typename="tf2_msgs::msg::dds_::TFMessage_"):
 @dataclass
 class NamedPose(IdlStruct, typename="motion_capture_tracking_interfaces::msg::dds_::NamedPose_"):
     name: str
-    pose: Pose
+    pose: RosPose
 
 
 @dataclass
@@ -95,7 +95,7 @@ class NamedPoseArrayV2(IdlStruct, typename="motion_capture_tracking_interfaces::
 
 
 @dataclass
-class Marker(IdlStruct, typename="mocap4r2_msgs::msg::dds_::Marker_"):
+class RosMarker(IdlStruct, typename="mocap4r2_msgs::msg::dds_::Marker_"):
     id_type: int8
     marker_index: int32
     marker_name: str
@@ -105,8 +105,8 @@ class Marker(IdlStruct, typename="mocap4r2_msgs::msg::dds_::Marker_"):
 @dataclass
 class RigidBody(IdlStruct, typename="mocap4r2_msgs::msg::dds_::RigidBody_"):
     rigid_body_name: str
-    markers: sequence[Marker]
-    pose: Pose
+    markers: sequence[RosMarker]
+    pose: RosPose
 
 
 @dataclass

@@ -1,10 +1,11 @@
 """Poses by DDS: a participant that hears topics of ROS 2, whether they are published reliably or by best effort."""
 
 import math
+import re
 import struct
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from cyclonedds.core import DDSException, InstanceState, Policy, Qos, ReadCondition, SampleState, ViewState, WaitSet
@@ -12,18 +13,18 @@ from cyclonedds.domain import DomainParticipant
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
-from trunkline.ar.tracking.body_frames import BodyFrames, BodyPose
+from trunkline.ar.tracking.body_frames import TOGETHER, BodyFrames, BodyPose
 from trunkline.ar.tracking.ros_messages import TYPES
 from trunkline.ar.tracking.ros_topics import BODY, PER_BODY, RosTopicSettings
 from trunkline.ar.tracking.tracker import CameraFrame
 from trunkline.errors import InputError, nearest
 from trunkline.recordings.logs.messages import POSES, READING, DecodedPoses
 
-COMES = 5.0  # s within which each body has to come once: knowing each other takes DDS a second or two
+COMES = 10.0  # s within which each body has to come once: a participant that was not heard announces itself every 8 s
 NEWEST = 256  # messages of a topic that wait to be heard
 # Of a sensor's data: a reader by best effort hears reliable publishers too, one that is reliable hears no others.
 SENSOR_DATA = Qos(Policy.Reliability.BestEffort, Policy.Durability.Volatile, Policy.History.KeepLast(NEWEST))
-DAMAGED = (*READING, struct.error, UnicodeError)  # what bytes of another layout raise
+DAMAGED = (*READING, struct.error)  # what bytes of another layout raise
 
 
 class RosSource:
@@ -37,7 +38,11 @@ class RosSource:
         self._settings, self._names, self._where = settings, tuple(names), f"ROS 2 topic {settings.topic}"
         self._read, self._frame = POSES[settings.message], settings.frame.strip("/")
         self._frames, self._complete = BodyFrames(names), deque[CameraFrame]()
+        self._elsewhere = ""  # the first body in another frame: from then on nothing is received
         per_body = settings.message == PER_BODY
+        if unnamed := next((name for name in names if per_body and not re.fullmatch(r"\w+", name, re.ASCII)), None):
+            expected = f"letters, digits and _, as a part of the topic {settings.topic}"
+            raise InputError(f"cameras.bodies: found {unnamed!r}, expected {expected}")
         topics = {name: settings.topic.replace(BODY, name) for name in names} if per_body else {None: settings.topic}
         try:
             self._participant = DomainParticipant(settings.domain)
@@ -52,11 +57,15 @@ class RosSource:
             for condition in self._conditions:
                 self._waits.attach(condition)
         except DDSException as error:
-            raise InputError(f"{self._where}: found no DDS in domain {settings.domain} ({error})") from error
+            where = f"{self._where}: cameras.ros.domain: found none to take part in"
+            raise InputError(f"{where}, {settings.domain} ({error}), expected DDS there") from error
         self._await_bodies()
 
     def receive(self, seconds: float) -> CameraFrame | None:
         until = time.monotonic() + seconds
+        if self._elsewhere:
+            time.sleep(seconds)
+            raise ValueError(self._elsewhere)
         while not self._complete:
             left = until - time.monotonic()
             if left <= 0:
@@ -69,35 +78,59 @@ class RosSource:
         """Nothing: it ends with its process."""
 
     def _await_bodies(self) -> None:
-        """Until each body came once."""
-        until, heard = time.monotonic() + COMES, set()
-        while not heard >= set(self._names):
+        """Until each body came once, and two of them in one frame."""
+        until, heard, together = time.monotonic() + COMES, set(), len(self._names) == 1
+        while not (together and heard >= set(self._names)):
             left = until - time.monotonic()
             if left <= 0:
-                missing = next(name for name in self._names if name not in heard)
-                came = f"the bodies {', '.join(sorted(heard))}" if heard else f"no {self._settings.message}"
-                reason = f"found {came} within {COMES:g} s, expected {missing!r}{nearest(missing, sorted(heard))}"
-                raise InputError(f"{self._where}: {reason}")
+                raise InputError(f"{self._where}: {self._missing(heard)}")
             try:
-                heard.update(pose.name for poses in self._messages(left) for pose in poses)
+                for poses in self._messages(left):
+                    heard.update(pose.name for pose in poses)
+                    together |= any(frame.tracked.sum() > 1 for frame in self._frames.add(poses))
             except ValueError as error:
                 raise InputError(f"{self._where}: {error}") from error
 
-    def _messages(self, seconds: float) -> list[list[BodyPose]]:
+    def _missing(self, heard: set[str]) -> str:
+        """What is, where these bodies were heard."""
+        missing = next((name for name in self._names if name not in heard), None)
+        if missing is None:
+            return f"found each body stamped by itself, expected two of them within {1e3 * TOGETHER:g} ms"
+        came = f"the bodies {', '.join(sorted(heard))}" if heard else f"no {self._settings.message}"
+        return f"found {came} within {COMES:g} s, expected {missing!r}{nearest(missing, sorted(heard))}"
+
+    def _messages(self, seconds: float) -> Iterator[list[BodyPose]]:
         """The poses of each message that came, in the order in which they were published; waits for the first.
 
         Raises:
-            ValueError: one cannot be read.
+            ValueError: one cannot be read; once all others have come.
         """
-        self._waits.wait(math.ceil(1e9 * seconds))
+        taken, wrong = [], ""
         try:
-            taken = [(body, message) for body, reader in self._readers for message in reader.take(NEWEST)]
-            taken = [(body, message) for body, message in taken if _info(message).valid_data]
-            taken.sort(key=lambda pair: _info(pair[1]).source_timestamp)
-            decoded = [(body, message, self._read(message)) for body, message in taken]
+            self._waits.wait(math.ceil(1e9 * seconds))
+            for body, reader in self._readers:
+                taken += [(body, message) for message in reader.take(NEWEST) if _info(message).valid_data]
         except DAMAGED as error:
-            raise ValueError(f"found a message that is no {self._settings.message} ({error})") from error
-        return [self._poses(*some) for some in decoded]
+            wrong = self._damaged(error)
+        except DDSException as error:
+            wrong = f"DDS: {error}, expected messages"
+        for body, message in sorted(taken, key=lambda pair: _info(pair[1]).source_timestamp):
+            try:
+                decoded = self._read(message)
+            except DAMAGED as error:
+                wrong = self._damaged(error)
+                continue
+            try:
+                poses = self._poses(body, message, decoded)
+            except ValueError as error:
+                wrong = str(error)
+                continue
+            yield poses
+        if wrong:
+            raise ValueError(wrong)
+
+    def _damaged(self, error: Exception) -> str:
+        return f"found a message that is no {self._settings.message} ({error}), expected its layout"
 
     def _poses(self, body: str | None, message, decoded: DecodedPoses) -> list[BodyPose]:
         """Of a message and what was decoded of it; `body` of one that names none.
@@ -125,7 +158,8 @@ class RosSource:
     def _check_frame(self, name: str, frame: str) -> None:
         self._frame = self._frame or frame
         if frame != self._frame:
-            raise ValueError(f"found {name!r} in the frame {frame!r}, expected {self._frame!r}")
+            self._elsewhere = f"found {name!r} in the frame {frame!r}, expected {self._frame!r}"
+            raise ValueError(self._elsewhere)
 
 
 def _info(message):
