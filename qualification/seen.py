@@ -96,11 +96,12 @@ class ArmAtWork:
 @dataclass
 class Corrected:
     """errors: m, of the true tip at each rest, first the open loop's; the last one where it stays. seconds: of each
-    correction. reason: why it ended."""
+    correction. reason: why it ended. rests: commands, m, and measured tips, m, in the model's base frame."""
 
     errors: list[float]
     seconds: list[float] = field(default_factory=list)
     reason: str = ""
+    rests: list[tuple[np.ndarray, np.ndarray]] = field(default_factory=list)
 
 
 def correct(arm: ArmAtWork, chain: Chain, target: np.ndarray, commands: np.ndarray, frame, rng) -> Corrected:
@@ -118,7 +119,8 @@ def correct(arm: ArmAtWork, chain: Chain, target: np.ndarray, commands: np.ndarr
         result.seconds += [seconds] * bool(result.errors)
         result.errors.append(float(np.linalg.norm((truth - origin) @ turn - goal)))
         if not loop.ended and np.isfinite(measured).all():
-            loop.measured((measured - origin) @ turn)
+            result.rests.append((sent, (measured - origin) @ turn))
+            loop.measured(result.rests[-1][1])
         elif not loop.ended:
             loop.refuse("the arm does not rest")
     result.reason = loop.ended

@@ -27,11 +27,11 @@ import mujoco
 import numpy as np
 
 from qualification.command import qualify
-from trunkline.ar.session.arm_cameras import EVERY, MOUNT, ArmCameraSettings
+from trunkline.ar.session.arm_cameras import EVERY, MOUNT, ArmCameraSettings, expected_bodies
 from trunkline.ar.session.settings import SessionConfig
 from trunkline.ar.tracking.pose_channel import PoseChannel
 from trunkline.ar.tracking.simulated_cameras import CameraSettings, SimulatedCameras
-from trunkline.ar.tracking.tracker import CameraFrame, ExpectedBodies
+from trunkline.ar.tracking.tracker import CameraFrame
 from trunkline.ar.tracking.tracking_process import TrackingProcess
 from trunkline.frames import rotation_from_wxyz
 from trunkline.pipeline.config import PROJECT, load_folder
@@ -132,13 +132,6 @@ class BendingArm:
         """Where cameras that are right see the last body, m (3,)."""
         return self._turn.apply(self.poses(now)[0][-1]) + self._origin
 
-    def expected(self) -> ExpectedBodies:
-        """Distances of neighbors alone, as a session has them."""
-        places, _ = self.poses(0.0)
-        distances, rows = np.full((len(places), len(places)), np.nan), np.arange(len(places) - 1)
-        distances[rows, rows + 1] = distances[rows + 1, rows] = np.linalg.norm(np.diff(places, axis=0), axis=1)
-        return ExpectedBodies(self.names, True, None, distances)
-
 
 def row(package: Path, does: str, cameras: ArmCameraSettings) -> str:
     """Of the table: a stream that does this from BEGINS to BEGINS + LASTS s."""
@@ -146,7 +139,8 @@ def row(package: Path, does: str, cameras: ArmCameraSettings) -> str:
     arm = BendingArm(package, settings)
     shown, switch = PoseChannel(context, 7 * len(arm.names)), context.RawValue(ctypes.c_int, 0)
     shown.tell(np.concatenate([part.ravel() for part in arm.poses(0.0)]))
-    tracker = TrackingProcess(partial(LyingCameras, settings, shown, switch), arm.expected(), cameras.limits)
+    expected = expected_bodies(arm.names, np.linalg.norm(np.diff(arm.poses(0.0)[0], axis=0), axis=1))
+    tracker = TrackingProcess(partial(LyingCameras, settings, shown, switch), expected, cameras.limits)
     tracker.connect()
     begun, line, noticed, again, most = time.monotonic(), "", np.nan, np.nan, 0.0
     process = next(child for child in multiprocessing.active_children() if child.name == "tracking")

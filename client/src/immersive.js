@@ -8,6 +8,7 @@ import { noHand } from "./wire.js";
 
 const BUTTONS = { trigger: 0, grip: 1, stick_pressed: 3, primary: 4, secondary: 5 }; // of WebXR's xr-standard mapping
 const STICK = [2, 3]; // its axes
+const ASIDE = [0.8, 0.4]; // of a stick that is pushed to a side: from where on, and from where on no longer
 const LEAST_RATE = 72, MOST_RATE = 120; // Hz
 const TICK = [0.6, 30]; // strength and ms
 const CREEP = 0.0005, CREEP_TURN = 0.0005; // m and rad of an anchor that are not worth a message
@@ -124,15 +125,17 @@ export class Immersive {
     this.sendJson("anchor", { id: this.anchor.id, pose: place && toWire(place) });
   }
 
-  /** The tracked controllers: `buttons` that are down, and those `pressed` since the frame before. */
+  /** The tracked controllers: `buttons` that are down, and those `pressed` since the frame before; `aside` is a stick's. */
   readControllers(frame) {
     const controllers = { left: null, right: null };
     for (const source of this.session.inputSources) {
       if (!HANDS.includes(source.handedness) || !source.gamepad) continue;
       const pose = frame.getPose(source.targetRaySpace, this.space);
       const button = (name) => Boolean(source.gamepad.buttons[BUTTONS[name]]?.pressed);
-      const buttons = new Set(Object.keys(BUTTONS).filter(button));
+      const stick = STICK.map((axis) => source.gamepad.axes[axis] ?? 0);
       const before = this.buttons[source.handedness];
+      const buttons = new Set(Object.keys(BUTTONS).filter(button));
+      if (isAside(stick, before.has("aside"))) buttons.add("aside");
       this.buttons[source.handedness] = buttons;
       // An emulated position is a guess of the headset's: no touch, no target.
       if (!pose || pose.emulatedPosition) continue;
@@ -144,7 +147,7 @@ export class Immersive {
         buttons,
         pressed: new Set([...buttons].filter((name) => !before.has(name))),
         grip: buttons.has("grip"),
-        stick: STICK.map((axis) => source.gamepad.axes[axis] ?? 0),
+        stick,
       };
     }
     this.controllers = controllers;
@@ -177,5 +180,7 @@ export class Immersive {
   }
 }
 
+/** Whether a stick is to a side, which forward and back, for the ray's length, are not. `was`: before. */
+const isAside = ([right, back], was) => Math.abs(right) > ASIDE[Number(was)] && Math.abs(right) > Math.abs(back);
 const vector = ({ x, y, z }) => new Vector3(x, y, z);
 const quaternion = ({ x, y, z, w }) => new Quaternion(x, y, z, w);

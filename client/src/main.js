@@ -195,6 +195,11 @@ class Page {
     if (this.measured.message) this.corrects = !this.corrects;
   }
 
+  /** Whether the arm as cameras see it is drawn. */
+  chooseMeasured() {
+    if (this.measured.message) this.measured.shown = !this.measured.shown;
+  }
+
   /** As well as drawing is fast. */
   redraw() {
     if (!this.reachChosen) this.drawn.showReach(this.quality.reach);
@@ -268,7 +273,7 @@ class Page {
       this.desktop.press("stick_pressed");
     });
     tapped("reach", () => this.chooseReach());
-    tapped("cameras", () => (this.measured.shown = !this.measured.shown));
+    tapped("cameras", () => this.chooseMeasured());
     tapped("correct", () => this.chooseCorrection());
     for (const view of ["fit", "front", "side", "top"]) tapped(view, () => this.lookFrom(view));
     for (const step of document.querySelectorAll("#pad [data-step]")) {
@@ -390,7 +395,8 @@ class Page {
   }
 
   inHeadset(now, frame) {
-    const hands = this.immersive.frame(frame), { eye, alignment } = this.immersive;
+    const hands = this.immersive.frame(frame), { eye, alignment, controllers } = this.immersive;
+    if (HANDS.some((side) => controllers[side]?.pressed.has("aside"))) this.chooseMeasured();
     if (alignment.place) this.stand(alignment.place);
     if (this.wire?.controls && this.wire.offset !== null) this.wire.view(eye, now);
     return hands;
@@ -482,7 +488,7 @@ class Page {
     this.addNotices(status, device);
     this.measured.update(clock());
     const cameras = camerasText(this.measured.message);
-    if (cameras) status.facts.Cameras = cameras;
+    if (cameras) status.facts.Cameras = immersed && !this.measured.shown ? `hidden, stick to a side shows; ${cameras}` : cameras;
     if (state?.correction) status.facts.Correction = state.correction;
     if (immersed) {
       const { alignment } = this.immersive;

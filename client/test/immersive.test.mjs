@@ -248,3 +248,34 @@ test("the stick asks for touches, and a controller whose place is guessed touche
   await until(page, () => globalThis.trunkline.immersive.alignment.feedback === "");
   await inMode(page, "hold");
 });
+
+test("a stick that is pushed to a side hides and shows the arm as cameras see it, once a push, and moves no ray", async (t) => {
+  const { page, wrongs } = await aligned(t);
+  const drawn = () => page.evaluate(() => globalThis.trunkline.measured.group.visible);
+  const push = async (side, x, y) => {
+    await page.evaluate(([hand, ...axes]) => globalThis.headset.controllers[hand].updateAxes("thumbstick", ...axes), [side, x, y]);
+    await frames(page);
+  };
+  await push("right", 1, 0);
+  assert.ok(await page.evaluate(() => globalThis.trunkline.measured.shown), "without cameras nothing is switched off");
+  await push("right", 0, 0);
+  await server.command("cameras");
+  await until(page, () => globalThis.trunkline.measured.group.visible);
+  const before = await page.evaluate(() => globalThis.trunkline.state.mode);
+  await push("right", 1, 0.3);
+  assert.ok(!(await drawn()));
+  assert.match(await page.evaluate(() => globalThis.trunkline.board.drawn), /"Cameras":"hidden, stick to a side shows; 7 of 7 bodies/);
+  await picture(page, "10-headset-measured-hidden");
+  await push("right", 0.6, 0.3); // not let go yet
+  await push("right", 1, 0.3);
+  assert.ok(!(await drawn()));
+  await push("right", 0, 0);
+  await push("left", 0.9, -1); // the ray's length
+  assert.ok(!(await drawn()));
+  await push("left", -1, 0);
+  assert.ok(await drawn());
+  await push("left", 0, 0);
+  assert.doesNotMatch(await page.evaluate(() => globalThis.trunkline.board.drawn), /hidden/);
+  assert.equal(await page.evaluate(() => globalThis.trunkline.state.mode), before);
+  assert.deepEqual(wrongs, []);
+});

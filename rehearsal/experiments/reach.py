@@ -101,8 +101,9 @@ def _touches(frame: SessionFrame) -> bool:
 
 
 def tell_end(result: Result, foreseen: PredictionMessage, duration: float, tips: dict[str, np.ndarray]) -> None:
-    """How far the robot's tip was from where the preview had it then, at the end of a plan of `duration` s and later;
-    tips (3,), m, by LATER."""
+    """How far the preview ends from the target, and the robot's tip was from where the preview had it then, at the end
+    of a plan of `duration` s and later; tips (3,), m, by LATER."""
+    result.plan_end_mm = float("nan") if foreseen.miss is None else 1e3 * foreseen.miss
     result.radius_mm = 1e3 * foreseen.spread[-1] if foreseen.spread else float("nan")  # unknown
     for name, tip in tips.items():
         setattr(result, f"{name}_mm", 1e3 * _off(foreseen, duration + LATER[name], tip))

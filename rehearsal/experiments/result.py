@@ -24,12 +24,12 @@ class Result:
     set delay before; worst_mm: its 95th percentile. robot_mm: median distance of the tip from where the operator's rays
     wanted it then: what is left when the operator's own lag and aim are taken out. probability: that the preview gave
     to the plan that was confirmed. agreed: 1 if it was at least a half for a success, or less for a failure, else 0.
-    path_pct: median distance between the robot's tip and the nominal preview's, % of the arm's length. radius_mm:
-    within which the preview had stated that the tip ends; at_end_mm, after_2s_mm, after_10s_mm: of the robot's tip from
-    where that has it then, when the execution had ended and so long after it, with nothing in the way; touching_mm:
-    likewise when it had ended, beside the object. off_target_mm: of the tip from its target after_10s; corrected_mm:
-    likewise once the plan has corrected itself by cameras, and `correction` what that came to. seconds: of the whole
-    run. object: what was grasped, in words.
+    path_pct: median distance between the robot's tip and the nominal preview's, % of length. plan_end_mm: from
+    the preview's tip at its end to the tip target. radius_mm: within which the preview had stated that the tip ends;
+    at_end_mm, after_2s_mm, after_10s_mm: of the robot's tip from where that has it then, when the execution had ended
+    and so long after it, with nothing in the way; touching_mm: likewise when it had ended, beside the object.
+    off_target_mm: of the tip from its target after_10s; corrected_mm: likewise once the plan has corrected itself by
+    cameras, and `correction` what that came to. seconds: of the whole run. object: what was grasped, in words.
 
     variant: of an ablation, "" for none. package, code: digests of what the run was made of: `rehearsal.runs.Source`.
     """
@@ -49,6 +49,7 @@ class Result:
     probability: float = float("nan")
     agreed: float = float("nan")
     path_pct: float = float("nan")
+    plan_end_mm: float = float("nan")
     radius_mm: float = float("nan")
     at_end_mm: float = float("nan")
     after_2s_mm: float = float("nan")

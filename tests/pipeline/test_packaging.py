@@ -27,7 +27,8 @@ NEEDS_EXTRA = (
     "trunkline/kinematics/ik/network.py", "trunkline/kinematics/ik/onnx.py", "trunkline/kinematics/ik/tip_loss.py",
     "trunkline/kinematics/ik/training.py", "trunkline/report/figures", "trunkline/pipeline", "trunkline/tools/evaluate",
     "trunkline/tools/export", "trunkline/tools/monitor", "trunkline/tools/promote", "trunkline/ar/teleop",
-    "trunkline/ar/drivers", "trunkline/ar/session",
+    "trunkline/ar/drivers", "trunkline/ar/session", "trunkline/ar/tracking/qualisys.py",
+    "trunkline/ar/tracking/ros_messages.py", "trunkline/ar/tracking/ros_source.py",
 )  # fmt: skip
 
 
@@ -83,7 +84,7 @@ def test_the_library_needs_its_dependencies_alone():
 @pytest.mark.parametrize(
     ("extra", "folders"),
     [
-        ("pipeline,teleop,live,motors,ros2,cluster", ["trunkline", "stages", "demo", *EXAMPLES]),
+        ("pipeline,teleop,live,motors,ros2,qualisys,cluster", ["trunkline", "stages", "demo", *EXAMPLES]),
         ("teleop", ["rehearsal"]),
         ("bench,live,cluster", ["benchmarks", "studies", "qualification"]),
         ("test", ["tests"]),

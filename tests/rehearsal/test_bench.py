@@ -95,7 +95,7 @@ def test_an_aim_beside_the_object_is_one_beyond_its_radius(aimed, kind):
 )
 def test_what_was_stated_of_a_reach_is_told_where_it_was_done(monkeypatch, done, judged, radius):
     """And where anybody looks at previews."""
-    stated = SimpleNamespace(spread=(0.004,), times=(0.0,), tip=((0.0, 0.0, 0.0),))
+    stated = SimpleNamespace(spread=(0.004,), times=(0.0,), tip=((0.0, 0.0, 0.0),), miss=0.002)
     session = SimpleNamespace(
         controller=SimpleNamespace(plan=SimpleNamespace(duration=1.0), prediction=stated),
         in_client_frame=lambda tip: tip + [0.0, 0.0, 0.01], targets="of the plan",
@@ -107,7 +107,7 @@ def test_what_was_stated_of_a_reach_is_told_where_it_was_done(monkeypatch, done,
     result, stage_run = Result("reach", 0, True), reach(bench(session, judged), 0)  # type: ignore[arg-type]
     stage_run.watch(result, Ending(done), [frame(0.0, "execute"), frame(1.0, "aim", tip=np.zeros(3))])  # type: ignore[misc]
     np.testing.assert_equal((result.radius_mm, result.after_2s_mm), (radius, radius - 1))
-    np.testing.assert_allclose(result.touching_mm, radius + 6)
+    np.testing.assert_allclose((result.touching_mm, result.plan_end_mm), (radius + 6, radius / 2))
     assert [args[3] for args in corrections] == ["of the plan"] * int(np.isfinite(radius))
 
 

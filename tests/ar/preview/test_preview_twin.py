@@ -69,6 +69,12 @@ def test_poses_of_the_arm_move_the_tip_that_is_stated_and_not_its_radius():
     uncertain = dry.tip_uncertainty(pull(dry.arm.copy().compile()), None)
     assert isinstance(uncertain, TipUncertainty)
     assert uncertain.unknown < 1e-6
+    elsewhere = replace(dry, lacking=replace(knows, residual_map=replace(
+        knows.residual_map, numbers=np.array([1.0, 1e-6, 1e-3, 1e-3, 1e3])
+    )))  # fmt: skip
+    without, session = (elsewhere.tip_uncertainty(pull(dry.arm.copy().compile()), None, learnt)
+                        for learnt in (None, knows.residual_map))  # fmt: skip
+    assert session.unknown == without.unknown > 0.5  # a few rests of one session make none surer
     drawn = uncertain.offsets(np.zeros(3), np.array([0.0, 0.0, -0.3]), 50, np.random.default_rng(0))
     assert np.linalg.norm(drawn, axis=1).max() < 1e-4 < np.linalg.norm(uncertain.friction)
     made = robot_model(CASES["rubbing"])
@@ -78,8 +84,8 @@ def test_poses_of_the_arm_move_the_tip_that_is_stated_and_not_its_radius():
     knows = replace(made, lacking=replace(LACKING, residual_map=everywhere(list(shift))))
     beyond = replace(knows, lacking=replace(knows.lacking, pull=0.0))  # plans take the shift there as well
     stated = []
-    for robot in (made, knows, beyond):
-        tip = robot.tip_uncertainty(trajectory, None)
+    for robot, session in ((made, None), (knows, None), (beyond, None), (made, everywhere(list(shift)))):
+        tip = robot.tip_uncertainty(trajectory, None, session)
         assert isinstance(tip, TipUnknown if robot is beyond else TipUncertainty)
         foreseen = preview(twin, trajectory, made.uncertainty, None, 2, tip=tip)
         stated.append(foreseen.stated)
@@ -90,6 +96,8 @@ def test_poses_of_the_arm_move_the_tip_that_is_stated_and_not_its_radius():
     np.testing.assert_allclose(stated[1].tips - stated[0].tips, np.tile(expected, (len(stated[0].tips), 1)), atol=1e-6)
     np.testing.assert_array_equal(stated[1].radii, stated[0].radii)
     np.testing.assert_array_equal(stated[2].tips, stated[1].tips)
+    np.testing.assert_array_equal(stated[3].tips, stated[1].tips)
+    np.testing.assert_array_equal(stated[3].radii, stated[0].radii)  # a few rests of one session make none surer
     assert len(stated[2].radii) == 0
 
 

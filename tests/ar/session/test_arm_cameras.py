@@ -11,7 +11,7 @@ from tests.ar.session.test_robot_process import simulation
 from tests.support.live import live
 from tests.support.waiting import until
 from trunkline.ar.session.__main__ import parsed
-from trunkline.ar.session.arm_cameras import ArmCameras, SimulatedArmCameras, natnet_cameras
+from trunkline.ar.session.arm_cameras import ArmCameras, SimulatedArmCameras, real_cameras, with_session
 from trunkline.ar.session.bodies import BodyPoses
 from trunkline.ar.session.composition import subject_of
 from trunkline.ar.teleop.base_frames import base_frames
@@ -97,13 +97,13 @@ def test_simulated_cameras_see_the_simulated_robots_arm_and_name_exchanged_label
 
 def test_settings_of_cameras_say_what_is_missing():
     with pytest.raises(InputError, match=r"^cameras.bodies: found none"):
-        natnet_cameras(live().cameras)
+        real_cameras("natnet", live().cameras)
     with pytest.raises(ValueError, match="found 2 bodies and 0 distances, expected a distance from each to the next"):
         replace(live().cameras, bodies=("a", "b"))
     with pytest.raises(ValueError, match="found a length of 2, expected 1"):
         replace(live().cameras, quaternion=(2.0, 0.0, 0.0, 0.0))
     named = replace(live().cameras, bodies=("mount", "mid", "tip"), apart=(0.2, 0.1), tip=(0.0, 0.0, -0.01))
-    assert natnet_cameras(named).names == ("mount", "mid", "tip")
+    assert real_cameras("natnet", named).names == ("mount", "mid", "tip")
 
 
 @pytest.mark.parametrize(
@@ -112,7 +112,7 @@ def test_settings_of_cameras_say_what_is_missing():
 )
 def test_which_streams_have_a_body_at_the_mount(bodies, mount, expected):
     named = replace(live().cameras, bodies=bodies, apart=(0.2,) * (len(bodies) - 1), mount=mount)
-    cameras = natnet_cameras(named)
+    cameras = real_cameras("natnet", named)
     cameras._tracker = ToldTracker(np.zeros((len(bodies), 3)), np.tile([1.0, 0, 0, 0], (len(bodies), 1)))
     place = cameras.latest().mount
     assert (None if place is None else tuple(place)) == expected
@@ -124,3 +124,51 @@ def test_simulated_cameras_are_not_for_a_real_arm(more):
     assert parsed(["package", "--cameras", "natnet", *more]).cameras == "natnet"
     with pytest.raises(InputError, match="--cameras simulated: found --robot or --bus besides"):
         parsed(["package", "--cameras", "simulated", *more])
+
+
+SESSION = """
+frame: {up: [0, 1, 0]}
+base: mount
+markers: {middle: unit_04, end: unit_08}
+trials: [{file: a.mcap, experiment: release, level: 0.1, split: identify}]
+"""
+
+
+@pytest.fixture
+def recorded(tmp_path):
+    (tmp_path / "a.mcap").touch()
+    (tmp_path / "session.yaml").write_text(SESSION)
+    return tmp_path
+
+
+@pytest.mark.parametrize("kind", ["natnet", "ros2", "qualisys"])
+def test_a_session_names_the_bodies_and_what_the_model_calls_them(recorded, kind):
+    settings = replace(live().cameras, session=str(recorded), apart=(0.2, 0.1))
+    assert with_session(settings).bodies == ("mount", "middle", "end")
+    cameras = real_cameras(kind, settings)
+    assert cameras.names == ("base", "unit_04", "unit_08")
+    assert cameras._tracker._expected.names == ("mount", "middle", "end")
+    np.testing.assert_array_equal(np.diag(cameras._tracker._expected.distances, 1), [0.2, 0.1])
+    assert cameras.sees_mount
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "reason"),
+    [
+        ("base: mount", "base: {position: [0, 0, 0]}", "found a fixed base"),
+        ("markers: {middle: unit_04, end: unit_08}", "", "found no `markers`"),
+        ("end: unit_08", "end: unit_08, more: unit_09", "found 4 bodies and 2 distances"),
+    ],
+)
+def test_a_session_that_names_no_such_arm_is_refused(recorded, before, after, reason):
+    (recorded / "session.yaml").write_text(SESSION.replace(before, after))
+    settings = replace(live().cameras, session=str(recorded), apart=(0.2, 0.1))
+    with pytest.raises(InputError, match=rf"^cameras.session: .*session.yaml: .*{reason}"):
+        real_cameras("natnet", settings)
+    with pytest.raises(InputError, match=r"^cameras.session: .*/absent: no such folder, expected a session"):
+        real_cameras("natnet", replace(settings, session=str(recorded / "absent")))
+
+
+def test_names_are_said_once():
+    with pytest.raises(ValueError, match="session: found `bodies` or `markers` besides, expected neither"):
+        replace(live().cameras, session="data/raw/lab", bodies=("a",))

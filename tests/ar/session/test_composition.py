@@ -52,7 +52,7 @@ def test_where_a_session_is_not_made_all_that_has_begun_is_closed(monkeypatch, t
         "scene": {},
         "subject_of": (subject := Subject(("base",), (), (), np.zeros(3), ("base", (0.0, 0.0, 0.0)), "")),
         "measured_subject": subject,
-        "natnet_cameras": Cameras(closed, fails == "cameras"),
+        "real_cameras": Cameras(closed, fails == "cameras"),
         "new_path": tmp_path / "log.mcap",
         "LogWriterProcess": begun("log_writer"),
         "robot_of": begun("robot"),

@@ -390,6 +390,7 @@ def test_without_a_body_at_the_mount_it_is_told_once(session):
     session.executing().until(lambda intent: intent.mode == "aim")
     assert session.words == f"corrected from 5.1 to 1.1 mm in 2 steps: arrived; {UNCHECKED}"
     correction = session.controller.correction
+    assert not correction.rests  # nothing has checked the frame that they are in
     correction.begin(9, replace(some_plan(), correction=BOUNDS), session.controller.world)
     correction._errors.append(1e-3)
     correction.end("the end")
@@ -400,6 +401,7 @@ def test_a_tip_that_ended_farther_off_is_told_plainly(session):
     session.planning.change = -2e-3
     session.executing().until(lambda intent: intent.mode == "aim")
     assert session.words == "the tip ended farther off than before, from 5.1 to 9.1 mm in 2 steps: arrived"
+    assert not session.controller.correction.rests  # of an arm that does what its twin does not
 
 
 def test_an_outlier_ends_nothing(session):

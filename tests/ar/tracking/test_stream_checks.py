@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from trunkline.ar.tracking.stream_checks import LASTS, LOOKS, StreamChecks, StreamLimits
+from trunkline.ar.session.arm_cameras import expected_bodies
+from trunkline.ar.tracking.stream_checks import LASTS, LOOKS, StreamChecks, StreamLimits, along_arm
 from trunkline.ar.tracking.tracker import CameraFrame, ExpectedBodies
 from trunkline.errors import InputError
 from trunkline.recordings.cleaning.usual_distances import usual_distances
@@ -150,6 +151,61 @@ def test_without_usual_distances_what_positions_alone_show_is_still_noticed():
     checks, _ = run(lambda frame, _: with_body(frame, 3, frame.positions[5]), unknown)
     assert checks.fault.startswith("'marker_3': found poses exactly at the place of another body")
     assert run(off, unknown)[0].fault == ""
+
+
+def test_where_only_neighbors_distances_are_known_the_arm_reaches_as_far_as_all_of_them():
+    """The tip jumps by more than twice the way to the next body, and by less than twice the arm's length."""
+    beside = np.abs(np.subtract.outer(np.arange(7), np.arange(7))) == 1
+    np.testing.assert_allclose(along_arm(np.where(beside, USUAL, np.nan))[0], np.cumsum([0, *np.diagonal(USUAL, 1)]))
+    expected = replace(EXPECTED, distances=np.where(beside, USUAL, np.nan))
+
+    def away(metres):
+        return lambda frame, _: replace(frame, positions=frame.positions + [metres, 0.0, 0.0])
+
+    assert run(away(0.3), expected)[0].fault == ""
+    assert "farther away than the arm reaches" in run(away(1.0), expected)[0].fault
+
+
+@pytest.mark.parametrize("order", [[0, 1, 2, 4, 3, 5, 6], [0, 1, 3, 4, 2, 5, 6]])
+@pytest.mark.parametrize("gap", [0, 1, 3])
+@pytest.mark.parametrize("hides", [slice(None), slice(1)])
+def test_labels_that_are_exchanged_are_named_where_no_distances_are_known(order, gap, hides):
+    """Also after a short gap, of all of them or of a single one; those that are put right within LASTS are none."""
+    wrong, unknown = np.flatnonzero(np.array(order) != np.arange(7)), ExpectedBodies(NAMES, True)
+
+    def exchanged(frame, _):
+        tracked = np.ones(7, bool) if frame.number >= BEGINS + gap else ~np.isin(np.arange(7), wrong[hides])
+        return replace(frame, positions=frame.positions[order], quaternions=frame.quaternions[order], tracked=tracked)
+
+    checks, taken = run(exchanged, unknown)
+    words = " and ".join(f"'marker_{body}'" for body in wrong)
+    assert checks.fault == (
+        f"'marker_{wrong[0]}': found the labels {words} taken for each other, expected measured poses"
+    )
+    assert np.flatnonzero(np.isnan(taken[BEGINS + gap].positions[:, 0])).tolist() == wrong.tolist()
+    checks, taken = run(exchanged, unknown, until=BEGINS + gap + round(LASTS / STEP) - 1)
+    assert checks.fault == ""
+    assert np.isfinite(taken[-1].positions).all()
+
+
+def test_a_stream_of_a_single_body_has_no_distances_and_no_fault():
+    checks = StreamChecks(expected_bodies(NAMES[-1:], np.empty(0)), StreamLimits())
+    for frame in frames():
+        parts = {name: getattr(frame, name)[6:] for name in ("tracked", "positions", "quaternions")}
+        taken = checks.take(frame.number * STEP, replace(frame, **parts))
+    assert (checks.fault, bool(np.isfinite(taken.positions).all())) == ("", True)
+
+
+@pytest.mark.parametrize("every", [2, 40])
+def test_good_frames_in_between_do_not_end_a_second_stream_of_earlier_stamps(every):
+    """Now and then such a frame is no fault."""
+    checks = StreamChecks(EXPECTED, StreamLimits())
+    for frame in frames():
+        now = 5.0 + frame.number * STEP
+        checks.take(now, frame)
+        if frame.number % every == 1:
+            checks.take(now + STEP / 2, replace(frame, stamp=frame.stamp - 0.3))
+    assert ("expected both to grow" in checks.fault) == (every == 2), checks.fault
 
 
 def test_where_no_body_marks_the_base_distances_count_from_the_mount():

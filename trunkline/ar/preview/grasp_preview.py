@@ -23,6 +23,7 @@ from trunkline.ar.teleop.messages import Offer, Targets, World, WorldObject
 from trunkline.ar.teleop.object_shapes import beneath, grip_of, way_of_grasping
 from trunkline.ar.teleop.plan import Plan
 from trunkline.frames import rotation_from_wxyz
+from trunkline.kinematics.residual.residual_map import ResidualMap
 
 NOWHERE = (0.0, 0.0, 0.0)
 FINALISTS = 2  # places that the assistant tries once more
@@ -116,9 +117,11 @@ class GraspPreviewer:
         hangs: np.ndarray | None,
         seed: int,
         go_on: Callable[[], None] = lambda: None,
+        learnt: ResidualMap | None = None,
     ) -> PlanPrediction:
-        """Futures of which nothing is asked but where the tip goes. `hangs`, `go_on`: as of `grasp`."""
-        tip = self.robot_model.tip_uncertainty(trajectory, hangs)
+        """Futures of which nothing is asked but where the tip goes. `hangs`, `go_on`: as of `grasp`; `learnt`: as of
+        `tip_uncertainty`."""
+        tip = self.robot_model.tip_uncertainty(trajectory, hangs, learnt)
         uncertainty, futures = self.robot_model.uncertainty, self.settings.futures
         return PlanPrediction(
             preview(twin, trajectory, uncertainty, None, futures, seed, go_on=go_on, tip=tip), 0.0

@@ -57,10 +57,13 @@ class RobotModel:
                  for part in ArmModel(model).branches]  # fmt: skip
         return float(-np.log(CREEP) * np.max([time.max(initial=0.0) for time in times], initial=0.0))
 
-    def tip_uncertainty(self, trajectory: CommandTrajectory, hangs: np.ndarray | None) -> TipUncertainty | TipUnknown:
+    def tip_uncertainty(
+        self, trajectory: CommandTrajectory, hangs: np.ndarray | None, session: ResidualMap | None = None
+    ) -> TipUncertainty | TipUnknown:
         """By how far its tip may be elsewhere, at rest without a load where a trajectory ends; or why that is unknown.
         Cables that rub hold a future's tip where its way leaves it, within the friction band: it counts only without.
-        hangs: where the straight arm's tip was seen where the trajectory begins, in the base frame, (3,), m."""
+        hangs: where the straight arm's tip was seen where the trajectory begins, in the base frame, (3,), m. session:
+        what is learnt of the arm, with what was measured in this session; it moves the tip and makes it no surer."""
         if self.lacking is None:
             return TipUnknown("no trial at rest was held out, or the package is of an earlier release")
         places, bases = base_frames(trajectory.joints[[0, -1]], self.robot.mount_offset)
@@ -71,7 +74,8 @@ class RobotModel:
         order = model.actuators
         pulls = np.maximum(arm.chain.straight_lengths - commands[order], 0)
         learnt = self.lacking.residual_map
-        shift = None if learnt is None else self._shift(trajectory, arm, order, learnt)
+        shifted = session or learnt
+        shift = None if shifted is None else self._shift(trajectory, arm, order, shifted)
         if beyond := self.lacking.beyond(pulls, float(np.degrees(tilt_of_gravity(gravity)))):
             return TipUnknown(beyond, shift)
         pose = StaticPoses(gravity[None], commands[None][:, order])
@@ -81,7 +85,7 @@ class RobotModel:
         hanging = None if hangs is None else Hanging(hangs, places[0], bases[0])
         uncertainty = TipUncertainty(self.lacking.discrepancy, ways, friction, self.alignment, base, hanging)
         if learnt is None:
-            return uncertainty
+            return replace(uncertainty, shift=shift)
         unknown = float(learnt.unknown(arm.resting(pose))[0])
         return replace(uncertainty, shift=shift, unknown=unknown, left=self.lacking.left)
 

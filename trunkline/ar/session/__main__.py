@@ -2,7 +2,7 @@
 
     trunkline live PACKAGE [--host ADDRESS --tls | --cert FILE --key FILE] [--port N]
                              [--dry-run | [--robot panda|fr3|ros2] [--motors gm6020 --bus can0 [--interface NAME]]]
-                             [--cameras simulated|natnet]
+                             [--cameras simulated|natnet|ros2|qualisys]
 
 PACKAGE: the folder or .tgz that the stage package_unity writes. It listens on this machine alone; a headset comes over
 USB: `adb reverse tcp:8443 tcp:8443`. Another address needs TLS. The address that is printed opens the session: whoever

@@ -4,7 +4,8 @@ The tracker is a process of its own (`trunkline/ar/tracking`). What it says is l
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Annotated
 
 import mujoco
@@ -16,12 +17,15 @@ from trunkline.ar.session.bodies import BodyPoses
 from trunkline.ar.session.simulated import Simulation
 from trunkline.ar.teleop.messages import Pose
 from trunkline.ar.tracking.natnet import NatNetSettings, NatNetTracker
+from trunkline.ar.tracking.qualisys import QualisysSettings, QualisysTracker
+from trunkline.ar.tracking.ros_topics import RosTopicSettings, RosTracker
 from trunkline.ar.tracking.simulated_cameras import CameraSettings, SimulatedTracker
 from trunkline.ar.tracking.stream_checks import StreamLimits
 from trunkline.ar.tracking.tracker import ExpectedBodies, Tracker
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.model.arm_model import CENTER
+from trunkline.recordings.session.session import read_session
 
 EVERY = 4  # units from one that the simulated cameras see to the next
 MOUNT = "base"  # the arm's first body
@@ -36,10 +40,11 @@ class ArmCameraSettings:
     """bodies: names of the rigid bodies in the stream, from the mount to the tip. apart: m from each of them to the
     next. tip: of the arm in the frame of the last, m. position, m, and quaternion, wxyz: of the cameras' frame in the
     robot's base frame. limits: of the stream, `distance` as a share of the first of `apart`: an arm that curls brings
-    only neighbors no nearer to each other. natnet: where Motive is. simulated: of the simulated robot's cameras, which
-    need none of these but limits. mount: the arm's in the frame of the first body, m; None where no body is at the
-    mount, as of a single one, and nothing shows then that the cameras' frame is elsewhere. markers: what the arm's
-    model calls the bodies, in the same order; none where it calls them as Motive does.
+    only neighbors no nearer to each other. natnet, ros, qualisys: where each system is. simulated: of the simulated
+    robot's cameras, which need none of these but limits. mount: the arm's in the frame of the first body, m; None where
+    no body is at the mount, as of a single one, and nothing shows then that the cameras' frame is elsewhere. markers:
+    what the arm's model calls the bodies, in the same order; none where it calls them as the system does. session:
+    folder of logs whose session.yaml says both, in its order; "" where `bodies` and `markers` do.
     """
 
     bodies: Annotated[tuple[Annotated[str, Field(min_length=1, max_length=64)], ...], Field(max_length=100)]
@@ -49,12 +54,17 @@ class ArmCameraSettings:
     quaternion: Turn
     limits: StreamLimits
     natnet: NatNetSettings
+    ros: RosTopicSettings
+    qualisys: QualisysSettings
     simulated: CameraSettings
     mount: Place | None = (0.0, 0.0, 0.0)
     markers: Annotated[tuple[Annotated[str, Field(min_length=1, max_length=64)], ...], Field(max_length=100)] = ()
+    session: str = ""
 
     def __post_init__(self) -> None:
-        if len(self.apart) != max(len(self.bodies) - 1, 0):
+        if self.session and (self.bodies or self.markers):
+            raise ValueError("session: found `bodies` or `markers` besides, expected neither: session.yaml says both")
+        if not self.session and len(self.apart) != max(len(self.bodies) - 1, 0):
             counts = f"{len(self.bodies)} bodies and {len(self.apart)} distances"
             raise ValueError(f"bodies, apart: found {counts}, expected a distance from each to the next")
         if self.markers and (len(self.markers) != len(self.bodies) or len(set(self.markers)) < len(self.markers)):
@@ -139,7 +149,7 @@ class SimulatedArmCameras(ArmCameras):
         cameras = settings.simulated
         turn = rotation_from_wxyz(np.array(cameras.quaternion)).inv()
         pose = _pose(turn, -turn.apply(np.array(cameras.origin)))
-        self._simulated = SimulatedTracker(cameras, _expected(names, apart), settings.limits)
+        self._simulated = SimulatedTracker(cameras, expected_bodies(names, apart), settings.limits)
         super().__init__(self._simulated, names, pose, np.array(tip[1], float) - self._places[-1], np.zeros(3))
         self.show(poses)
 
@@ -151,19 +161,49 @@ class SimulatedArmCameras(ArmCameras):
         return marker_positions(bodies[self._rows], self._places)
 
 
-def natnet_cameras(settings: ArmCameraSettings) -> ArmCameras:
-    """By Motive's stream.
+def real_cameras(kind: str, settings: ArmCameraSettings) -> ArmCameras:
+    """By the stream of a system, "natnet", "ros2" or "qualisys".
 
     Raises:
         InputError: the settings name no bodies.
     """
+    settings = with_session(settings)
     if not settings.bodies:
-        raise InputError("cameras.bodies: found none, expected the names of the arm's rigid bodies in Motive")
-    expected = _expected(settings.bodies, np.array(settings.apart))
-    tracker = NatNetTracker(settings.natnet, expected, settings.limits)
+        raise InputError("cameras.bodies: found none, expected the names of the arm's rigid bodies in the stream")
+    expected, limits = expected_bodies(settings.bodies, np.array(settings.apart)), settings.limits
+    if kind == "natnet":
+        tracker: Tracker = NatNetTracker(settings.natnet, expected, limits)
+    elif kind == "ros2":
+        tracker = RosTracker(settings.ros, expected, limits)
+    else:
+        tracker = QualisysTracker(settings.qualisys, expected, limits)
     alone = settings.mount is None or len(settings.bodies) == 1
     pose, mount = Pose(settings.position, settings.quaternion), None if alone else np.array(settings.mount)
     return ArmCameras(tracker, settings.markers or settings.bodies, pose, np.array(settings.tip), mount)
+
+
+def with_session(settings: ArmCameraSettings) -> ArmCameraSettings:
+    """With the names of the session.yaml that the settings name, if any: its base, then its markers, in its order.
+
+    Raises:
+        InputError: there is none, it names no markers, or as many as `apart` does not fit; no body marks its base.
+    """
+    if not settings.session:
+        return settings
+    try:
+        session = read_session(Path(settings.session))
+    except InputError as error:
+        raise InputError(f"cameras.session: {error}") from error
+    where = f"cameras.session: {settings.session}/session.yaml"
+    if not isinstance(session.base, str):
+        raise InputError(f"{where}: found a fixed base, expected the name of the body at the mount")
+    if session.markers is None:
+        raise InputError(f"{where}: found no `markers`, expected them, from the mount to the tip")
+    bodies, markers = (session.base, *session.markers), (MOUNT, *session.markers.values())
+    try:
+        return replace(settings, session="", bodies=bodies, markers=markers)
+    except ValueError as error:
+        raise InputError(f"{where}: {error}") from error
 
 
 def markers_of(
@@ -183,8 +223,10 @@ def marker_positions(poses: np.ndarray, places: np.ndarray) -> np.ndarray:
     return np.array([_place(pose, place) for pose, place in zip(poses, places, strict=True)])
 
 
-def _expected(names: Sequence[str], apart: np.ndarray) -> ExpectedBodies:
-    """Bodies from the mount on, of which neighbors are `apart`, m. Shape (B - 1,)."""
+def expected_bodies(names: Sequence[str], apart: np.ndarray) -> ExpectedBodies:
+    """Bodies from the mount on, of which neighbors are `apart`, m. Shape (B - 1,). A single one has no distances."""
+    if len(names) < 2:
+        return ExpectedBodies(tuple(names), True)
     distances, rows = np.full((len(names), len(names)), np.nan), np.arange(len(apart))
     distances[rows, rows + 1] = distances[rows + 1, rows] = apart
     return ExpectedBodies(tuple(names), True, None, distances)

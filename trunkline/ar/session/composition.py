@@ -17,7 +17,7 @@ from trunkline.ar.session.arm_cameras import (
     ArmCameraSettings,
     SimulatedArmCameras,
     markers_of,
-    natnet_cameras,
+    real_cameras,
 )
 from trunkline.ar.session.bodies import drawn_bodies
 from trunkline.ar.session.camera_alignment import CameraAlignment
@@ -131,7 +131,7 @@ def cameras_of(kind: str, simulation: Simulation, subject: Subject, settings: Ar
     if not kind:
         return None
     simulated_arm = kind == "simulated"
-    cameras = SimulatedArmCameras(simulation, subject.tip, settings) if simulated_arm else natnet_cameras(settings)
+    cameras = SimulatedArmCameras(simulation, subject.tip, settings) if simulated_arm else real_cameras(kind, settings)
     try:
         cameras.connect()
     except BaseException:

@@ -34,10 +34,9 @@ class IdleConnections:
         """Close those of the open `transports` that are idle for too long, or too many; how many."""
         idle = [t for t in transports if t is not None and t not in self.busy and not t.get_write_buffer_size()]
         self._since = {transport: self._since.get(transport, now) for transport in idle}
-        closed = [transport for transport in idle if now - self._since[transport] >= LONGEST]
-        waiting = {transport: _address(transport) for transport in sorted(idle, key=lambda t: self._since[t])}
-        for transport in closed:
-            del waiting[transport]
+        oldest = sorted(idle, key=lambda transport: self._since[transport])
+        closed = [transport for transport in oldest if now - self._since[transport] >= LONGEST]
+        waiting = {transport: _address(transport) for transport in oldest[len(closed) :]}
         while len(waiting) > MOST:
             closed.append(crowding(waiting))
             del waiting[closed[-1]]

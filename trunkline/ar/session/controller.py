@@ -20,6 +20,7 @@ from trunkline.ar.session.binary import MARKERS
 from trunkline.ar.session.camera_alignment import CameraAlignment, CamerasAligned
 from trunkline.ar.session.controller_input import NOWHERE
 from trunkline.ar.session.correction_control import CorrectionControl
+from trunkline.ar.session.correction_rests import MeasuredRest
 from trunkline.ar.session.correction_steps import CorrectionAnswer
 from trunkline.ar.session.follow import FollowControl
 from trunkline.ar.session.hanging import HangingWatch
@@ -86,7 +87,10 @@ class HandInput:
 
 
 class Cameras(Protocol):
-    """What sees the arm; simulated ones are shown where the robot's drawn bodies are, (N, 7)."""
+    """What sees the arm; simulated ones are shown where the robot's drawn bodies are, (N, 7). pose: of their frame, in
+    the base."""
+
+    pose: Pose
 
     def show(self, bodies: np.ndarray) -> None: ...
     def latest(self) -> MeasuredArm: ...
@@ -399,12 +403,18 @@ class SessionController:
             return f"cameras: {self.arm.fault}"
         return f"the arm would touch {targets.object}" if targets.object else ""
 
+    @property
+    def _rests(self) -> tuple[MeasuredRest, ...]:
+        """That corrections have measured, while the cameras' stream is sound."""
+        return tuple(self.correction.rests) if self.arm is not None and not self.arm.fault else ()
+
     def _ask(self, intent: Intent, robot_state: RobotState, correct: bool = False) -> None:
         request = intent.request
         if request is not None and request.serial != self._requested:
             if self.cameras is not None and self.camera_alignment is not None:
                 pose = self.camera_alignment.take()  # here, as the robot rests and nothing is corrected
                 if pose is not None:
+                    self.correction.realign(self.cameras.pose, pose)
                     self.cameras.align(pose)
                     self._frame_by = self.aligned
             self._requested, self.report, self.plan, self.preview = request.serial, None, None, None
@@ -415,7 +425,7 @@ class SessionController:
             uncorrected = self.why_uncorrected(request.targets) if correct else ""
             asks = correct and not uncorrected
             self._bounds = self.correction.bounds(request.targets.tip.position) if asks else None
-            self.previewer.submit(Order(request, self.world, *here, self._bounds, uncorrected))
+            self.previewer.submit(Order(request, self.world, *here, self._bounds, uncorrected, self._rests))
         elif self._ordered and intent.mode in ("hold", "stopped", "aim", "execute"):
             self._ordered = False
             self.previewer.leave()

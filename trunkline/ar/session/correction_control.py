@@ -4,6 +4,7 @@ Until it ends, the core hears that the plan still runs. So all that holds the ro
 grips let go, a stop, silence, a fault. What ends it leaves the robot where it is; nothing begins it anew.
 """
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -12,10 +13,11 @@ import numpy as np
 from trunkline.ar.correction.correction import CorrectionSettings
 from trunkline.ar.correction.rest import RestWatch
 from trunkline.ar.session.arm_cameras import MeasuredArm
+from trunkline.ar.session.correction_rests import MOST, MeasuredRest, realigned
 from trunkline.ar.session.correction_steps import CorrectionAnswer, CorrectionOrder
 from trunkline.ar.session.robot_process import RobotState
 from trunkline.ar.teleop.base_frames import base_frames
-from trunkline.ar.teleop.messages import ExecutorReport, World
+from trunkline.ar.teleop.messages import ExecutorReport, Pose, World
 from trunkline.ar.teleop.plan import CorrectionBounds, Plan
 
 PATIENCE = 20.0  # s in which the tip has to rest
@@ -31,6 +33,8 @@ class CorrectionControl:
 
     Attributes:
         words: of the last correction or the one that goes on, in one line; "" where there is none.
+        rests: that corrections of the session have measured, where the cameras saw the mount where the joints have it
+            and the tip came nearer, or was at its target at once: else an arm that somebody leans on would count.
     """
 
     def __init__(
@@ -46,11 +50,16 @@ class CorrectionControl:
         self._unchecked = False  # that no body is at the mount has been told
         self._submit, self._start, self._stop, self._event = submit, start, stop, event
         self._serial = 0
+        self.rests: deque[MeasuredRest] = deque(maxlen=MOST)
         self.forget()
 
     def bounds(self, target: tuple[float, float, float]) -> CorrectionBounds:
         """Of a plan whose tip target is there, m."""
         return CorrectionBounds(target, self._settings.steps, self._settings.longest, self._settings.astray)
+
+    def realign(self, before: Pose, after: Pose) -> None:
+        """The cameras' frame is not where it was `before` in the base, but `after`: nor is what was measured in it."""
+        self.rests = deque(realigned(self.rests, before, after), maxlen=MOST)
 
     def forget(self) -> None:
         """Another motion begins, or none was corrected."""
@@ -58,6 +67,7 @@ class CorrectionControl:
         self._plan: Plan | None = None
         self._digests: set[str] = set()  # of its steps
         self._errors: list[float] = []
+        self._measured: list[MeasuredRest] = []
         self._answer: CorrectionAnswer | None = None
         self._mounts: list[np.ndarray] = []  # as cameras see it at rest
         self._steps = 0  # after which the tip was measured
@@ -115,6 +125,8 @@ class CorrectionControl:
             self._stop()
         self._phase, self._answer = "", None
         off, steps = [1e3 * error for error in self._errors], self._steps
+        if off and self._mounts and (off[-1] < off[0] or off[0] <= 1e3 * self._settings.tolerance):
+            self.rests.extend(self._measured)
         if off and not self._mounts and not self._unchecked:
             self._unchecked, reason = True, f"{reason}; {UNCHECKED}"
         if steps > 0:
@@ -199,6 +211,7 @@ class CorrectionControl:
             return self.end(reason)
         if self._errors[-1] > bounds.astray:
             return self.end(self._too_far(self._errors[-1]))
+        self._measured.append(MeasuredRest(self._plan.joints[-1], self._here, tip))
         self._phase, self._waited, self._answer = "asks", 0.0, None
         self.words = f"the tip is {1e3 * self._errors[-1]:.1f} mm off"
         self._submit(CorrectionOrder(

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 ROBOTS = ("simulated", "panda", "fr3", "ros2")
 MOTORS = ("simulated", "gm6020")
-CAMERAS = ("simulated", "natnet")
+CAMERAS = ("simulated", "natnet", "ros2", "qualisys")
 MARGIN = 0.8  # share of a robot's own limits that plans may come to; the rest is for what bridges lost commands
 
 

@@ -23,6 +23,7 @@ from trunkline.ar.preview.preview_twin import at_rest, compose_twin, robot_model
 from trunkline.ar.preview.settings import Previewing
 from trunkline.ar.session import messages
 from trunkline.ar.session.bodies import BodyPoses
+from trunkline.ar.session.correction_rests import MeasuredRest, learnt_from
 from trunkline.ar.session.correction_steps import CorrectionAnswer, CorrectionOrder, CorrectionSteps, why_uncorrected
 from trunkline.ar.teleop.config import TeleoperationConfig
 from trunkline.ar.teleop.following import sought
@@ -30,13 +31,15 @@ from trunkline.ar.teleop.messages import PlanReport, Request, Targets, World, Wo
 from trunkline.ar.teleop.plan import CorrectionBounds, Plan
 from trunkline.ar.teleop.planner import Planner
 from trunkline.errors import InputError
+from trunkline.kinematics.residual.residual_map import ResidualMap
 
 
 @dataclass(frozen=True)
 class Order:
     """A plan that is asked for, from the robot at rest at `joints` (7,), rad, and `commands` (K,), m. hangs: where the
     straight arm's tip is seen in its base frame, (3,), m; None where nobody sees it. correction: within which it may
-    correct itself, None where it may not; uncorrected: why not, where it was asked to."""
+    correct itself, None where it may not; uncorrected: why not, where it was asked to. rests: that corrections have
+    measured, from which it begins."""
 
     request: Request
     world: World
@@ -45,6 +48,7 @@ class Order:
     hangs: np.ndarray | None = None
     correction: CorrectionBounds | None = None
     uncorrected: str = ""
+    rests: tuple[MeasuredRest, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -171,7 +175,7 @@ class PreviewPlanner:
         if order.hangs is not None:
             beside = float(order.hangs[1])
         try:
-            plan = self.planner.plan(request, order.world, order.joints, order.commands, beside)
+            plan = self._knowing(order.rests).plan(request, order.world, order.joints, order.commands, beside)
         except InputError as error:
             yield PlanAnswer(PlanReport(serial, refused=str(error)))
             return
@@ -200,6 +204,17 @@ class PreviewPlanner:
             self.prediction = prediction
             target = None if request.targets.object else np.array(request.targets.tip.position)
             yield PredictionAnswer(serial, prediction_message(digest, prediction, target))
+
+    def _knowing(self, rests: tuple[MeasuredRest, ...]) -> Planner:
+        """The planner that begins from `rests` as well."""
+        return replace(self.planner, residual_map=self._learnt(rests)) if rests else self.planner
+
+    def _learnt(self, rests: tuple[MeasuredRest, ...], lean: Rotation | None = None) -> ResidualMap | None:
+        """Of the arm, beside a twin that leans by `lean`."""
+        planner = self.planner
+        if planner.chain is None:
+            return planner.residual_map
+        return learnt_from(rests, planner.chain, planner.mount_offset, planner.residual_map, lean)
 
     def prepare(self, order: Order) -> None:
         """Compose its twin, which the next order takes, where nothing has changed."""
@@ -260,7 +275,9 @@ class PreviewPlanner:
                 plan, targets, held_object, order.world, order.hangs, self._grasped, serial, go_on
             )
         else:
-            yield self.foresight.free(twin(), way, order.hangs, serial, go_on)
+            composed = twin()
+            learnt = self._learnt(order.rests, self._composed[2]) if order.rests else None
+            yield self.foresight.free(composed, way, order.hangs, serial, go_on, learnt)
 
 
 class InlinePreviewer:

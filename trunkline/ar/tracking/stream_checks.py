@@ -11,7 +11,8 @@ are those by which `ingest` reads logs (`trunkline/recordings/cleaning/`):
 
 - no measurement: at the origin, at another body's place, farther than cameras see or the arm reaches (`unmeasured`);
 - stale: the same to the last bit as in the frame before (`stale_samples`);
-- exchanged labels (`find_label_swaps`), and a body that is elsewhere by its distances to its neighbors (`misplaced`);
+- exchanged labels (`find_label_swaps`; here also by bodies that are suddenly where others just were), and a body that
+  is elsewhere by its distances to its neighbors (`misplaced`);
 - no rotation (`is_rotation`).
 
 Of the stream alone: silence, frames that do not count up or whose stamps do not, and frames that come later than they
@@ -26,6 +27,7 @@ from typing import Annotated
 
 import numpy as np
 from pydantic import Field
+from scipy.sparse.csgraph import csgraph_from_dense, shortest_path
 
 from trunkline.ar.tracking.tracker import CameraFrame, ExpectedBodies, TrackedPoses
 from trunkline.recordings.cleaning.invalid_samples import unmeasured
@@ -41,6 +43,8 @@ SEARCHES = (
     0.25  # s for which they are, once a body came nearer to where another was; a search takes longer than a frame
 )
 LASTS = 0.1  # s after which an objection is a fault; outliers last for a frame or two
+JUST = 0.1  # s since bodies were where labels are exchanged
+THERE = 0.3  # of the distance of two bodies, within which one is where the other was
 DRIFT = 2e-4  # by which clocks may differ in rate; quartzes differ by less
 AGE = "age"  # the rule that objects to frames that come late
 STREAM = ""  # in place of a body, for objections to the stream as a whole
@@ -58,6 +62,12 @@ class StreamLimits:
     recovers: Annotated[float, Field(gt=0, le=60)] = 2.0
 
 
+def along_arm(distances: np.ndarray) -> np.ndarray:
+    """Distances (B, B), m, those that are NaN by way of other bodies: a session knows those of neighbors alone, and the
+    arm reaches as far as all of them together; infinite where no way leads."""
+    return shortest_path(csgraph_from_dense(distances, null_value=np.inf, nan_null=True), directed=False)
+
+
 class StreamChecks:
     """Of the frames of one stream."""
 
@@ -65,13 +75,17 @@ class StreamChecks:
         self._untrue = self._late = ""  # the first fault that persists, and the one of lateness that there is
         self._late_at = -math.inf  # s, when a frame was late last, or none came
         self._expected, self._limits = expected, limits
+        self._paths = None if expected.distances is None else along_arm(expected.distances)
         self._since: dict[tuple[str, str], float] = {}  # of objections, by rule and body
+        self._behind_at = -math.inf  # s, when a frame was behind last
         self._dropped: dict[str, set[str]] = {}  # by rule, as of the last look at the window
         self._last: CameraFrame | None = None
         self._offset, self._received, self._looked = math.inf, math.nan, -math.inf
         self._counted: deque[tuple[float, int]] = deque()  # of the last second: when each frame came, and its number
         self._window: deque[np.ndarray] = deque(maxlen=WINDOW)
         self._search, self._places = math.inf, np.full((len(expected.names), 3), np.nan)  # from the first frame on
+        self._homes, self._home_at = self._places.copy(), np.full(len(expected.names), -np.inf)  # of labels; m, s
+        self._labels = np.arange(len(expected.names))  # of each label the body that has it
         usual = expected.distances
         self._least = math.inf if usual is None else limits.distance * float(np.nanmax(usual[0]))
         self._names = expected.names if expected.marked_base else ("base", *expected.names)  # as in `distances`
@@ -89,7 +103,7 @@ class StreamChecks:
         elif last is not None and not (frame.number > last.number and frame.stamp > last.stamp):
             came = f"found frame {frame.number}, stamped {frame.stamp:.3f} s, after {last.number}, {last.stamp:.3f} s"
             behind = f"{came}, expected both to grow"
-        self._object(now, "order", {STREAM: behind} if behind else {})
+        self._object_to_order(now, behind)
         if behind:
             return None
         if now - self._received > self._limits.silence:
@@ -105,7 +119,7 @@ class StreamChecks:
 
     def unreadable(self, now: float, reason: str) -> None:
         """That a message came which is no frame; `reason` in one line."""
-        self._object(now, "unreadable", {STREAM: reason}, ends=False)
+        self._object(now, "unreadable", {STREAM: reason})
 
     def wait(self, now: float) -> None:
         """That nothing came until `now`, s."""
@@ -115,10 +129,18 @@ class StreamChecks:
             line = f"found no frame for {silent:.2f} s, expected one within {self._limits.silence:g} s"
             self._late = self._late or line
 
-    def _object(self, now: float, rule: str, sentences: dict[str, str], ends: bool = True) -> None:
-        """What a rule objects to now, by body; where it `ends`, it objects to no others any more."""
-        if ends:
-            self._since = {key: at for key, at in self._since.items() if key[0] != rule or key[1] in sentences}
+    def _object_to_order(self, now: float, behind: str) -> None:
+        """That a frame is `behind`, "" where it is not: frames in between, as of a second publisher, are no end of it,
+        LASTS s are."""
+        if behind:
+            self._behind_at = now
+            self._object(now, "order", {STREAM: behind})
+        elif now - self._behind_at >= LASTS:
+            self._object(now, "order", {})
+
+    def _object(self, now: float, rule: str, sentences: dict[str, str]) -> None:
+        """What a rule objects to now, by body, and to no others any more."""
+        self._since = {key: at for key, at in self._since.items() if key[0] != rule or key[1] in sentences}
         for body, sentence in sentences.items():
             if now - self._since.setdefault((rule, body), now) < LASTS:
                 continue
@@ -160,6 +182,8 @@ class StreamChecks:
         positions[~(finite & rotation)] = np.nan
         self._window.append(positions.copy())
         crossed = self._crossed(positions)
+        self._relabel(now, positions)
+        self._drop_exchanged(now, "exchanged", self._labels != np.arange(len(names)))
         if crossed or self._search == math.inf:
             self._search = now + SEARCHES
         if crossed or now - self._looked >= LOOKS:
@@ -186,9 +210,14 @@ class StreamChecks:
         bodies = {
             self._names[body]: text for body, text in misplaced(distances, usual, self._names, self._least).items()
         }
-        swapped = self._dropped.get("swap", set())
+        swapped = self._dropped.get("swap", set()) | self._dropped["exchanged"]
         self._object(now, "misplaced", {name: bodies[name] for name in bodies if name not in swapped})
         return set(bodies) & set(self._expected.names)
+
+    def _drop_exchanged(self, now: float, rule: str, exchanged: np.ndarray) -> None:
+        """Labels (B,) that are on other bodies."""
+        others = " and ".join(repr(self._expected.names[body]) for body in np.flatnonzero(exchanged))
+        self._dropped[rule] = self._drop(now, rule, exchanged, f"the labels {others} taken for each other,")
 
     def _crossed(self, positions: np.ndarray) -> bool:
         """Whether a body (B, 3) m is nearer to where another was last than to where it was itself."""
@@ -198,6 +227,20 @@ class StreamChecks:
         visible = np.isfinite(positions[:, 0])
         self._places[visible] = positions[visible]
         return bool(np.any(nearest[both] != np.flatnonzero(both)))
+
+    def _relabel(self, now: float, positions: np.ndarray) -> None:
+        """Which body each label is on, by labels at (B, 3), m, that are where others just were: bodies move no way so
+        fast, several at once, and end where others were. One of them may be hidden meanwhile."""
+        apart = np.linalg.norm(positions[:, None] - self._homes, axis=-1)
+        between = np.linalg.norm(self._homes[:, None] - self._homes, axis=-1)
+        just = now - self._home_at <= JUST
+        there = (apart < THERE * between) & just & just[:, None]
+        moved = np.flatnonzero(there.any(axis=1) & there.any(axis=0))
+        before, elsewhere = there[moved].argmax(axis=1), there.any(axis=1)
+        if np.array_equal(np.sort(before), moved):
+            self._labels[moved], elsewhere[moved] = self._labels[before], False
+        at_home = np.isfinite(positions[:, 0]) & ~elsewhere
+        self._homes[at_home], self._home_at[at_home] = positions[at_home], now
 
     def _look(self, now: float) -> None:
         """At the window, for what a single frame does not show."""
@@ -214,8 +257,7 @@ class StreamChecks:
             for swap in find_label_swaps(places[-SWAPPED:], expected.distances, expected.marked_base):
                 swapped[list(swap.bodies)] |= swap.frames[-1]
             swapped = swapped[len(swapped) - len(expected.names) :]
-            others = " and ".join(repr(expected.names[body]) for body in np.flatnonzero(swapped))
-            self._dropped["swap"] = self._drop(now, "swap", swapped, f"the labels {others} taken for each other,")
-        for flagged, words in unmeasured(places, expected.marked_base, expected.distances):
+            self._drop_exchanged(now, "swap", swapped)
+        for flagged, words in unmeasured(places, expected.marked_base, self._paths):
             flagged = flagged[-1, places.shape[1] - len(expected.names) :]
             self._dropped[words] = self._drop(now, words, flagged, f"poses {words}")

@@ -1,8 +1,9 @@
 """Who tracks bodies live: three calls, the same for every motion-capture system.
 
 A `Tracker` runs in a process of its own what a `PoseSource` receives, past the checks of `stream_checks.py`. There are
-sources for OptiTrack (`natnet.py`) and simulated cameras (`simulated_cameras.py`). Topics of ROS 2, Qualisys (the
-library qtm-rt) and Vicon would be others: a class with `receive` and `close`, and a function of names that opens it.
+sources for OptiTrack (`natnet.py`), topics of ROS 2 (`ros_topics.py`), Qualisys (`qualisys.py`) and simulated cameras
+(`simulated_cameras.py`). Vicon's would be another: a class with `receive` and `close`, and a function of names that
+opens it.
 """
 
 from collections.abc import Callable
@@ -12,8 +13,6 @@ from typing import Protocol
 import numpy as np
 
 from trunkline.errors import InputError
-from trunkline.recordings.cleaning.reference import Reference
-from trunkline.recordings.session.session import FixedBase, Session
 
 
 @dataclass(frozen=True)
@@ -110,12 +109,6 @@ class ExpectedBodies:
     marked_base: bool
     mount: np.ndarray | None = None
     distances: np.ndarray | None = None
-
-    @classmethod
-    def of(cls, reference: Reference, session: Session) -> "ExpectedBodies":
-        """As `ingest` read them from the logs of a session."""
-        mount = np.array(session.base.position) if isinstance(session.base, FixedBase) else None
-        return cls(tuple(reference.bodies), reference.base is not None, mount, reference.distances)
 
     def __post_init__(self) -> None:
         if repeated := [name for name in self.names if self.names.count(name) > 1]:

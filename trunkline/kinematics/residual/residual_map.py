@@ -107,6 +107,19 @@ class ResidualMap:
             learnt = replace(learnt, noisier=np.maximum(missed / (FAR * usual), 1.0))
         return learnt
 
+    @classmethod
+    def supposed(cls, poses: RestingPoses, residuals: np.ndarray, length: float) -> "ResidualMap":
+        """Of poses too few to tell the numbers: these where the priors have their middle; arguments as of `fit`."""
+        return cls(poses, residuals, np.ones(len(poses)), MIDDLE * [length, length, 1, 1, 1])
+
+    def extended(self, poses: RestingPoses, residuals: np.ndarray) -> "ResidualMap":
+        """With further poses and their residuals, m (N, 3), and the same numbers."""
+        every = RestingPoses(*(np.concatenate(both) for both in (
+            (self.poses.pulls, poses.pulls), (self.poses.gravity, poses.gravity),
+        )))  # fmt: skip
+        noisier = np.concatenate([self.noisier, np.ones(len(poses))])
+        return ResidualMap(every, np.concatenate([self.residuals, residuals]), noisier, self.numbers)
+
     def _likeliest(self, length: float) -> "ResidualMap":
         """The same poses with the numbers of the largest posterior density. length: of the arm, m."""
         residuals, middle = self.residuals, np.log(MIDDLE * [length, length, 1, 1, 1])

@@ -63,7 +63,7 @@ def marker_figure(tables: dict[str, pd.DataFrame]) -> Figure:
         for model, (color, line, dot, width) in _styles(rows).items():
             curve, dots = rows[rows.model == model], {"marker": dot, "ms": 0.7 * _dot_size(dot, width)}
             axis.semilogy(curve.from_base_mm, curve.e_position_mm, line, lw=width, color=color, label=model, **dots)
-        axis.set(title=f"{kind}, {title}", xlabel="distance from the base, straight arm (mm)")
+        axis.set(title=f"{kind}\n{title}", xlabel="distance from the base, straight arm (mm)")
         axis.set_xlim(0, 1.04 * rows.from_base_mm.max())
     if not panels:
         axes[0, 0].text(0.5, 0.5, "no trial", ha="center", transform=axes[0, 0].transAxes)

@@ -25,13 +25,14 @@ public static class Unpacked {
 
   /// <summary>SHA-256 of the manifest, which has that of every other file: of another package, another
   /// digest.</summary>
-  /// <exception cref="InputError">Naming the file that is not the one that the manifest means.</exception>
+  /// <exception cref="InputError">Naming the file that is not the one that the manifest means, or that it does not
+  /// list.</exception>
   public static string PackageDigest(IReadOnlyDictionary<string, byte[]> files, JsonBlock manifest) {
     var digests = manifest.Block("sha256");
     foreach (string path in digests.Names) {
       Require(path, files.TryGetValue(path, out var data) ? Digest(data) : "none", digests.Text(path));
     }
-    return Digest(files[Manifest]);
+    return PartDigest(files, manifest);
   }
 
   /// <summary>The same of an app that brings some of the package's files: those that it brings are tested.</summary>
