@@ -21,7 +21,7 @@ from trunkline.ar.teleop.config import TeleoperationConfig
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.executor import PlanFollower
 from trunkline.ar.teleop.following import Following
-from trunkline.ar.teleop.messages import ExecutorReport, Intent, Offer, Pose, Targets, World
+from trunkline.ar.teleop.messages import ExecutorReport, Intent, Offer, Pose, Request, World
 from trunkline.ar.teleop.plan import Plan
 from trunkline.ar.teleop.trajectory import MotionLimits
 from trunkline.errors import InputError
@@ -134,7 +134,7 @@ class RehearsedSession:
         self.controller = SessionController(core, self.executor, self.previewer, world, lift, period=period)
         self.controller.control(REFERENCE)
         self.previewed: np.ndarray | None = None
-        self.targets: Targets | None = None  # of the newest plan
+        self.request: Request | None = None  # for the newest plan
         self.now, self.rays = 0.0, (None, None)
         self._executed, self._began = "", 0.0
         self.tips: list[tuple[float, np.ndarray]] = []  # s since a plan began, and where its tip is seen, m
@@ -165,7 +165,7 @@ class RehearsedSession:
         self.rays = intent.rays
         if controller.plan is not before:
             self.previewed = self._end(controller.plan, intent)
-            self.targets = None if intent.request is None else intent.request.targets
+            self.request = intent.request
         if intent.mode == "preview":
             controller.preview_shown(intent.preview, self.now)  # which counts once it has lasted long enough
         if intent.execute and intent.execute != self._executed:
@@ -179,13 +179,15 @@ class RehearsedSession:
             self.tips.append((self.now - self._began, tip))
         view = View(self.now, intent, self.in_client_frame(self.place(self.now)), tip, None, controller.world)
         if intent.mode in ("preview", "ready", "delay"):
+            if controller.prediction is not None and self.previewed is not None:
+                self.previewed = np.array(controller.prediction.tip[-1])
             view.previewed = self.previewed
             if controller.prediction is not None and self.judged:
                 view.probability, view.offer = controller.prediction.probability, controller.prediction.offer
         return view
 
     def _end(self, plan: Plan | None, intent: Intent) -> np.ndarray | None:
-        """Where the twin's tip comes to rest at the end of a plan that grasps nothing, m (3,)."""
+        """Where the twin's tip comes to rest, without friction, at the end of a plan that grasps nothing, m (3,)."""
         if plan is None or intent.request is None or intent.request.targets.object:
             return None
         x, y, z = (float(value) for value in mount_pose(plan.joints[-1:], self.config.mount_offset)[0][0])

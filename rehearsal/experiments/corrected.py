@@ -1,7 +1,7 @@
 """What cameras are worth at rest: a plan that has arrived corrects itself by where its tip is seen.
 
 The rules and the steps are those of a live session. Its cameras are the client's tracking of poses, late and noisy, at
-the rate of its frames. The plan is the one that was run; here it has the bounds with which it would be confirmed.
+the rate of its frames. The plan is asked for anew, as one that corrects itself.
 """
 
 from dataclasses import replace
@@ -15,8 +15,18 @@ from trunkline.ar.correction.correction import CorrectionSettings
 from trunkline.ar.session.arm_cameras import MeasuredArm
 from trunkline.ar.session.correction_control import CorrectionControl
 from trunkline.ar.session.correction_steps import CorrectionAnswer, CorrectionOrder, why_uncorrected
-from trunkline.ar.teleop.messages import Targets
-from trunkline.ar.teleop.plan import Plan
+from trunkline.ar.session.previewer import Order, PlanAnswer
+from trunkline.ar.teleop.messages import Request, Targets
+from trunkline.ar.teleop.plan import CorrectionBounds, Plan
+
+
+def plan_that_corrects(session: RehearsedSession, request: Request, hangs: np.ndarray | None, otherwise: Plan) -> Plan:
+    """For a robot that has not moved; `otherwise` where there is none. hangs: as of an `Order`."""
+    settings, robot = CorrectionSettings(), session.executor.axes
+    bounds = CorrectionBounds(request.targets.tip.position, settings.steps, settings.longest, settings.astray)
+    order = Order(request, session.controller.world, robot.joints, robot.commands, hangs, bounds)
+    answer = next(iter(session.planner.answers(order)))
+    return answer.plan or otherwise if isinstance(answer, PlanAnswer) else otherwise
 
 
 def correct(session: RehearsedSession, plan: Plan, targets: Targets) -> str:

@@ -98,17 +98,21 @@ def test_what_was_stated_of_a_reach_is_told_where_it_was_done(monkeypatch, done,
     stated = SimpleNamespace(spread=(0.004,), times=(0.0,), tip=((0.0, 0.0, 0.0),), miss=0.002)
     session = SimpleNamespace(
         controller=SimpleNamespace(plan=SimpleNamespace(duration=1.0), prediction=stated),
-        in_client_frame=lambda tip: tip + [0.0, 0.0, 0.01], targets="of the plan",
+        in_client_frame=lambda tip: tip + [0.0, 0.0, 0.01], request=SimpleNamespace(targets="of the plan"),
+        executor=SimpleNamespace(hangs="as seen"),
     )  # fmt: skip
     tips = {"after_2s": np.array([0.0, 0.003, 0.0]), "after_10s": np.zeros(3)}
     monkeypatch.setattr(reaches, "tips_after", lambda alone, plan: tips)
-    corrections = []
+    corrections, ran = [], []
+    monkeypatch.setattr(reaches, "plan_that_corrects", lambda again, request, hangs, plan: f"hangs {hangs}")
+    monkeypatch.setattr(reaches, "execute", lambda again, plan: ran.append(plan))
     monkeypatch.setattr(reaches, "tell_correction", lambda *args: corrections.append(args))
     result, stage_run = Result("reach", 0, True), reach(bench(session, judged), 0)  # type: ignore[arg-type]
     stage_run.watch(result, Ending(done), [frame(0.0, "execute"), frame(1.0, "aim", tip=np.zeros(3))])  # type: ignore[misc]
     np.testing.assert_equal((result.radius_mm, result.after_2s_mm), (radius, radius - 1))
     np.testing.assert_allclose((result.touching_mm, result.plan_end_mm), (radius + 6, radius / 2))
     assert [args[3] for args in corrections] == ["of the plan"] * int(np.isfinite(radius))
+    assert ran == [args[2] for args in corrections] == ["hangs as seen"] * int(np.isfinite(radius))
 
 
 @pytest.mark.parametrize(("seconds", "success"), [(FREE.interruption, True), (FREE.interruption + 0.25, False)])

@@ -248,7 +248,12 @@ def test_a_process_whose_first_preview_breaks_off_does_not_begin():
     """No plan could ever be confirmed: that is better said before anybody comes."""
     s, asked = simulation(), order()
     plan = made().planner.plan(asked.request, asked.world, asked.joints, asked.commands)
-    broken = Broken(SimpleNamespace(plan=lambda *_: plan), made().foresight, made().bodies)  # type: ignore[arg-type]
+
+    class Planned(Planner):
+        def plan(self, *_):
+            return plan
+
+    broken = Broken(Planned(**vars(made().planner)), made().foresight, made().bodies)
     package = SimpleNamespace(straight=s.commands, digest="a package", tip=lambda *_: TIP)
     with pytest.raises(InputError, match="preview: ValueError: two"):
         preview_process.warm(broken, package, make_world(()))  # type: ignore[arg-type]

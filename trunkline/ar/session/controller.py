@@ -289,7 +289,7 @@ class SessionController:
             self._ask(intent, robot_state, hands.correct)
             self._follow.advance(dt / len(steps))
             if intent.mode == "follow":
-                self._follow.seek(intent.targets, robot_state.joints, self.world)
+                self._follow.seek(intent.targets, robot_state.joints, self.world, self._hangs(robot_state))
             else:
                 self._follow.end()
             self._drive(intent)

@@ -43,14 +43,15 @@ class FollowControl:
         """Let `dt` s pass."""
         self._now += dt
 
-    def seek(self, targets: Targets | None, joints: np.ndarray, world: World) -> None:
-        """Every KNOT s, what `targets` ask for, near what was found last, at first near `joints` (7,), rad."""
+    def seek(self, targets: Targets | None, joints: np.ndarray, world: World, hangs: np.ndarray | None = None) -> None:
+        """Every KNOT s, what `targets` ask for, near what was found last, at first near `joints` (7,), rad. hangs: as
+        of an `Order`."""
         if self._now < self._last + KNOT - ROUNDING:
             return
         self._serial, self._last = self._serial + 1, self._now
         self._times[self._serial] = self._now
         near = joints if self._near is None else self._near
-        self._order(FollowRequest(self._serial, None if why_not(targets) else targets, near, world))
+        self._order(FollowRequest(self._serial, None if why_not(targets) else targets, near, world, hangs))
 
     def begin(self) -> None:
         """The robot follows from now on, and hears what was found so far."""

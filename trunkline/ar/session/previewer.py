@@ -4,6 +4,11 @@ The answers to an order are a `PlanAnswer`; then, if there is a plan, a `Preview
 nominal twin's motion as soon as it is simulated, and a `PredictionAnswer`, the result of the batch of rollouts, again
 where the assistant has an offer.
 
+Statics without friction say with which commands the arm comes to a target; the twin, run through the plan, stays short
+of it by what its cables' friction holds. A reach is planned anew by that, until its preview ends at the target. One
+that may correct itself is not: short of its target, its steps pull on, which the arm answers at once, while what is to
+let go stays where it is until friction has turned round.
+
 A live session has them made by a process (`preview_process.py`), a rehearsal by the same `PreviewPlanner` in line.
 """
 
@@ -15,7 +20,7 @@ from typing import Protocol
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from trunkline.ar.hybrid.rollout_batch import WITHIN, nominal
+from trunkline.ar.hybrid.rollout_batch import WITHIN, interruptible, nominal
 from trunkline.ar.hybrid.rollouts import FRAME, CommandTrajectory, ComposedTwin
 from trunkline.ar.preview.grasp_preview import GraspPreviewer, PlanPrediction
 from trunkline.ar.preview.package import Package
@@ -25,13 +30,20 @@ from trunkline.ar.session import messages
 from trunkline.ar.session.bodies import BodyPoses
 from trunkline.ar.session.correction_rests import MeasuredRest, learnt_from
 from trunkline.ar.session.correction_steps import CorrectionAnswer, CorrectionOrder, CorrectionSteps, why_uncorrected
+from trunkline.ar.teleop.base_frames import base_frames
 from trunkline.ar.teleop.config import TeleoperationConfig
 from trunkline.ar.teleop.following import sought
 from trunkline.ar.teleop.messages import PlanReport, Request, Targets, World, WorldObject
 from trunkline.ar.teleop.plan import CorrectionBounds, Plan
 from trunkline.ar.teleop.planner import Planner
 from trunkline.errors import InputError
-from trunkline.kinematics.residual.residual_map import ResidualMap
+from trunkline.frames import STANDARD_GRAVITY
+from trunkline.kinematics.residual.residual_map import ResidualMap, RestingPoses
+from trunkline.model.statics.equilibria import actuated
+
+AIMED, ROUNDS = 1e-3, 3  # m from its target that a preview may end, and how often a reach is planned anew at most
+STILL = 30  # frames at the end of a preview, in which a tip at rest keeps within AIMED of their mean
+EMPTY = World("empty")
 
 
 @dataclass(frozen=True)
@@ -54,12 +66,13 @@ class Order:
 @dataclass(frozen=True)
 class FollowRequest:
     """What `targets` ask of a robot that follows is asked for, the nearest to `joints` (7,), rad; targets None: nothing
-    that it may follow."""
+    that it may follow. hangs: as of an `Order`."""
 
     serial: int
     targets: Targets | None
     joints: np.ndarray
     world: World
+    hangs: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -135,7 +148,9 @@ class PreviewPlanner:
         self.robot_model, self.previewing = foresight.robot_model, foresight.settings
         self.prediction: PlanPrediction | None = None
         self._corrections = CorrectionSteps(planner, self.robot_model.lacking)
-        self._composed: tuple[tuple, ComposedTwin | None, Rotation | None] = ((), None, None)
+        self._composed: tuple[tuple, ComposedTwin | None] = ((), None)
+        self._alone: tuple[Rotation | None, ComposedTwin | None] = (None, None)
+        self._leans: tuple[bytes | None, Rotation | None] = (None, None)
         self._grasped: PlanPrediction | None = None  # the last grasp: of an object that is held, the one that was run
 
     @classmethod
@@ -155,7 +170,8 @@ class PreviewPlanner:
         preview breaks off is refused, as it could never be confirmed."""
         try:
             if isinstance(order, FollowRequest):
-                yield FollowAnswer(order.serial, *sought(self.planner, order.targets, order.joints, order.world))
+                planner = replace(self.planner, lean=self._lean(order.hangs))
+                yield FollowAnswer(order.serial, *sought(planner, order.targets, order.joints, order.world))
             elif isinstance(order, CorrectionOrder):
                 yield self._corrections.answer(order)
             else:
@@ -170,20 +186,13 @@ class PreviewPlanner:
                 yield PlanAnswer(PlanReport(order.request.serial, refused=refused))
 
     def _answers(self, order: Order, go_on: Callable[[], None]) -> Iterator[Answer]:
-        request, serial, beside = order.request, order.request.serial, 0.0
+        request, serial = order.request, order.request.serial
         self.prediction = None
-        if order.hangs is not None:
-            beside = float(order.hangs[1])
         try:
-            plan = self._knowing(order.rests).plan(request, order.world, order.joints, order.commands, beside)
+            plan, uncorrected, rubbing = self._planned(order, go_on)
         except InputError as error:
             yield PlanAnswer(PlanReport(serial, refused=str(error)))
             return
-        bounds, uncorrected = order.correction, order.uncorrected
-        if bounds is not None:
-            lacking = self.robot_model.lacking
-            uncorrected = why_uncorrected(plan, request.targets, order.world, bounds, self.planner, lacking)
-            plan = plan if uncorrected else replace(plan, correction=bounds)
         digest = plan.digest()
         yield PlanAnswer(PlanReport(serial, digest, "", plan.package, plan.world), plan)
         way = self.foresight.whole(plan, bool(request.targets.object))
@@ -200,21 +209,92 @@ class PreviewPlanner:
             yield from self._pieces_of(serial, twin(), way, go_on)
         else:
             yield PreviewPiece(serial, 0, 0.0, np.empty((0, 0, 7), dtype=np.float32), True)
-        for prediction in self._predictions(order, plan, twin, way, go_on):
+        for prediction in self._predictions(order, plan, twin, way, rubbing, go_on):
             self.prediction = prediction
             target = None if request.targets.object else np.array(request.targets.tip.position)
             yield PredictionAnswer(serial, prediction_message(digest, prediction, target))
 
-    def _knowing(self, rests: tuple[MeasuredRest, ...]) -> Planner:
-        """The planner that begins from `rests` as well."""
-        return replace(self.planner, residual_map=self._learnt(rests)) if rests else self.planner
+    def _planned(self, order: Order, go_on: Callable[[], None]) -> tuple[Plan, str, np.ndarray | None]:
+        """The plan, from rests that were measured and for an arm that leans as it is seen to; why it does not correct
+        itself, where it was asked to; and by how far friction holds its tip beside the rest without, m (3,), None where
+        that is not asked for.
 
-    def _learnt(self, rests: tuple[MeasuredRest, ...], lean: Rotation | None = None) -> ResidualMap | None:
-        """Of the arm, beside a twin that leans by `lean`."""
+        Raises:
+            InputError: what forbids it.
+        """
+        targets, bounds, uncorrected = order.request.targets, order.correction, order.uncorrected
+        planner = replace(self.planner, residual_map=self._learnt(order), lean=self._lean(order.hangs))
+        plan = self._by(planner, order)
+        if bounds is not None:
+            lacking = self.robot_model.lacking
+            uncorrected = why_uncorrected(plan, targets, order.world, bounds, self.planner, lacking)
+            plan = plan if uncorrected else replace(plan, correction=bounds)
+        if targets.object or planner.chain is None:
+            return plan, uncorrected, None
+        missed, rubbing = self._missed(planner, plan, order, go_on)
+        for _ in range(0 if plan.correction else ROUNDS):
+            if not AIMED < np.linalg.norm(missed) <= planner.tolerance:
+                break
+            x, y, z = (float(value) for value in planner.beyond + missed)
+            planner = replace(planner, beyond=(x, y, z))
+            try:
+                nearer = self._by(planner, order)
+            except InputError:  # out of reach, or in the way of something
+                break
+            left, holds = self._missed(planner, nearer, order, go_on)
+            if not np.linalg.norm(left) < np.linalg.norm(missed):
+                break
+            plan, missed, rubbing = nearer, left, holds
+        return plan, uncorrected, rubbing
+
+    def _by(self, planner: Planner, order: Order) -> Plan:
+        beside = 0.0 if order.hangs is None else float(order.hangs[1])
+        return planner.plan(order.request, order.world, order.joints, order.commands, beside)
+
+    def _missed(
+        self, planner: Planner, plan: Plan, order: Order, go_on: Callable[[], None]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """From its target to where a reach's preview ends that touches nothing; and by how far friction holds the tip
+        there beside the rest without. Both (3,), m, NaN where MuJoCo warns, or the arm still swings."""
+        assert planner.chain is not None, "plans without are not looked at"
+        way = self.foresight.whole(plan, False)
+        twin = self._bare(planner.lean, way.joints[0], way.commands[0])
+        pieces = list(interruptible(nominal(twin, way), go_on))
+        tips = np.concatenate([piece.tip[0] for piece in pieces])[-STILL:]
+        tip = tips.mean(axis=0)
+        if not pieces[-1].sound[0] or np.linalg.norm(tips - tip, axis=1).max() > AIMED:
+            tip = np.full(3, np.nan)
+        (place, base), commands = base_frames(plan.joints[-1], planner.mount_offset), plan.commands[-1:]
+        lean, gravity = planner.lean or Rotation.identity(), STANDARD_GRAVITY * -base[2:]
+        rest = actuated(planner.chain.smooth, commands, lean.inv().apply(gravity))
+        rubbing, shift = tip - place - base @ lean.apply(rest.position[0]), np.zeros(3)
+        if planner.residual_map is not None:
+            poses = RestingPoses.of(planner.chain, rest, gravity)
+            shift = base @ planner.residual_map.mean(poses)[0] - (1 - planner.residual_map.unknown(poses)[0]) * rubbing
+        return tip + shift - order.request.targets.tip.position, rubbing
+
+    def _bare(self, lean: Rotation | None, joints: np.ndarray, commands: np.ndarray) -> ComposedTwin:
+        """That touches nothing, at rest at `joints` (7,), rad, and `commands` (K,), m."""
+        before, twin = self._alone
+        if twin is None or before is not lean:
+            twin = compose_twin(self.robot_model, EMPTY, None, joints, commands, self.previewing, lean)
+        self._alone = lean, at_rest(twin, joints, commands, self.planner.mount_offset, lean)
+        return self._alone[1]
+
+    def _lean(self, hangs: np.ndarray | None) -> Rotation | None:
+        """How the arm is turned on its mount, the last where that is seen as it was."""
+        key = None if hangs is None else hangs.tobytes()
+        if key != self._leans[0]:
+            self._leans = key, self.robot_model.lean(hangs)
+        return self._leans[1]
+
+    def _learnt(self, order: Order) -> ResidualMap | None:
+        """Of the arm, beside a twin that leans as it is seen to."""
         planner = self.planner
-        if planner.chain is None:
+        if planner.chain is None or not order.rests:
             return planner.residual_map
-        return learnt_from(rests, planner.chain, planner.mount_offset, planner.residual_map, lean)
+        lean = self._lean(order.hangs)
+        return learnt_from(order.rests, planner.chain, planner.mount_offset, planner.residual_map, lean)
 
     def prepare(self, order: Order) -> None:
         """Compose its twin, which the next order takes, where nothing has changed."""
@@ -230,13 +310,12 @@ class PreviewPlanner:
         """It leans as the robot does. The last one where nothing has changed: to compile another takes longer than a
         piece of a preview."""
         object, hangs = _beside(order), None if order.hangs is None else order.hangs.tobytes()
-        now, (composed, twin, lean) = (order.world.obstacles, object, hangs), self._composed
+        now, (composed, twin), lean = (order.world.obstacles, object, hangs), self._composed, self._lean(order.hangs)
         if twin is not None and composed == now:
             twin = at_rest(twin, joints, commands, self.robot_model.robot.mount_offset, lean)
         else:
-            lean = self.robot_model.lean(order.hangs)
             twin = compose_twin(self.robot_model, order.world, object, joints, commands, self.previewing, lean)
-        self._composed = now, twin, lean
+        self._composed = now, twin
         return twin
 
     def _pieces_of(
@@ -262,6 +341,7 @@ class PreviewPlanner:
         plan: Plan,
         twin: Callable[[], ComposedTwin],
         way: CommandTrajectory,
+        rubbing: np.ndarray | None,
         go_on: Callable[[], None],
     ) -> Iterator[PlanPrediction]:
         targets, serial = order.request.targets, order.request.serial
@@ -275,9 +355,8 @@ class PreviewPlanner:
                 plan, targets, held_object, order.world, order.hangs, self._grasped, serial, go_on
             )
         else:
-            composed = twin()
-            learnt = self._learnt(order.rests, self._composed[2]) if order.rests else None
-            yield self.foresight.free(composed, way, order.hangs, serial, go_on, learnt)
+            learnt = self._learnt(order) if order.rests else None
+            yield self.foresight.free(twin(), way, order.hangs, serial, go_on, learnt, rubbing)
 
 
 class InlinePreviewer:

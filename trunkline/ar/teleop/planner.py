@@ -5,6 +5,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from trunkline.ar.teleop.alignment import base_quaternion
 from trunkline.ar.teleop.grasping import Grasping, Leg, gravity_direction
@@ -37,7 +38,9 @@ class Planner:
     from its target the tip may be foreseen. `step`: s, between a plan's rows. `chain`: the arm's statics, by which the
     network's answers are corrected, and no obstacle may be in the arm's way. `grasping`: how objects are grasped.
     `advance`: m, the last part of a reach, along the tip's axis, of an arm with a `chain`; `advance_speed`: m/s, of the
-    mount there, at most. `residual_map`: by how far the arm's tip rests beside the twin's, where poses tell."""
+    mount there, at most. `residual_map`: by how far the arm's tip rests beside the twin's, where poses tell. `lean`:
+    how the arm is turned on its mount, None where nobody has seen that. `beyond`: by how far a reach is known to end
+    beside what all this says, in the base frame, m."""
 
     rigid: RigidIK
     network: Network
@@ -52,6 +55,8 @@ class Planner:
     advance: float = 0.0
     advance_speed: float = 0.1
     residual_map: ResidualMap | None = None
+    lean: Rotation | None = None
+    beyond: Vector = (0.0, 0.0, 0.0)
 
     def plan(
         self, request: Request, world: World, joints: np.ndarray, commands: np.ndarray, beside: float = 0.0
@@ -158,7 +163,8 @@ class Planner:
         """
         turn = base_quaternion(targets.pointing, targets.heading)
         back = conjugate(turn)
-        tip = rotate(back, subtract(targets.tip.position, targets.rigid.position))
-        bent = bend(self.network, tip, rotate(back, DOWN), self.tolerance, self.chain, self.residual_map)
+        tip = rotate(back, subtract(subtract(targets.tip.position, self.beyond), targets.rigid.position))
+        down, tolerance = rotate(back, DOWN), self.tolerance + float(np.linalg.norm(self.beyond))
+        bent = bend(self.network, tip, down, tolerance, self.chain, self.residual_map, self.lean)
         missed = rotate(turn, subtract(tip, (float(bent.tip[0]), float(bent.tip[1]), float(bent.tip[2]))))
         return add(targets.rigid.position, missed), bent.commands

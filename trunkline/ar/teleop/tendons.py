@@ -14,6 +14,7 @@ from functools import partial
 import numpy as np
 import onnxruntime
 from onnxruntime.capi.onnxruntime_pybind11_state import Fail, InvalidGraph, InvalidProtobuf
+from scipy.spatial.transform import Rotation
 
 from trunkline.ar.teleop.correction import Bent, corrected, shift_of
 from trunkline.ar.teleop.tilt_reach import AZIMUTH, STRAIGHT_DOWN, SYMMETRY
@@ -48,28 +49,37 @@ def network_of(session: onnxruntime.InferenceSession) -> Network:
 
 def bend(
     network: Network, tip: Vector, gravity: Vector, tolerance: float, chain: Chain | None = None,
-    learnt: ResidualMap | None = None,
+    learnt: ResidualMap | None = None, lean: Rotation | None = None,
 ) -> Bent:  # fmt: skip
     """Commands that bring the tip to `tip`, m, within `tolerance` m, under `gravity` (unit vector), all in the base
     frame. With `chain`, the arm's statics correct the network's answer, and the tip foreseen is theirs, moved by
-    what is `learnt` of the arm if the network knows of that.
+    what is `learnt` of the arm if the network knows of that; then the arm may `lean` on its mount, too: what the
+    network is asked for, and what is learnt, leans with it.
 
     Raises:
         InputError: no bend comes so near, or a network of one tilt is asked about gravity out of its plane.
     """
+    target, pull, by = tip, gravity, None if chain is None else lean
+    if by is not None:
+        tip, pull = _turned(by.inv(), tip), _turned(by.inv(), gravity)
     if network.inputs == len(TILT):
         bent = _at_tilt(network, tip, gravity, chain, learnt)
     else:
         bent = _best_bend(network, tip, gravity)
     if chain is not None:
-        better = corrected(chain, bent, tip, gravity, learnt)
+        better = corrected(chain, bent, tip, pull, learnt)
         if better is None:
             raise InputError("out of reach: the soft arm finds no rest under the commands for its target")
-        bent = better
-    missed = float(np.linalg.norm(bent.tip - tip))
+        bent = better if by is None else better._replace(tip=by.apply(better.tip))
+    missed = float(np.linalg.norm(bent.tip - target))
     if missed > tolerance:
         raise InputError(f"out of reach: the soft arm's tip comes no nearer to its target than {1e3 * missed:.0f} mm")
     return bent
+
+
+def _turned(by: Rotation, vector: Vector) -> Vector:
+    x, y, z = (float(value) for value in by.apply(vector))
+    return x, y, z
 
 
 def _best_bend(network: Network, tip: Vector, gravity_inputs: tuple[float, ...]) -> Bent:
