@@ -86,7 +86,7 @@ def session(off: list[float]) -> tuple[RehearsedSession, Operator]:
     person = replace(settings.person(), patience=3)
     left, right = (RayHand(origin, REFERENCE, person, 0.15, rng) for origin in ORIGINS)
     operator = Operator(person, (left, right), BENT, 0.03, 0.03, rng)
-    previewer = GraspPreviewer(SimpleNamespace(rest_time=0.0, lacking=None), {}, settings.previewing())  # type: ignore[arg-type]
+    previewer = GraspPreviewer(SimpleNamespace(rest_time=0.0, lacking=None, lean=lambda hangs: None), {}, settings.previewing())  # type: ignore[arg-type]
     made = RehearsedSession(Arc(off), config(), Sent(), (left, right), World("world"), lambda now: OBJECT, previewer)  # type: ignore[arg-type]
     made.planner._predictions = lambda *_: iter([PREDICTION])  # type: ignore[method-assign, return-value]
     return made, operator

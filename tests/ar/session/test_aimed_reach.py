@@ -107,7 +107,7 @@ def test_what_is_learnt_of_an_arm_has_its_friction_in_it_already():
 def test_who_is_followed_leans_too():
     made_once, targets = planning(0.0), order(tip=target(planning(0.0))).request.targets
     asks = FollowRequest(1, targets, START, order().world, HANGS)
-    leaning, upright = (next(made_once.answers(one)).axes for one in (asks, replace(asks, hangs=None)))
+    leaning, upright = (next(made_once.answers(request)).axes for request in (asks, replace(asks, hangs=None)))
     place, turn = base_frames(leaning[:7], OFFSET)
     lean, chain = made_once.robot_model.lean(HANGS), made_once.planner.chain
     down = -9.81 * turn[2]
