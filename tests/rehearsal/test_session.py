@@ -28,14 +28,15 @@ from trunkline.ar.teleop.trajectory import JOINTS, gentle
 from trunkline.errors import InputError
 
 OBJECT = np.array([0.6, 0.1, 0.1])
-PREDICTION = SimpleNamespace(
-    preview=SimpleNamespace(
-        stated=Stated(np.zeros(1), np.zeros((1, 3)), np.zeros(1)), interval=None, probability=None, samples=(),
-        nominal=SimpleNamespace(tip=np.zeros((1, 1, 3))), shown=np.zeros((1, 3)), unknown="",
-    ),
-    begins=0.0,
-    offer=None,
-)
+
+
+def prediction(tip: np.ndarray) -> SimpleNamespace:
+    """Of a plan that ends with the tip there, m (3,)."""
+    preview = SimpleNamespace(
+        stated=Stated(np.zeros(1), tip[None], np.zeros(1)), interval=None, probability=None, samples=(),
+        nominal=SimpleNamespace(tip=tip[None, None]), shown=tip[None], unknown="",
+    )  # fmt: skip
+    return SimpleNamespace(preview=preview, begins=0.0, offer=None)
 
 
 class Arc:
@@ -49,8 +50,10 @@ class Arc:
         return Planner(RigidIK(OFFSET), NETWORK, STRAIGHT, LIMITS, OFFSET, step=0.01)
 
     def tip(self, mount, targets, commands):
-        x, y, z = targets.tip.position
-        return np.array([x, y, z]) + [0.0, 0.0, self.off.pop(0) if self.off else 0.0]
+        return np.array(targets.tip.position)
+
+    def predictions(self, order, *_):
+        yield prediction(np.array(order.request.targets.tip.position) + [0, 0, self.off.pop(0) if self.off else 0])
 
 
 class Sent:
@@ -86,9 +89,10 @@ def session(off: list[float]) -> tuple[RehearsedSession, Operator]:
     person = replace(settings.person(), patience=3)
     left, right = (RayHand(origin, REFERENCE, person, 0.15, rng) for origin in ORIGINS)
     operator = Operator(person, (left, right), BENT, 0.03, 0.03, rng)
-    previewer = GraspPreviewer(SimpleNamespace(rest_time=0.0, lacking=None, lean=lambda hangs: None), {}, settings.previewing())  # type: ignore[arg-type]
+    robot_model = SimpleNamespace(rest_time=0.0, lacking=None, lean=lambda hangs: None)
+    previewer = GraspPreviewer(robot_model, {}, settings.previewing())  # type: ignore[arg-type]
     made = RehearsedSession(Arc(off), config(), Sent(), (left, right), World("world"), lambda now: OBJECT, previewer)  # type: ignore[arg-type]
-    made.planner._predictions = lambda *_: iter([PREDICTION])  # type: ignore[method-assign, return-value]
+    made.planner._predictions = made.package.predictions  # type: ignore[method-assign, attr-defined]
     return made, operator
 
 
@@ -132,7 +136,8 @@ def ran() -> tuple[RehearsedSession, list, list]:
     )
     made.robot.truth = lambda: SimpleNamespace(tip=np.array([0.5, 0.2, 0.4]))
     asked = []
-    made.planner._predictions = lambda order, plan, *_: asked.append((plan, order)) or iter([PREDICTION])
+    foreseen = prediction(made.robot.instruments.turn.apply(OBJECT) + made.robot.instruments.shift)
+    made.planner._predictions = lambda order, plan, *_: asked.append((plan, order, foreseen)) or iter([foreseen])
     ending, _, views = rehearse(made, operator.reach())
     assert ending.done
     return made, views, asked
@@ -152,10 +157,10 @@ def test_tip_and_object_are_seen_with_the_whole_error_of_the_alignment(ran):
 def test_the_plan_that_was_run_was_foreseen_before(ran):
     """By the planner of a page, in the client's world."""
     made, _, asked = ran
-    ((plan, order),) = asked
+    ((plan, order, foreseen),) = asked
     assert plan is made.controller.plan
     assert order.world is made.controller.world
-    assert made.prediction is PREDICTION
+    assert made.prediction is foreseen
     assert made.controller.prediction.digest == plan.digest()
     np.testing.assert_allclose(made.robot.joints[0], plan.joints[-1], atol=1e-9)
 
