@@ -6,21 +6,20 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.ar.session.test_correction_steps import BEYOND
+from tests.ar.session.test_correction_steps import BEYOND, BOUNDS
 from tests.ar.session.test_preview_process import made, order
 from tests.ar.teleop.test_plan import MOUNT, OFFSET, START
 from tests.support.small_arm import small_spec
 from trunkline.ar.session import previewer
 from trunkline.ar.session.correction_rests import MeasuredRest
+from trunkline.ar.session.correction_steps import DOWN
 from trunkline.ar.session.previewer import FollowRequest, PlanAnswer, PredictionAnswer, PreviewPlanner
 from trunkline.ar.teleop.base_frames import base_frames
-from trunkline.ar.teleop.plan import CorrectionBounds
 from trunkline.model.arm.guide_holes import GuideHoles, add_holes
 from trunkline.model.statics.chain import read_chain
 from trunkline.model.statics.equilibria import actuated
 
 HANGS = np.array([0.012, -0.006, -0.5])  # a degree and a half
-BOUNDS = CorrectionBounds((0.0, 0.0, 0.0), 5, 5e-3, 0.03)
 CALM = 15.0  # times the small arm's damping
 
 
@@ -42,7 +41,7 @@ def target(planning: PreviewPlanner) -> tuple[float, float, float]:
     place, turn = base_frames(START, OFFSET)
     chain = planning.planner.chain
     commands = chain.straight_lengths - [0.02, -0.05, -0.05]
-    tip = np.array(MOUNT) + turn @ actuated(chain, commands[None], (-9.81 * turn[2])[None]).position[0]
+    tip = np.array(MOUNT) + turn @ actuated(chain, commands[None], (DOWN @ turn)[None]).position[0]
     x, y, z = (float(value) for value in tip)
     return x, y, z
 
@@ -104,12 +103,11 @@ def test_what_is_learnt_of_an_arm_has_its_friction_in_it_already():
 
 
 def test_who_is_followed_leans_too():
-    made_once, targets = planning(0.0), order(tip=target(planning(0.0))).request.targets
+    previews, targets = planning(0.0), order(tip=target(planning(0.0))).request.targets
     asks = FollowRequest(1, targets, START, order().world, HANGS)
-    leaning, upright = (next(made_once.answers(request)).axes for request in (asks, replace(asks, hangs=None)))
+    leaning, upright = (next(previews.answers(request)).axes for request in (asks, replace(asks, hangs=None)))
     place, turn = base_frames(leaning[:7], OFFSET)
-    lean, chain = made_once.robot_model.lean(HANGS), made_once.planner.chain
-    down = -9.81 * turn[2]
-    tip = lean.apply(actuated(chain, leaning[None, 7:], lean.inv().apply(down)[None]).position[0])
+    lean, chain = previews.robot_model.lean(HANGS), previews.planner.chain
+    tip = lean.apply(actuated(chain, leaning[None, 7:], lean.inv().apply(DOWN @ turn)[None]).position[0])
     assert np.linalg.norm(place + turn @ tip - targets.tip.position) < 1e-3
     assert np.linalg.norm(leaning - upright) > 1e-3
