@@ -45,10 +45,10 @@ def stated_interval(row: dict) -> list[float]:
 
 
 def contradicted(tables: dict[str, dict], table: dict) -> list[str]:
-    """A line for each parameter of a stage's `table` whose 95 % interval has no value in common with an earlier stage's.
+    """A line for each parameter of a stage whose 95 % interval has no value in common with an earlier stage's.
 
     Args:
-        tables: of the earlier stages, as `read_tables`.
+        tables: of the earlier stages, as `read_tables`. table: of the stage.
     """
     lines = []
     for before, earlier in tables.items():
