@@ -88,9 +88,13 @@ class MocapFrame(Entry):
 
 
 class FixedBase(Entry):
-    """Where no body marks the mount: its pose in the motion-capture frame. By default its z axis is up."""
+    """Where no body marks the mount: its pose in the motion-capture frame. By default its z axis is up.
+
+    body: a tracked point on the mount from which `position` is: where it rests in each log, or trial of a table.
+    """
 
     position: Vector
+    body: str | None = None
     quaternion: tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat] | None = None
 
     @model_validator(mode="after")
