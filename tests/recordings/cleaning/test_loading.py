@@ -304,10 +304,11 @@ def test_a_mount_is_stated_from_one_point_of_it(tmp_path):
     place, turn = np.nanmedian(raw.base_positions, axis=0), raw.base_quaternions[0].tolist()
     point = [0.01, -0.02, 0.03]
     origins = []
-    for base in ({"position": (place + point).tolist()}, {"position": point, "body": "base"}):
+    names = {"markers": {name: name for name in raw.markers}}  # else the base would be one
+    for base, more in (({"position": (place + point).tolist()}, names), ({"position": point, "body": "base"}, {})):
         content = yaml.safe_load((tmp_path / "session.yaml").read_text())
         path = tmp_path / "session.yaml"
-        path.write_text(yaml.safe_dump(content | {"base": base | {"quaternion": turn}}))
+        path.write_text(yaml.safe_dump(content | more | {"base": base | {"quaternion": turn}}))
         ((stated, _),) = taken(tmp_path)
         assert stated.markers == raw.markers, "the point is no marker of the arm"
         origins.append(stated.positions - stated.base_positions[:, None])
