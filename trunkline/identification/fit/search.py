@@ -217,7 +217,8 @@ def descend(
     tried: dict[bytes, list[np.ndarray]] = {}
     matters = np.ones(len(start), dtype=bool)
     low, high = problem.bounds()
-    here, local, spent = np.clip(start, low + 1e-9, high - 1e-9), None, 0
+    here, spent = np.clip(start, low + 1e-9, high - 1e-9), 0
+    local: _Local | None = None
 
     def blocks_at(vector: np.ndarray) -> list[np.ndarray]:
         nonlocal spent
@@ -268,7 +269,9 @@ def descend(
                 residuals, here, derivatives, bounds=(low, high), max_nfev=iterations - spent + bool(tried),
                 ftol=tolerance, xtol=STEP_TOLERANCE,
             )  # fmt: skip
-            converged = result.status != 0 and not (local is not None and local.updated)
+            if result.status == 0:
+                break
+            converged = local is None or not local.updated
         except _Misled:
             continue
         except _Ended:
