@@ -6,12 +6,16 @@ import numpy as np
 import pytest
 
 from tests.identification.test_recovery import identified
+from tests.model.simulation.test_shortening import soft_model
 from tests.support.forced_arm import forced_model, forced_pull, holding_model
 from tests.support.noisy_trials import with_values
 from trunkline.errors import InputError
-from trunkline.identification.parameters.parameters import PARAMETERS, parameter_of, parameters_of
+from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields, parameter_of, parameters_of
 from trunkline.identification.simulate.checks import check_trials
 from trunkline.identification.simulate.experiment import prepare
+from trunkline.identification.simulate.markers import with_measured_markers
+from trunkline.identification.simulate.population import Population
+from trunkline.model.simulation.shortening import shortened
 
 PULLS = ([6.0, 0, 0, 0], [0, 5.0, 0, 0], [0, 0, 4.0, 0], [0, 2.0, 0, 6.0])
 OF_LENGTHS = ["kp", "kp_ratio_2", "kv", "winding", "preload_1", "rate_limit", "backlash"]
@@ -45,6 +49,40 @@ def test_stiffness_and_the_scale_of_forces_come_back(model):
     result = identified(trials, model, {"stiffness": (1.0, 100.0), "force_scale": (0.3, 3.0)})
     assert result.values["stiffness"] == pytest.approx(true["stiffness"], rel=0.01)
     assert result.values["force_scale"] == pytest.approx(1.3, rel=0.01)
+
+
+SOFT = ("unit_02", "unit_04", "end")
+SOFT_PULLS = ([4.0, 0, 0], [0, 5.0, 1.0], [4.0, 0, 0])
+
+
+def test_soft_arms_rest_shorter_by_each_trials_tensions():
+    """Two candidates with their own EA and force scale, as MuJoCo settles arms that are as short."""
+    model = with_values(soft_model(), {"axial_stiffness": 300.0})
+    trials = [forced_pull(shortened(model, np.array(pull)), pull, markers=SOFT) for pull in SOFT_PULLS]
+    experiments = [prepare(trial, model, 1) for trial in trials]
+    assert max(experiment.fit.residuals.max() for experiment in experiments) < 1e-4  # the pose is that of a shorter arm
+    values = {"axial_stiffness": np.array([300.0, 150.0]), "force_scale": np.array([1.0, 0.8])}
+    shapes = Population(model, experiments, SOFT).simulate(candidate_fields(model, values)).positions
+    other = with_values(model, {"axial_stiffness": 150.0})
+    for trial, pull, shape in zip(trials, SOFT_PULLS, shapes, strict=True):
+        weaker = forced_pull(shortened(other, 0.8 * np.array(pull)), pull, scale=0.8, markers=SOFT)
+        np.testing.assert_allclose(shape[:, 0], [trial.positions[0], weaker.positions[0]], atol=2e-6)
+
+
+def test_markers_of_a_soft_arm_are_where_it_is_as_short():
+    model = soft_model()
+    trials = [forced_pull(shortened(model, np.array(pull)), pull, markers=SOFT) for pull in SOFT_PULLS]
+    np.testing.assert_allclose(with_measured_markers(model, trials).site_pos, model.site_pos, atol=2e-4)
+
+
+def test_soft_arms_do_not_move_yet():
+    rest = forced_pull(soft_model(), SOFT_PULLS[0], markers=SOFT)
+    trial = replace(rest, experiment="motion", time=np.arange(30) / 60)
+    many = {name: np.repeat(getattr(trial, name), 30, axis=0)
+            for name in ("positions", "measured", "commands", "tendon_positions")}  # fmt: skip
+    experiment = prepare(replace(trial, **many), soft_model(), 5)
+    with pytest.raises(InputError, match="^trial pull_4_0_0_identify, which moves: found an arm with axial_stiffness"):
+        Population(soft_model(), [experiment], SOFT)
 
 
 def test_trials_are_set_up_with_their_tensions(model):

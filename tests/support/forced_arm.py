@@ -51,14 +51,16 @@ def rest_of(model: mujoco.MjModel, tensions: np.ndarray) -> mujoco.MjData:
     return data
 
 
-def forced_pull(model: mujoco.MjModel, tensions, split: str = "identify", scale: float = 1.0) -> Trial:
+def forced_pull(
+    model: mujoco.MjModel, tensions, split: str = "identify", scale: float = 1.0, markers: tuple[str, ...] = MARKERS
+) -> Trial:
     """A static pull that logs `tensions`, N, of which motors pull with `scale` times as much."""
     data = rest_of(model, scale * np.asarray(tensions, dtype=float))
-    places = np.array([data.site(f"{name}_center").xpos for name in MARKERS])[None]
+    places = np.array([data.site(f"{name}_center").xpos for name in markers])[None]
     pulls, names = np.array([tensions], dtype=float), ArmModel(model).cable_names
     return Trial(
         name="pull_" + "_".join(f"{tension:g}" for tension in tensions) + f"_{split}", experiment="static_pull",
-        split=split, level=None, gravity=DOWN, time=np.zeros(1), markers=MARKERS, positions=places, quaternions=None,
-        measured=np.ones((1, len(MARKERS)), bool), tendons=tuple(names), commands=pulls, tendon_positions=pulls,
+        split=split, level=None, gravity=DOWN, time=np.zeros(1), markers=markers, positions=places, quaternions=None,
+        measured=np.ones((1, len(markers)), bool), tendons=tuple(names), commands=pulls, tendon_positions=pulls,
         command_unit=FORCE,
     )  # fmt: skip

@@ -9,7 +9,8 @@ Numbers `rate_limit` and `backlash` are those of the motors' winches (`trunkline
 for none. `winding` and `preload` say what a logged command draws in: so many times its metres, and so many metres of
 each cable beyond the straight arm's where it is 0; of motors that are commanded by force, `force_scale` says how many
 times its newtons it pulls with. `sections` are the numbers of units of an arm that is made of
-several.
+several. `axial_stiffness` is EA of each unit, N, of an arm that gets shorter under its tendons
+(`trunkline/model/simulation/shortening.py`).
 """
 
 from collections.abc import Sequence
@@ -31,7 +32,7 @@ SLIP = 2e-4  # m, of models that do not say: see conf/build_mjcf/holes/rubbing.y
 HINGE_SHARE, DIAGONAL_SHARE = 2 / 3, 1 / 6  # of the hardening K c of a round joint, see `trunkline/model/arm/joints.py`
 RATE_LIMIT, BACKLASH = "rate_limit", "backlash"  # of winches, m/s and m of cable
 WINDING, PRELOAD, SECTIONS = "winding", "preload", "sections"
-FORCE_SCALE = "force_scale"
+FORCE_SCALE, AXIAL_STIFFNESS = "force_scale", "axial_stiffness"
 TIP_LOAD = "tip_load"  # the body that an arm's description hangs at the tip
 
 # by model, for all its `ArmModel`s: names are fixed once a model is compiled, and looking through them takes long
@@ -158,6 +159,12 @@ class ArmModel:
                              "build_mjcf.actuation.commands: length, or stages up to `score` and `fk_dataset` alone"
                              )  # fmt: skip
 
+    def require_stiff_units(self, what: str) -> None:
+        """Raise InputError, one line that begins with `what`, for an arm that gets shorter under its tendons."""
+        if len(self.axial_stiffness):
+            raise InputError(f"{what}: found an arm with axial_stiffness, expected one without: its shortening is "
+                             "known at rest alone, in identify_stiffness and score")  # fmt: skip
+
     @cached_property
     def guide_holes(self) -> np.ndarray:
         """Numbers of the tendons by which each cable rubs, P for each. Shape (K, P), P = 0 where nothing rubs."""
@@ -256,6 +263,11 @@ class ArmModel:
     def sections(self) -> np.ndarray:
         """Numbers of units of an arm that is made of several sections, else empty."""
         return self.numbers(SECTIONS).astype(int)
+
+    @property
+    def axial_stiffness(self) -> np.ndarray:
+        """EA of each unit, N. Shape (n,), or empty of units that keep their lengths."""
+        return self.numbers(AXIAL_STIFFNESS)
 
     def switch_off(self, *names: str) -> bool:
         """Set the model's numbers of these names to 0, in place; returns whether any was on, by its first value."""

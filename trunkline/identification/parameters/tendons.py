@@ -137,6 +137,21 @@ def _write_distance(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -
     fields["site_pos"][:, sites, :2] *= (values / _read_distance(model))[:, None, None]
 
 
+def _read_taper(model: mujoco.MjModel) -> float:
+    sites = _sites(model, 1)
+    return float(np.hypot(*model.site_pos[sites[-1], :2])) / _read_distance(model)
+
+
+def _write_taper(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
+    """Of every cable: what the last of its holes is further out, or less, its others are from hole to hole."""
+    change = values - _read_taper(model)
+    for cable in range(1, model.nu + 1):
+        sites = _sites(model, cable)
+        away = np.hypot(*model.site_pos[sites, :2].T)
+        added = np.outer(change, np.linspace(0, 1, len(sites))) * away[0]
+        fields["site_pos"][:, sites, :2] *= (1 + added / away)[..., None]
+
+
 TENDON_PARAMETERS: dict[str, Parameter] = {
     "tendon_friction": _of_all("N", "tendon_frictionloss", identifiable_from=moving),
     # the smallest speed at which a regularised friction yields falls with it: a slow one lets a hook creep straight
@@ -163,4 +178,6 @@ TENDON_PARAMETERS: dict[str, Parameter] = {
     "tendon_distance": Parameter(
         "m", ("site_pos",), _read_distance, _write_distance, part=TENDONS, identifiable_from=pulled
     ),
+    # distance from the axis of the first cable's last hole over that of its first
+    "tendon_taper": Parameter("", ("site_pos",), _read_taper, _write_taper, part=TENDONS, identifiable_from=pulled),
 }  # fmt: skip

@@ -7,10 +7,12 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.identification.parameters.per_session import model_in
+from trunkline.identification.parameters.spool_scale import wound
 from trunkline.identification.simulate.checks import check_names
 from trunkline.identification.simulate.loss import LossWeights
 from trunkline.identification.simulate.pose_fit import PoseFit, start_frames, start_of
 from trunkline.model.arm_model import ArmModel
+from trunkline.model.simulation.shortening import shortened
 from trunkline.recordings.trials.experiments import is_static, is_stepwise
 from trunkline.recordings.trials.trial import Trial
 
@@ -93,7 +95,7 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
     positions, measured = trial.positions[window], trial.measured[window]
     if not measured.any():
         raise InputError(f"trial {trial.name}: found no measured frame after its start at {trial.start:.2f} s")
-    fit, start, velocity = start_of(trial, model_in(trial.session, model), start_frame)
+    fit, start, velocity = start_of(trial, arm_in(trial, model, start_frame), start_frame)
     controls = commanded_controls(trial, model)
     if command_delay and model.nu:
         controls = np.stack(
@@ -156,6 +158,15 @@ def _lead(trial: Trial, last: int) -> float:
     """Time to simulate until the first frame: from the start, or from the frame whose velocity is known, s."""
     begin = trial.time[last] if trial.in_motion else max(trial.start, trial.time[last])
     return max(float(trial.time[last + 1] - begin), 1e-4)
+
+
+def arm_in(trial: Trial, model: mujoco.MjModel, frame: int) -> mujoco.MjModel:
+    """The arm as it was in the trial's session, as short as its tendons make it in a frame."""
+    model = model_in(trial.session, model)
+    if not len(ArmModel(model).axial_stiffness):
+        return model
+    sent = wound(model, commanded_controls(trial, model)[frame : frame + 1])[0]
+    return shortened(model, sent[ArmModel(model).actuators])
 
 
 def commanded_controls(trial: Trial, model: mujoco.MjModel) -> np.ndarray:

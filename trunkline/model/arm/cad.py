@@ -86,7 +86,8 @@ class ChainArm(ABC):
         """The arm from geometry and material alone. `models`, the folder of MJCF files, is idle.
 
         Raises:
-            InputError: a tendon has a pretension, and its motor is commanded by force.
+            InputError: a tendon has a pretension, and its motor is commanded by force, or units that get shorter, and it
+                is not.
         """
         actuation = self.actuation or actuation
         forced = actuation.commands == "force"
@@ -96,6 +97,9 @@ class ChainArm(ABC):
                 raise InputError(f"build_mjcf.arm.tendons.{number}.pretension: {problem}: a command of 0 pulls nothing")
         chain = self.chain()
         properties = self.properties(chain)
+        if properties.axial_stiffness is not None and not forced:
+            problem = "found axial_stiffness beside motors that are commanded by length, expected `commands: force`"
+            raise InputError(f"build_mjcf.arm.sections: {problem}: units get shorter by the tension that is sent")
         mass = float(properties.masses.sum()) + self.tip_load
         tendons = Tendons(
             **vars(actuation),

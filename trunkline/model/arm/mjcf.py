@@ -17,7 +17,16 @@ from trunkline.frames import STANDARD_GRAVITY
 from trunkline.model.arm.geometry import ChainGeometry
 from trunkline.model.arm.material import UnitProperties
 from trunkline.model.arm.tendons import Route
-from trunkline.model.arm_model import BACKLASH, FORCE_SCALE, PRELOAD, RATE_LIMIT, SECTIONS, TIP_LOAD, WINDING
+from trunkline.model.arm_model import (
+    AXIAL_STIFFNESS,
+    BACKLASH,
+    FORCE_SCALE,
+    PRELOAD,
+    RATE_LIMIT,
+    SECTIONS,
+    TIP_LOAD,
+    WINDING,
+)
 
 TENDON_RGBA = (0.15, 0.15, 0.15, 1)
 LONGEST_DEAD_TIME = 0.2  # s; what a motor remembers of its commands
@@ -141,6 +150,8 @@ def build_spec(
         preload = [route.pretension / tendons.kp for route in tendons.routes]
         spec.add_numeric(name=WINDING, data=[1.0], size=1)
         spec.add_numeric(name=PRELOAD, data=preload, size=len(preload))
+    if properties.axial_stiffness is not None:
+        spec.add_numeric(name=AXIAL_STIFFNESS, data=properties.axial_stiffness, size=chain.units)
     if chain.sections:
         spec.add_numeric(name=SECTIONS, data=chain.sections, size=len(chain.sections))
 
