@@ -86,8 +86,7 @@ class ChainArm(ABC):
         """The arm from geometry and material alone. `models`, the folder of MJCF files, is idle.
 
         Raises:
-            InputError: a tendon has a pretension, and its motor is commanded by force, or units that get shorter, and it
-                is not.
+            InputError: a tendon has a pretension and its motor is commanded by force, or units get shorter and it is not.
         """
         actuation = self.actuation or actuation
         forced = actuation.commands == "force"
