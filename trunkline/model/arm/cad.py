@@ -86,7 +86,7 @@ class ChainArm(ABC):
         """The arm from geometry and material alone. `models`, the folder of MJCF files, is idle.
 
         Raises:
-            InputError: a tendon has a pretension and its motor is commanded by force, or units get shorter and it is not.
+            InputError: beside `commands: force` a tendon has a pretension; without it, units get shorter.
         """
         actuation = self.actuation or actuation
         forced = actuation.commands == "force"
