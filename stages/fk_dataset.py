@@ -5,6 +5,7 @@ from pathlib import Path
 from trunkline.compute.progress import progress
 from trunkline.kinematics.dataset.gather import Sampling, gather
 from trunkline.kinematics.dataset.report import summary, unevenness_table
+from trunkline.model.arm_model import ArmModel
 from trunkline.model.statics.chain import read_chain
 from trunkline.model_files import read_model
 from trunkline.pipeline.stage import output_folder, run_stage, write_metrics
@@ -24,6 +25,7 @@ class Config(Sampling):
 
 def main(config: Config) -> None:
     model = read_model(Path(config.model))
+    ArmModel(model).require_stiff_units("fk_dataset.model")
     chain = read_chain(model).smooth
     with progress(len(config.gravity.downs), "fk_dataset", "gravities") as bar:
         gathered = gather(model, chain, config, lambda **counts: bar.update(1, **counts))

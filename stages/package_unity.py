@@ -10,6 +10,7 @@ from pydantic import Field
 from trunkline.ar.conformance.vectors import vectors, with_shared_vectors
 from trunkline.ar.teleop.settings import Teleop
 from trunkline.kinematics.panda.mounts import Robot
+from trunkline.model.arm_model import ArmModel
 from trunkline.pipeline.stage import output_folder, run_stage, write_metrics
 from trunkline.report.figures.package import roundtrip_figure
 from trunkline.report.figures.style import save_figure
@@ -35,6 +36,7 @@ class Config(Label):
 
 def main(config: Config) -> None:
     sources = read_sources(Path("."))
+    ArmModel(mujoco.MjModel.from_xml_string(sources.mjcf)).require_lengths("package_unity")
     files, violations = assemble(config, sources, config.roundtrip, config.robot)
     files = with_shared_vectors(files, config.core)
     for violation in violations:

@@ -11,6 +11,7 @@ from trunkline.kinematics.reachability.report import heldout_table, summary
 from trunkline.kinematics.reachability.sampled import read_tips
 from trunkline.kinematics.reachability.survey import SurveySettings, survey
 from trunkline.kinematics.sdf.mesh import write_obj
+from trunkline.model.arm_model import ArmModel
 from trunkline.model.statics.chain import read_chain
 from trunkline.model_files import read_model
 from trunkline.pipeline.stage import output_folder, run_stage, write_metrics
@@ -31,7 +32,9 @@ class Config(SurveySettings):
 
 
 def main(config: Config) -> None:
-    chain = read_chain(read_model(Path(config.model))).smooth
+    model = read_model(Path(config.model))
+    ArmModel(model).require_stiff_units("reachability.model")
+    chain = read_chain(model).smooth
     lacking = read_lacking(LACKING, file_digest(Path(config.model)))
     tips_at = read_tips(SAMPLES, chain, config.soft, config.seed, lacking and lacking.residual_map)
     with progress(config.parts(tips_at), "reachability", "parts") as bar:

@@ -33,6 +33,7 @@ def main(config: Config) -> None:
     files = {stage: ARTIFACTS / stage / "metrics.json" for stage in (*STAGES, "score", "ingest", "filter")}
     metrics = {stage: json.loads(existing(file).read_text()) for stage, file in files.items()}
     twin = Twin.load(ARTIFACTS)
+    twin.arm.require_lengths("report")
     certificate = certify(config, twin, read_trials(TRIALS, DECIDING), metrics, bring)
     facts = certificate.facts | {"files": twin.provenance.files, "code": digest_of_code(CHECKOUT, code())}
     with output_folder(ARTIFACTS / "report") as folder:

@@ -12,6 +12,7 @@ from trunkline.kinematics.ik.learn import Learning, learn
 from trunkline.kinematics.ik.on_plant import Rig
 from trunkline.kinematics.ik.onnx import TrialsAtRest
 from trunkline.kinematics.ik.report import histogram, summary
+from trunkline.model.arm_model import ArmModel
 from trunkline.model.statics.chain import read_chain
 from trunkline.model_files import read_model
 from trunkline.pipeline.inputs import load_rig
@@ -38,6 +39,7 @@ class Config(Learning):
 
 def main(config: Config) -> None:
     model = read_model(Path(config.model))
+    ArmModel(model).require_lengths("train_ik.model")
     chain = read_chain(model).smooth
     table = read_samples(SAMPLES, chain.tendons, "split")
     rig = None

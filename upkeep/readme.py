@@ -44,6 +44,7 @@ PICTURES = {
     "examples/ftdcr/artifacts/score/errors.png": "examples/ftdcr/errors.png",
     "examples/helix/artifacts/score/errors.png": "examples/helix/errors.png",
     "examples/pairs/artifacts/identify_stiffness/paths.png": "examples/pairs/paths.png",
+    "examples/soromox/artifacts/score/errors.png": "examples/soromox/errors.png",
 }
 EXAMPLES = ("asl_trunk",)  # folders of examples/ with releases, each a block of docs/report.md and of its own README
 RESULTS_PAGE = Path("docs/report.md")
@@ -606,7 +607,7 @@ def generate(root: Path) -> dict[Path, str]:
     """README.md, the examples' own, the reference of sessions and the docs, with their generated blocks as they should
     be."""
     examples = {name: example_table(root / "examples" / name) for name in EXAMPLES}
-    examples |= {name: log_table(root / "examples" / name) for name in ("asl_motion", "helix", "pairs")}
+    examples |= {name: log_table(root / "examples" / name) for name in ("asl_motion", "helix", "pairs", "soromox")}
     blocks: dict[Path, dict[str, str]] = {}
     blocks[root / "README.md"] = {"pipeline": pipeline_graph(root), "headline": headline(root)}
     blocks[root / "data" / "raw" / "README.md"] = {"experiments": experiment_table()}

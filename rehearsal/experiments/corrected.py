@@ -13,20 +13,20 @@ from rehearsal.robot.sensors import Readings
 from rehearsal.session import RATE, RehearsedSession
 from trunkline.ar.correction.correction import CorrectionSettings
 from trunkline.ar.session.arm_cameras import MeasuredArm
-from trunkline.ar.session.correction_control import CorrectionControl
+from trunkline.ar.session.correction_control import CorrectionControl, bounds_of
 from trunkline.ar.session.correction_steps import CorrectionAnswer, CorrectionOrder, why_uncorrected
 from trunkline.ar.session.previewer import Order, PlanAnswer
 from trunkline.ar.teleop.messages import Request, Targets
-from trunkline.ar.teleop.plan import CorrectionBounds, Plan
+from trunkline.ar.teleop.plan import Plan
 
 
 def plan_that_corrects(session: RehearsedSession, request: Request, hangs: np.ndarray | None, otherwise: Plan) -> Plan:
     """For a robot that has not moved; `otherwise` where there is none. hangs: as of an `Order`."""
-    settings, robot = CorrectionSettings(), session.executor.axes
-    bounds = CorrectionBounds(request.targets.tip.position, settings.steps, settings.longest, settings.astray)
+    robot, bounds = session.executor.axes, bounds_of(CorrectionSettings(), request.targets.tip.position)
     order = Order(request, session.controller.world, robot.joints, robot.commands, hangs, bounds)
-    answer = next(iter(session.planner.answers(order)))
-    return answer.plan or otherwise if isinstance(answer, PlanAnswer) else otherwise
+    answer = next(session.planner.answers(order))
+    assert isinstance(answer, PlanAnswer), "a plan is asked for"
+    return answer.plan or otherwise
 
 
 def correct(session: RehearsedSession, plan: Plan, targets: Targets) -> str:

@@ -25,7 +25,7 @@ from trunkline.identification.parameters.parameters import (
 from trunkline.identification.parameters.saving import save_model
 from trunkline.model.arm.guide_holes import GuideHoles, add_holes
 from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement, add_elements
-from trunkline.model.arm_model import PRELOAD, SECTIONS, WINDING, ArmModel
+from trunkline.model.arm_model import AXIAL_STIFFNESS, PRELOAD, SECTIONS, WINDING, ArmModel
 
 VALUES = {
     "joint_place": 0.3,
@@ -39,6 +39,7 @@ VALUES = {
     "dead_time": 0.04, "rate_limit": 0.3, "backlash": 0.002,
     "mount_tilt_x": 0.03, "mount_tilt_y": -0.02, "mount_twist": 0.05,
     "winding": 1.2, "tendon_distance": 0.03, "section_stiffness_2": 0.7, "mass": 0.9,
+    "tendon_taper": 0.6, "axial_stiffness": 150.0,
     "preload_1": 0.003, "preload_2": -0.002, "preload_3": 0.001,
     "tendon_angle_1": 0.1, "tendon_angle_2": 2.0, "tendon_angle_3": -2.2,
 }  # fmt: skip
@@ -57,7 +58,9 @@ def with_parts(spec: mujoco.MjSpec, sections: list[int]) -> mujoco.MjSpec:
     """The arm with all but its motors' parts; sections: units of each."""
     add_elements(spec, ELEMENTS, 1e-5)
     add_holes(spec, GuideHoles(0.1, 2))
-    for number, values in ((WINDING, [1.0]), (PRELOAD, [0.0, 0.001, 0.0]), (SECTIONS, sections)):
+    numbers = {WINDING: [1.0], PRELOAD: [0.0, 0.001, 0.0], SECTIONS: sections}
+    numbers[AXIAL_STIFFNESS] = np.linspace(90, 30, sum(sections))
+    for number, values in numbers.items():
         spec.add_numeric(name=number, data=values, size=len(values))
     return spec
 
@@ -193,9 +196,9 @@ def test_units_without_a_line_have_no_joint_place(old, new, message):
         ("dead_time", "motors without, expected build_mjcf.actuation.dead_time of more than 0"),
         ("rate_limit", "winches without, expected build_mjcf.actuation.rate_limit of more than 0"),
         ("backlash", "winches without, expected build_mjcf.actuation.backlash of more than 0"),
-        ("winding", "evenly spread tendons, expected tendons that are described one by one"),
-        ("preload_2", "evenly spread tendons, expected tendons that are described one by one"),
-        ("preload_*", "evenly spread tendons, expected tendons that are described one by one"),
+        ("winding", "evenly spread tendons, or motors that are commanded by force, expected tendons that are"),
+        ("preload_2", "evenly spread tendons, or motors that are commanded by force, expected tendons that are"),
+        ("preload_*", "evenly spread tendons, or motors that are commanded by force, expected tendons that are"),
         ("tendon_angle_4", "an arm without tendon 4, expected one for each .*, did you mean 'tendon_angle_3'"),
         ("section_stiffness_*", "an arm without section 2, expected build_mjcf.arm of the kind sections"),
     ],
@@ -254,6 +257,20 @@ def test_the_tendons_distance_keeps_the_taper():
     scales = np.hypot(*model.site_pos[holes, :2].T) / np.hypot(*start.site_pos[holes, :2].T)
     np.testing.assert_allclose(scales, scales[0])
     assert np.hypot(*model.site("base_tendon_1").pos[:2]) == pytest.approx(0.02)
+
+
+def test_the_tendons_taper_keeps_the_mount_and_changes_evenly():
+    start, model = start_model(), model_with({"tendon_taper": 0.6})
+    for sites in (ArmModel(start).cable_sites(cable) for cable in ArmModel(start).cables):
+        before, after = (np.hypot(*each.site_pos[sites, :2].T) for each in (start, model))
+        steps = np.diff(after - before)
+        np.testing.assert_allclose(steps, steps[0], atol=1e-12)
+        assert after[[0, -1]] == pytest.approx([before[0], 0.6 * before[0]])
+
+
+def test_axial_stiffness_keeps_its_ratios():
+    model = model_with({"axial_stiffness": 150.0})
+    np.testing.assert_allclose(ArmModel(model).axial_stiffness, 150 / 90 * ArmModel(start_model()).axial_stiffness)
 
 
 def test_a_section_s_stiffness_leaves_the_others():

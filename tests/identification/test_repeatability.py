@@ -10,7 +10,6 @@ from tests.support.matched_plant import release, small_model, tilt
 from trunkline.identification.evaluation.repeatability import (
     SAME_GRAVITY,
     SAME_LOAD,
-    SAME_PULL,
     _same,
     end_shape,
     repeatability,
@@ -20,6 +19,9 @@ from trunkline.pipeline.config import settings_of
 from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.filtering.filter import filter_raw_trial
 from trunkline.recordings.session.session import read_session
+from trunkline.recordings.trials.recording import LENGTH, PULLED
+
+SAME_PULL = PULLED[LENGTH]
 
 
 @pytest.fixture(scope="module")

@@ -76,6 +76,55 @@ def test_the_linearisation_where_a_descent_ends_is_that_of_central_differences(p
     assert np.abs(gradient).max() < 0.02 * np.abs(steep).max()
 
 
+class Valley:
+    """Residuals of Rosenbrock's function (1960) in place of an arm's: a valley that bends, its minimum at (1, 1).
+    floor: one more residual, which nothing changes."""
+
+    rubs, parameters = False, ("damping", "tendon_friction")
+
+    def __init__(self, floor: float = 0.0) -> None:
+        self.evaluations, self.floor = 0, floor
+
+    def bounds(self):
+        return np.full(2, -3.0), np.full(2, 3.0)
+
+    def prior(self, vectors):
+        return np.zeros_like(vectors)
+
+    def residuals(self, vectors, near=None):
+        self.evaluations += len(vectors)
+        x, y = vectors.T
+        return [np.stack([10 * (y - x**2), 1 - x, np.full(len(x), self.floor)], axis=1)]
+
+
+@pytest.mark.parametrize("start", [(-1.2, 1.0), (2.5, -2.0), (0.9, 0.8)])
+def test_a_descent_that_updates_its_jacobian_ends_where_differences_have_the_minimum(start, monkeypatch):
+    updated, anew = Valley(), Valley()
+    result = descend(updated, np.array(start), 200, 1e-9, quiet)
+    assert result.converged
+    np.testing.assert_allclose(result.vector, 1.0, atol=1e-4)
+    monkeypatch.setattr("trunkline.identification.fit.search.FORESEEN", -1.0)
+    np.testing.assert_allclose(descend(anew, np.array(start), 200, 1e-9, quiet).vector, 1.0, atol=1e-4)
+    assert updated.evaluations <= anew.evaluations
+
+
+def test_a_descent_does_not_end_where_an_updated_jacobian_gains_too_little():
+    assert descend(Valley(floor=3.0), np.array([-2.426, 1.818]), 200, 1e-2, quiet).loss < 1.02 * 4.5
+
+
+def test_a_descent_that_updates_its_jacobian_takes_fewer_evaluations_on_an_arm(problem, monkeypatch):
+    def effort():
+        counted = replace(problem)
+        return descend(counted, problem.start() + [0.9, -0.8], 25, 1e-6, quiet), counted.evaluations
+
+    result, evaluations = effort()
+    monkeypatch.setattr("trunkline.identification.fit.search.FORESEEN", -1.0)
+    anew, more = effort()
+    assert result.converged
+    assert evaluations < more
+    np.testing.assert_allclose(result.vector, anew.vector, atol=1e-4)
+
+
 def test_differences_stay_within_the_bounds(problem):
     low, high = problem.bounds()
     vectors_tried = []

@@ -137,7 +137,9 @@ def ran() -> tuple[RehearsedSession, list, list]:
     made.robot.truth = lambda: SimpleNamespace(tip=np.array([0.5, 0.2, 0.4]))
     asked = []
     foreseen = prediction(made.robot.instruments.turn.apply(OBJECT) + made.robot.instruments.shift)
-    made.planner._predictions = lambda order, plan, *_: asked.append((plan, order, foreseen)) or iter([foreseen])
+    made.planner._predictions = lambda order, planned, *_: (
+        asked.append((planned.plan, order, foreseen)) or iter([foreseen])
+    )
     ending, _, views = rehearse(made, operator.reach())
     assert ending.done
     return made, views, asked

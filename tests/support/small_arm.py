@@ -24,7 +24,8 @@ def small_spec(units: int = 8, **motors: float) -> mujoco.MjSpec:
 def plain_spec(damping: float, timestep: float, load: float, markers: dict[str, float] | None = None) -> mujoco.MjSpec:
     """Four equal units without tendons, 0.3 m in all. load: kg at the tip. markers: how far from the mount, m."""
     chain, places = uniform_chain(0.3, 0.05, 4, 1.0), {name: Marker(away) for name, away in (markers or {}).items()}
-    tendons, solver = Tendons(0.1, 200, 20, 0.1, routes=[], kv=10), Solver(timestep, 1e-5, *LIMIT, *LIMIT)
+    tendons = Tendons(friction=0.1, kp=200, max_force=20, time_constant=0.1, routes=[], kv=10)
+    solver = Solver(timestep, 1e-5, *LIMIT, *LIMIT)
     return build_spec(chain, uniform_properties(chain, [0.02], 1.0, damping), tendons, solver, load, places)
 
 

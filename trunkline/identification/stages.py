@@ -44,6 +44,25 @@ def stated_interval(row: dict) -> list[float]:
     return row.get("interval_95", row.get("interval_95_given_model", []))
 
 
+def contradicted(tables: dict[str, dict], table: dict) -> list[str]:
+    """A line for each parameter of a stage whose 95 % interval has no value in common with an earlier stage's.
+
+    Args:
+        tables: of the earlier stages, as `read_tables`. table: of the stage.
+    """
+    lines = []
+    for before, earlier in tables.items():
+        for name in [name for name in table["parameters"] if name in earlier["parameters"]]:
+            ends = [stated_interval(rows["parameters"][name]) for rows in (earlier, table)]
+            if all(ends) and (ends[0][0] > ends[1][1] or ends[1][0] > ends[0][1]):
+                (low, high), (least, most) = ends
+                lines.append(
+                    f"{name}: found {least:.3g} to {most:.3g} here and {low:.3g} to {high:.3g} in {before}, expected "
+                    "intervals that overlap: are commands, loads and gravity alike in the trials of both?"
+                )
+    return lines
+
+
 def interval_words(rows: Iterable[dict]) -> str:
     """What the `stated_interval` of rows is called; of stages that differ in what they consider, no more than that."""
     wide = {"interval_95" in row for row in rows}

@@ -7,17 +7,22 @@ diagonals of a round joint, tendons named `<hinge>_diagonal_<number>` after its 
 and the model a number `capstan_friction`, their coefficient, and `slip_length`, m of sliding within which it builds up.
 Numbers `rate_limit` and `backlash` are those of the motors' winches (`trunkline/model/simulation/winch.py`); 0 stands
 for none. `winding` and `preload` say what a logged command draws in: so many times its metres, and so many metres of
-each cable beyond the straight arm's where it is 0. `sections` are the numbers of units of an arm that is made of
-several.
+each cable beyond the straight arm's where it is 0; of motors that are commanded by force, `force_scale` says how many
+times its newtons it pulls with. `sections` are the numbers of units of an arm that is made of
+several. `axial_stiffness` is EA of each unit, N, of an arm that gets shorter under its tendons
+(`trunkline/model/simulation/shortening.py`).
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 from weakref import WeakKeyDictionary
 
 import mujoco
 import numpy as np
+
+from trunkline.errors import InputError
 
 BRANCH, SLIDER, DIAGONAL, HOLE = "branch", "slider", "diagonal", "hole"
 CENTER = "_center"  # ends the name of a marker's site
@@ -27,6 +32,7 @@ SLIP = 2e-4  # m, of models that do not say: see conf/build_mjcf/holes/rubbing.y
 HINGE_SHARE, DIAGONAL_SHARE = 2 / 3, 1 / 6  # of the hardening K c of a round joint, see `trunkline/model/arm/joints.py`
 RATE_LIMIT, BACKLASH = "rate_limit", "backlash"  # of winches, m/s and m of cable
 WINDING, PRELOAD, SECTIONS = "winding", "preload", "sections"
+FORCE_SCALE, AXIAL_STIFFNESS = "force_scale", "axial_stiffness"
 TIP_LOAD = "tip_load"  # the body that an arm's description hangs at the tip
 
 # by model, for all its `ArmModel`s: names are fixed once a model is compiled, and looking through them takes long
@@ -129,6 +135,37 @@ class ArmModel:
         return np.array([np.flatnonzero(drawn == cable)[0] for cable in self.cables], dtype=int)
 
     @cached_property
+    def commands(self) -> Literal["length", "force"]:
+        """What its actuators are sent: lengths of cable that they hold, m, or tensions, N."""
+        motors = self.actuators
+        forced = self.model.actuator_biastype[motors] == mujoco.mjtBias.mjBIAS_NONE
+        return "force" if len(motors) and forced.all() else "length"
+
+    @property
+    def command_unit(self) -> str:
+        """m or N."""
+        return "N" if self.commands == "force" else "m"
+
+    def controls(self, pulls: np.ndarray) -> np.ndarray:
+        """What actuators are sent for pulls of theirs, m from the straight arm or N. Both of shape (..., nu)."""
+        if self.commands == "force":
+            return np.array(pulls, dtype=float)
+        return self.model.tendon_length0[self.model.actuator_trnid[:, 0]] - pulls
+
+    def require_lengths(self, what: str) -> None:
+        """Raise InputError, one line that begins with `what`, for an arm whose motors are commanded by force."""
+        if self.commands == "force":
+            raise InputError(f"{what}: found an arm whose motors are commanded by force, N, expected lengths of cable: "
+                             "build_mjcf.actuation.commands: length, or stages up to `score` and `fk_dataset` alone"
+                             )  # fmt: skip
+
+    def require_stiff_units(self, what: str) -> None:
+        """Raise InputError, one line that begins with `what`, for an arm that gets shorter under its tendons."""
+        if len(self.axial_stiffness):
+            raise InputError(f"{what}: found an arm with axial_stiffness, expected one without: its shortening is "
+                             "known at rest alone, in identify_stiffness and score")  # fmt: skip
+
+    @cached_property
     def guide_holes(self) -> np.ndarray:
         """Numbers of the tendons by which each cable rubs, P for each. Shape (K, P), P = 0 where nothing rubs."""
         tendons = [t for t in range(self.model.ntendon) if f"_{HOLE}_" in self.model.tendon(t).name]
@@ -226,6 +263,11 @@ class ArmModel:
     def sections(self) -> np.ndarray:
         """Numbers of units of an arm that is made of several sections, else empty."""
         return self.numbers(SECTIONS).astype(int)
+
+    @property
+    def axial_stiffness(self) -> np.ndarray:
+        """EA of each unit, N. Shape (n,), or empty of units that keep their lengths."""
+        return self.numbers(AXIAL_STIFFNESS)
 
     def switch_off(self, *names: str) -> bool:
         """Set the model's numbers of these names to 0, in place; returns whether any was on, by its first value."""

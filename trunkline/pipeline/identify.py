@@ -26,7 +26,7 @@ from trunkline.identification.results.parameter_table import parameter_table, un
 from trunkline.identification.results.scoring import Compared, fingerprints, predict, start_fit
 from trunkline.identification.simulate.checks import check_trials
 from trunkline.identification.simulate.experiment import Experiment
-from trunkline.identification.stages import MODEL, STAGES, TABLE, read_table, read_tables
+from trunkline.identification.stages import MODEL, STAGES, TABLE, contradicted, read_table, read_tables
 from trunkline.model.arm_model import BACKLASH, CAPSTAN_FRICTION, RATE_LIMIT, ArmModel
 from trunkline.model_files import read_spec
 from trunkline.pipeline.stage import output_folder, write_json, write_metrics
@@ -160,6 +160,10 @@ def compare(
     }
     for doubt in doubts(result, settings.parameters, diagnostics):
         print(f"{stage}: {doubt}")
+    if not inputs.from_cad:
+        before = read_tables(ARTIFACTS, STAGES[: STAGES.index(stage)])
+        for line in contradicted(before, parameter_table(result, settings.parameters)):
+            print(f"{stage}: warning: {line}")
     return predictions, metrics
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import yaml
 
 from demo.instruments import measure
 from demo.recorder import write_log, write_session
@@ -295,3 +296,22 @@ def test_real_recordings_without_orientations_or_base_body(tmp_path):
         rest = trial.positions[-1] - [[0, 0, -0.106], [0, 0, -0.203], [0, 0, -0.322]]
         assert np.abs(rest).max() < 0.04, "the hose hangs along -z again"
         assert 0 <= trial.start < 1.5
+
+
+def test_a_mount_is_stated_from_one_point_of_it(tmp_path):
+    """Wherever the point is: poses in the base frame are those of a mount that is stated in the cameras' frame."""
+    raw, _ = one_trial(tmp_path)
+    place, turn = np.nanmedian(raw.base_positions, axis=0), raw.base_quaternions[0].tolist()
+    point = [0.01, -0.02, 0.03]
+    origins = []
+    names = {"markers": {name: name for name in raw.markers}}  # else the base would be one
+    for base, more in (({"position": (place + point).tolist()}, names), ({"position": point, "body": "base"}, {})):
+        content = yaml.safe_load((tmp_path / "session.yaml").read_text())
+        path = tmp_path / "session.yaml"
+        path.write_text(yaml.safe_dump(content | more | {"base": base | {"quaternion": turn}}))
+        ((stated, _),) = taken(tmp_path)
+        assert stated.markers == raw.markers, "the point is no marker of the arm"
+        origins.append(stated.positions - stated.base_positions[:, None])
+    np.testing.assert_allclose(origins[0], origins[1], atol=1e-9)
+    path.write_text(path.read_text().replace("body: base", "body: bse"))
+    refused(taken(tmp_path)[0], "release_a.mcap: base.body: found 'bse', expected one of base, unit_")

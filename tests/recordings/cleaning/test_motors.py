@@ -10,9 +10,13 @@ from mcap_ros2.decoder import DecoderFactory
 from mcap_ros2.writer import Writer as RosWriter
 
 from tests.recordings.cleaning.test_loading import edit_session, one_trial, taken
+from tests.recordings.filtering.test_gaps import SETTINGS
 from tests.support.sessions import curl_truth, pull_truth
 from trunkline.errors import InputError
+from trunkline.recordings.cleaning.pulls import check_pulls
+from trunkline.recordings.filtering.filter import filter_raw_trial
 from trunkline.recordings.logs.definitions import JOINT_STATE, KNOWN, RIGID_BODIES
+from trunkline.recordings.trials.inventory import recorded_lines
 
 
 def curl(folder, change=lambda m: None, clock="frame"):
@@ -295,3 +299,41 @@ def test_a_command_that_was_sent_before_the_poses_holds_an_arm_at_rest(tmp_path)
     assert not isinstance(after, InputError), str(after)
     np.testing.assert_array_equal(after.commands, before.commands[:1])
     assert any("s before the poses: the last holds" in line for line in findings.repairs)
+
+
+def forced(folder, tensions):
+    """The pull, its motors commanded by torques at drums of 2 cm that pull with these N."""
+    torques = np.asarray(tensions) * 0.02
+    pulled = one_trial(folder, lambda m: replace(m, commands=np.broadcast_to(torques, m.commands.shape)), pull_truth())
+    assert not isinstance(pulled[0], InputError)
+    motors = "".join(f"  tendon_{k}: {{unit: Nm, spool_radius: 0.02, tendons: {{tendon_{k}: 1}}}}\n" for k in (1, 2, 3))
+    edit_session(folder, "trials:", f"motors:\n{motors}trials:")
+    edit_session(folder, ", tendon_positions: /tendon_states", "")
+    ((raw, _),) = taken(folder)
+    return raw
+
+
+def test_torques_of_drums_are_newtons_of_tension(tmp_path):
+    raw = forced(tmp_path, [4.0, 0.0, 1.5])
+    assert raw.command_unit == "N"
+    np.testing.assert_allclose(raw.commands, np.broadcast_to([4.0, 0.0, 1.5], raw.commands.shape), atol=1e-12)
+    assert not raw.tendon_positions.size, "what encoders measure is no force"
+    assert check_pulls(raw, 0.5, 0.01, 2.0, {}) == [], "5 N are no 5 m"
+    trial, _ = filter_raw_trial(raw, SETTINGS)
+    assert (trial.command_unit, trial.commands[0].tolist()) == ("N", pytest.approx([4.0, 0.0, 1.5]))
+    assert recorded_lines([trial]) == ["static pulls: 1 identify, 0 validate, 0 test; pulls of up to 4 N"]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda raw: replace(raw, commands=-raw.commands), "from -4 to 0 N, expected positive .* is the sign reversed"),
+        (lambda raw: replace(raw, experiment="release"), "'tendon_1' is pulled by 4 N, expected a release without"),
+        (lambda raw: replace(raw, commands=np.linspace(0, 2, len(raw.commands))[:, None] * raw.commands),
+         "'tendon_1' is pulled by .* N more at times, expected a static_pull to hold them"),
+    ],
+)  # fmt: skip
+def test_tensions_that_cannot_be_are_named(tmp_path, change, message):
+    raw = forced(tmp_path, [4.0, 0.0, 1.5])
+    (fault,) = check_pulls(change(raw), 0.5, 0.01, 2.0, {})
+    assert re.search(message, fault), fault

@@ -52,13 +52,56 @@ def test_good_session(tmp_path):
     [
         ({"unit": "deg", "tendons": {"tendon_1": 1}}, "motors.m1.*spool_radius: missing, expected that of a motor"),
         ({"unit": "mm", "spool_radius": 0.1, "tendons": {"tendon_1": 1}}, "spool_radius: found 0.1, expected none"),
-        ({"unit": "inch", "tendons": {"tendon_1": 1}}, "motors.m1.unit: found 'inch', expected 'm', 'mm', 'rad' or"),
+        ({"unit": "inch", "tendons": {"tendon_1": 1}}, "motors.m1.unit: found 'inch', expected 'm', 'mm', .*'Nm' or"),
+        ({"unit": "Nm", "tendons": {"tendon_1": 1}}, "spool_radius: missing, expected .* that counts Nm, m"),
+        ({"unit": "N", "spool_radius": 0.1, "tendons": {"tendon_1": 1}}, "found 0.1, expected none .* that counts N"),
         ({"unit": "m", "tendons": {}}, "motors.m1.tendons: "),
     ],
 )
 def test_a_mistake_about_a_motor_is_named(tmp_path, motor, message):
     with pytest.raises(InputError, match=message):
         read_session(session(tmp_path, changed("motors", value={"m1": motor})))
+
+
+@pytest.mark.parametrize(
+    ("unit", "radius", "tension"), [("N", None, 4.0), ("Nm", 0.02, 200.0), ("effort", None, 4.0)]
+)
+def test_commands_as_forces_are_newtons_of_tension(tmp_path, unit, radius, tension):
+    """A drum of 2 cm pulls by 200 N with 4 N m; an effort is N but for a factor."""
+    motor = {"unit": unit, "tendons": {"tendon_2": 1, "tendon_1": 0.5}} | ({"spool_radius": radius} if radius else {})
+    read = read_session(session(tmp_path, changed("motors", value={"m1": motor})))
+    names, scale = read.coupling()
+    assert names == ("tendon_2", "tendon_1")
+    np.testing.assert_allclose(scale @ [4.0], [tension, tension / 2])
+    assert read.command_unit == "N"
+    assert read_session(session(tmp_path)).command_unit == "m"
+
+
+FORCED = {"m1": {"unit": "N", "tendons": {"tendon_1": 1}}}
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (
+            changed("motors", value=FORCED | {"m2": {"unit": "mm", "tendons": {"tendon_2": 1}}}),
+            r"motors.m2.unit: found 'mm', expected a unit of force \(N, Nm, effort\) as others have it",
+        ),
+        (
+            changed("motors", value=FORCED) | {"topics": {"tendon_positions": "/states"}},
+            "tendon_positions: found it of motors that are commanded by force, expected none",
+        ),
+        (
+            changed("trials", 0, value={"file": "tilt.mcap", "experiment": "curl", "level": 20, "split": "identify"})
+            | {"motors": FORCED},
+            "trials.0.experiment: found a curl, whose level is in mm of pull, expected a motion",
+        ),
+    ],
+)
+def test_what_forces_exclude_is_named(tmp_path, content, message):
+    with pytest.raises(InputError, match=message) as error:
+        read_session(session(tmp_path, content))
+    assert "\n" not in str(error.value)
 
 
 def test_motors_and_tendons_exclude_each_other(tmp_path):

@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 
 from trunkline.recordings.signals.held import to_and_fro, with_corners
+from trunkline.recordings.trials.recording import LENGTH, PULLED
+
+FAR = PULLED[LENGTH]
 
 
 def at(when, time, commands, between=None):
@@ -35,12 +38,12 @@ def test_two_publishers_are_told_by_their_jumps(every):
     time = np.arange(100) * 0.02
     commands = 0.01 * np.sin(np.pi * time)[:, None]
     commands[::every] = 0
-    assert len(to_and_fro(time, commands)) > 15
+    assert len(to_and_fro(time, commands, FAR)) > 15
 
 
 def test_one_publisher_is_left_alone():
     time = np.arange(400) * 0.01
     square = np.where(np.sin(2 * np.pi * time) > 0, 0.02, 0.0)[:, None]
-    assert to_and_fro(time, square) == []
-    assert to_and_fro(time, 0.02 * np.sin(20 * time)[:, None]) == []
-    assert to_and_fro(np.arange(6) * 0.5, square[::50][:6]) == [], "told one by one, seldom"
+    assert to_and_fro(time, square, FAR) == []
+    assert to_and_fro(time, 0.02 * np.sin(20 * time)[:, None], FAR) == []
+    assert to_and_fro(np.arange(6) * 0.5, square[::50][:6], FAR) == [], "told one by one, seldom"

@@ -1,6 +1,7 @@
 """Trials and raw trials come back from Parquet as they were."""
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from trunkline.errors import InputError
@@ -87,3 +88,12 @@ def test_missing_tables_name_the_file_and_the_stage_to_run(tmp_path, read, stage
     (tmp_path / "trials.parquet").write_bytes(b"")
     with pytest.raises(InputError, match=rf"trials\.parquet: not readable as Parquet, .*dvc repro {stage}"):
         read(tmp_path, SPLITS)
+
+
+def test_the_unit_of_commands_comes_back_and_has_no_column_where_all_are_lengths(tmp_path):
+    forced, plain = trial("b", 4, 2, 2, True), trial("a", 5, 2, 2, True)
+    forced.command_unit = "N"
+    for trials, units in (([plain, forced], ["m", "N"]), ([plain], ["m"])):
+        write_trials(tmp_path, trials)
+        assert [each.command_unit for each in read_trials(tmp_path, SPLITS)] == units
+    assert "command_unit" not in pq.read_schema(tmp_path / "trials.parquet").names

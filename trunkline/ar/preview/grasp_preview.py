@@ -118,11 +118,11 @@ class GraspPreviewer:
         seed: int,
         go_on: Callable[[], None] = lambda: None,
         learnt: ResidualMap | None = None,
-        rubbing: np.ndarray | None = None,
+        hysteresis: np.ndarray | None = None,
     ) -> PlanPrediction:
         """Futures of which nothing is asked but where the tip goes. `hangs`, `go_on`: as of `grasp`; `learnt` and
-        `rubbing`: as of `tip_uncertainty`."""
-        tip = self.robot_model.tip_uncertainty(trajectory, hangs, learnt, rubbing)
+        `hysteresis`: as of `tip_uncertainty`."""
+        tip = self.robot_model.tip_uncertainty(trajectory, hangs, learnt, hysteresis)
         uncertainty, futures = self.robot_model.uncertainty, self.settings.futures
         return PlanPrediction(
             preview(twin, trajectory, uncertainty, None, futures, seed, go_on=go_on, tip=tip), 0.0

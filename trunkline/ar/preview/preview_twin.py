@@ -34,7 +34,7 @@ from trunkline.twin.twin import Twin
 GRAVITY = np.array([[0.0, 0.0, -STANDARD_GRAVITY]])  # m/s², where the arm hangs straight down
 
 LEANS = 4  # times that it is corrected: each leaves a tenth or less
-EASED = 1e-6  # m of all pulls, below which an arm is not pulled
+UNPULLED = 1e-6  # m of all pulls, up to which an arm is not pulled
 SHIFTED = 0.2  # s between the places along a plan at which the residual map is asked
 CREEP = 0.01  # share of the way to rest that may be left
 
@@ -63,13 +63,13 @@ class RobotModel:
         trajectory: CommandTrajectory,
         hangs: np.ndarray | None,
         session: ResidualMap | None = None,
-        rubbing: np.ndarray | None = None,
+        hysteresis: np.ndarray | None = None,
     ) -> TipUncertainty | TipUnknown:
         """By how far its tip may be elsewhere, at rest without a load where a trajectory ends; or why that is unknown.
         Cables that rub hold a future's tip where its way leaves it, within the friction band: it counts only without.
         hangs: where the straight arm's tip was seen where the trajectory begins, in the base frame, (3,), m. session:
         what is learnt of the arm, with what was measured in this session; it moves the tip and makes it no surer.
-        rubbing: by how far friction holds the twin's tip at the end, m (3,), world: what is learnt has that in it."""
+        hysteresis: by how far friction holds the twin's tip at the end, m (3,), world; what is learnt has that too."""
         if self.lacking is None:
             return TipUnknown("no trial at rest was held out, or the package is of an earlier release")
         places, bases = base_frames(trajectory.joints[[0, -1]], self.robot.mount_offset)
@@ -81,7 +81,7 @@ class RobotModel:
         pulls = np.maximum(arm.chain.straight_lengths - commands[order], 0)
         learnt = self.lacking.residual_map
         shifted = session or learnt
-        shift = None if shifted is None else self._shift(trajectory, arm, order, shifted, rubbing)
+        shift = None if shifted is None else self._shift(trajectory, arm, order, shifted, hysteresis)
         if beyond := self.lacking.beyond(pulls, float(np.degrees(tilt_of_gravity(gravity)))):
             return TipUnknown(beyond, shift)
         pose = StaticPoses(gravity[None], commands[None][:, order])
@@ -97,11 +97,11 @@ class RobotModel:
 
     def _shift(
         self, trajectory: CommandTrajectory, arm: StaticArm, order: np.ndarray, learnt: ResidualMap,
-        rubbing: np.ndarray | None,
+        hysteresis: np.ndarray | None,
     ) -> TipShift:  # fmt: skip
         """By how far the tip rests beside that of `arm` along a trajectory, its cables in that `order` (K,), less what
-        friction holds of it where poses tell: at the end `rubbing`, before that in proportion to the pulls. Where the
-        twin finds no rest, as before and after."""
+        friction holds of it where poses tell: `hysteresis` at the end, before that in proportion to the pulls. Where
+        the twin finds no rest, as before and after."""
         times = np.linspace(0, trajectory.duration, max(round(trajectory.duration / SHIFTED), 1) + 1)
         rows = trajectory.at(times)
         joints, commands = np.split(rows, [trajectory.joints.shape[1]], axis=1)
@@ -109,11 +109,11 @@ class RobotModel:
         poses = StaticPoses(np.einsum("nji,j->ni", bases, GRAVITY[0]), commands[:, order])
         shifts = np.einsum("nij,nj->ni", bases, arm.shift(learnt, poses))
         rested = np.isfinite(shifts).all(axis=1)
-        if rubbing is not None and np.isfinite(rubbing).all():
+        if hysteresis is not None and np.isfinite(hysteresis).all() and rested[-1]:
             resting = arm.resting(poses)
             pulled = np.linalg.norm(np.maximum(resting.pulls, 0), axis=1)
-            pulled = np.clip(pulled / max(pulled[-1], EASED), 0, 1)
-            shifts = shifts - (pulled * (1 - learnt.unknown(resting)))[:, None] * rubbing
+            share = np.clip(pulled / max(pulled[-1], UNPULLED), 0, 1)
+            shifts = shifts - (share * (1 - learnt.unknown(resting)))[:, None] * hysteresis
         return TipShift(times[rested], shifts[rested]) if rested.any() else TipShift(times, np.zeros_like(shifts))
 
     def lean(self, hangs: np.ndarray | None) -> Rotation | None:

@@ -55,7 +55,7 @@ class CorrectionControl:
 
     def bounds(self, target: tuple[float, float, float]) -> CorrectionBounds:
         """Of a plan whose tip target is there, m."""
-        return CorrectionBounds(target, self._settings.steps, self._settings.longest, self._settings.astray)
+        return bounds_of(self._settings, target)
 
     def realign(self, before: Pose, after: Pose) -> None:
         """The cameras' frame is not where it was `before` in the base, but `after`: nor is what was measured in it."""
@@ -269,6 +269,11 @@ class CorrectionControl:
             self.end("the robot has come to rest by itself")
         elif robot.mode != "running" and self._waited > STARTS:
             self.end(f"a step did not start within {STARTS:g} s")
+
+
+def bounds_of(settings: CorrectionSettings, target: tuple[float, float, float]) -> CorrectionBounds:
+    """Of a plan whose tip target is there, m."""
+    return CorrectionBounds(target, settings.steps, settings.longest, settings.astray)
 
 
 def beyond_bounds(step: Plan, plan: Plan, begin: np.ndarray, here: np.ndarray) -> str:

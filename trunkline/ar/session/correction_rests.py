@@ -22,7 +22,7 @@ from trunkline.frames import rotation_from_wxyz
 from trunkline.kinematics.dataset.sampling import sections
 from trunkline.kinematics.residual.residual_map import ResidualMap, RestingPoses
 from trunkline.model.statics.chain import Chain
-from trunkline.model.statics.equilibria import actuated
+from trunkline.model.statics.equilibria import Equilibrium, actuated
 
 MOST = 60  # rests, the newest: statics of so many take some 20 ms of a processor, for a plan and for its preview
 SHARED = 0.01  # of the largest tension: where all cables of a section have more, it moves the twin's tip by some 0.1 mm
@@ -60,6 +60,16 @@ def learnt_from(
     return learnt_in_base(chain, np.array([rest.commands for rest in rests]), gravity, tips, before, lean)
 
 
+def leaning_rest(
+    chain: Chain, commands: np.ndarray, gravity: np.ndarray, lean: Rotation | None
+) -> tuple[Equilibrium, np.ndarray]:
+    """Rests without friction of a twin that leans on its mount by `lean`, and its tips, NaN where it finds none, m (N,
+    3). Arguments as of `learnt_in_base`."""
+    by = Rotation.identity() if lean is None else lean
+    rest = actuated(chain.smooth, commands, by.inv().apply(gravity))
+    return rest, np.where(rest.converged[:, None], by.apply(rest.position), np.nan)
+
+
 def learnt_in_base(
     chain: Chain,
     commands: np.ndarray,
@@ -74,12 +84,11 @@ def learnt_in_base(
     Args:
         commands: m (N, K). gravity: m/s², tips: measured, m, both in the arm's base frame. Shapes (N, 3).
     """
-    by = Rotation.identity() if lean is None else lean
-    twin = actuated(chain.smooth, commands, by.inv().apply(gravity))
-    residuals = tips - by.apply(twin.position)
+    twin, places = leaning_rest(chain, commands, gravity, lean)
+    residuals = tips - places
     taut = twin.tensions > SHARED * twin.tensions.max(axis=1, keepdims=True)
     stopped = np.any([taut[:, section].all(axis=1) for section in sections(chain) if len(section) > 2], axis=0)
-    tells = twin.converged & ~twin.snapped & np.isfinite(residuals).all(axis=1) & ~stopped
+    tells = ~twin.snapped & np.isfinite(residuals).all(axis=1) & ~stopped
     if not tells.any():
         return before
     poses, residuals = RestingPoses.of(chain, twin, gravity)[tells], residuals[tells]

@@ -28,8 +28,14 @@ from trunkline.ar.preview.preview_twin import at_rest, compose_twin, robot_model
 from trunkline.ar.preview.settings import Previewing
 from trunkline.ar.session import messages
 from trunkline.ar.session.bodies import BodyPoses
-from trunkline.ar.session.correction_rests import MeasuredRest, learnt_from
-from trunkline.ar.session.correction_steps import CorrectionAnswer, CorrectionOrder, CorrectionSteps, why_uncorrected
+from trunkline.ar.session.correction_rests import MeasuredRest, leaning_rest, learnt_from
+from trunkline.ar.session.correction_steps import (
+    DOWN,
+    CorrectionAnswer,
+    CorrectionOrder,
+    CorrectionSteps,
+    why_uncorrected,
+)
 from trunkline.ar.teleop.base_frames import base_frames
 from trunkline.ar.teleop.config import TeleoperationConfig
 from trunkline.ar.teleop.following import sought
@@ -37,9 +43,7 @@ from trunkline.ar.teleop.messages import PlanReport, Request, Targets, World, Wo
 from trunkline.ar.teleop.plan import CorrectionBounds, Plan
 from trunkline.ar.teleop.planner import Planner
 from trunkline.errors import InputError
-from trunkline.frames import STANDARD_GRAVITY
 from trunkline.kinematics.residual.residual_map import ResidualMap, RestingPoses
-from trunkline.model.statics.equilibria import actuated
 
 AIMED, ROUNDS = 1e-3, 3  # m from its target that a preview may end, and how often a reach is planned anew at most
 STILL = 30  # frames at the end of a preview, in which a tip at rest keeps within AIMED of their mean
@@ -123,6 +127,17 @@ AnyOrder = Order | FollowRequest | CorrectionOrder
 Answer = PlanAnswer | PreviewBegun | PreviewPiece | PredictionAnswer | FollowAnswer | CorrectionAnswer
 
 
+@dataclass(frozen=True)
+class Planned:
+    """A plan, and why it does not correct itself, "" where it does or was not asked to. residual_map: by which it was
+    made. hysteresis: by how far friction holds its tip beside the rest without, m (3,), None where nobody needs it."""
+
+    plan: Plan
+    uncorrected: str
+    residual_map: ResidualMap | None
+    hysteresis: np.ndarray | None = None
+
+
 class Previewer(Protocol):
     """One order at a time, the newest."""
 
@@ -148,8 +163,7 @@ class PreviewPlanner:
         self.robot_model, self.previewing = foresight.robot_model, foresight.settings
         self.prediction: PlanPrediction | None = None
         self._corrections = CorrectionSteps(planner, self.robot_model.lacking)
-        self._composed: tuple[tuple, ComposedTwin | None] = ((), None)
-        self._alone: tuple[Rotation | None, ComposedTwin | None] = (None, None)
+        self._twins: dict[str, tuple[tuple, ComposedTwin]] = {}  # of the world as it is, and of none
         self._leans: tuple[bytes | None, Rotation | None] = (None, None)
         self._grasped: PlanPrediction | None = None  # the last grasp: of an object that is held, the one that was run
 
@@ -189,11 +203,11 @@ class PreviewPlanner:
         request, serial = order.request, order.request.serial
         self.prediction = None
         try:
-            plan, uncorrected, rubbing = self._planned(order, go_on)
+            planned = self._planned(order, go_on)
         except InputError as error:
             yield PlanAnswer(PlanReport(serial, refused=str(error)))
             return
-        digest = plan.digest()
+        plan, digest = planned.plan, planned.plan.digest()
         yield PlanAnswer(PlanReport(serial, digest, "", plan.package, plan.world), plan)
         way = self.foresight.whole(plan, bool(request.targets.object))
         twin = cache(partial(self._twin_of, order, way))
@@ -202,52 +216,52 @@ class PreviewPlanner:
         phases = tuple((name, plan.step * row) for name, row in plan.phases)
         step = self.previewing.step * max(round(FRAME / self.previewing.step), 1)
         yield PreviewBegun(serial, messages.PreviewMessage(
-            digest, step, way.duration, step, phases, plan.correction, uncorrected
+            digest, step, way.duration, step, phases, plan.correction, planned.uncorrected
         ))  # fmt: skip
         go_on()
         if self.bodies:
             yield from self._pieces_of(serial, twin(), way, go_on)
         else:
             yield PreviewPiece(serial, 0, 0.0, np.empty((0, 0, 7), dtype=np.float32), True)
-        for prediction in self._predictions(order, plan, twin, way, rubbing, go_on):
+        for prediction in self._predictions(order, planned, twin, way, go_on):
             self.prediction = prediction
             target = None if request.targets.object else np.array(request.targets.tip.position)
             yield PredictionAnswer(serial, prediction_message(digest, prediction, target))
 
-    def _planned(self, order: Order, go_on: Callable[[], None]) -> tuple[Plan, str, np.ndarray | None]:
-        """The plan, from rests that were measured and for an arm that leans as it is seen to; why it does not correct
-        itself, where it was asked to; and by how far friction holds its tip beside the rest without, m (3,), None where
-        that is not asked for.
+    def _planned(self, order: Order, go_on: Callable[[], None]) -> Planned:
+        """From rests that were measured, and for an arm that leans as it is seen to.
 
         Raises:
             InputError: what forbids it.
         """
         targets, bounds, uncorrected = order.request.targets, order.correction, order.uncorrected
         planner = replace(self.planner, residual_map=self._learnt(order), lean=self._lean(order.hangs))
-        plan = self._by(planner, order)
+        plan = self._plan_by(planner, order)
         if bounds is not None:
             lacking = self.robot_model.lacking
             uncorrected = why_uncorrected(plan, targets, order.world, bounds, self.planner, lacking)
             plan = plan if uncorrected else replace(plan, correction=bounds)
-        if targets.object or planner.chain is None:
-            return plan, uncorrected, None
-        missed, rubbing = self._missed(planner, plan, order, go_on)
-        for _ in range(0 if plan.correction else ROUNDS):
+        planned = Planned(plan, uncorrected, planner.residual_map)
+        aims = plan.correction is None
+        if targets.object or planner.chain is None or not (aims or planner.residual_map):
+            return planned
+        missed, hysteresis = self._missed(planner, plan, order, go_on)
+        for _ in range(ROUNDS if aims else 0):
             if not AIMED < np.linalg.norm(missed) <= planner.tolerance:
                 break
-            x, y, z = (float(value) for value in planner.beyond + missed)
-            planner = replace(planner, beyond=(x, y, z))
+            x, y, z = (float(value) for value in planner.overshoot + missed)
+            planner = replace(planner, overshoot=(x, y, z))
             try:
-                nearer = self._by(planner, order)
+                nearer = self._plan_by(planner, order)
             except InputError:  # out of reach, or in the way of something
                 break
-            left, holds = self._missed(planner, nearer, order, go_on)
+            left, nearer_hysteresis = self._missed(planner, nearer, order, go_on)
             if not np.linalg.norm(left) < np.linalg.norm(missed):
                 break
-            plan, missed, rubbing = nearer, left, holds
-        return plan, uncorrected, rubbing
+            plan, missed, hysteresis = nearer, left, nearer_hysteresis
+        return replace(planned, plan=plan, hysteresis=hysteresis)
 
-    def _by(self, planner: Planner, order: Order) -> Plan:
+    def _plan_by(self, planner: Planner, order: Order) -> Plan:
         beside = 0.0 if order.hangs is None else float(order.hangs[1])
         return planner.plan(order.request, order.world, order.joints, order.commands, beside)
 
@@ -255,31 +269,23 @@ class PreviewPlanner:
         self, planner: Planner, plan: Plan, order: Order, go_on: Callable[[], None]
     ) -> tuple[np.ndarray, np.ndarray]:
         """From its target to where a reach's preview ends that touches nothing; and by how far friction holds the tip
-        there beside the rest without. Both (3,), m, NaN where MuJoCo warns, or the arm still swings."""
+        there beside the rest without. Both (3,), m, NaN where MuJoCo warns, the arm swings, or statics find no rest."""
         assert planner.chain is not None, "plans without are not looked at"
         way = self.foresight.whole(plan, False)
-        twin = self._bare(planner.lean, way.joints[0], way.commands[0])
+        twin = self._composed(EMPTY, None, planner.lean, way.joints[0], way.commands[0])
         pieces = list(interruptible(nominal(twin, way), go_on))
         tips = np.concatenate([piece.tip[0] for piece in pieces])[-STILL:]
         tip = tips.mean(axis=0)
         if not pieces[-1].sound[0] or np.linalg.norm(tips - tip, axis=1).max() > AIMED:
             tip = np.full(3, np.nan)
-        (place, base), commands = base_frames(plan.joints[-1], planner.mount_offset), plan.commands[-1:]
-        lean, gravity = planner.lean or Rotation.identity(), STANDARD_GRAVITY * -base[2:]
-        rest = actuated(planner.chain.smooth, commands, lean.inv().apply(gravity))
-        rubbing, shift = tip - place - base @ lean.apply(rest.position[0]), np.zeros(3)
+        place, base = base_frames(plan.joints[-1], planner.mount_offset)
+        gravity = (DOWN @ base)[None]
+        rest, tips_without = leaning_rest(planner.chain, plan.commands[-1:], gravity, planner.lean)
+        hysteresis, shift = tip - place - base @ tips_without[0], np.zeros(3)
         if planner.residual_map is not None:
-            poses = RestingPoses.of(planner.chain, rest, gravity)
-            shift = base @ planner.residual_map.mean(poses)[0] - (1 - planner.residual_map.unknown(poses)[0]) * rubbing
-        return tip + shift - order.request.targets.tip.position, rubbing
-
-    def _bare(self, lean: Rotation | None, joints: np.ndarray, commands: np.ndarray) -> ComposedTwin:
-        """That touches nothing, at rest at `joints` (7,), rad, and `commands` (K,), m."""
-        before, twin = self._alone
-        if twin is None or before is not lean:
-            twin = compose_twin(self.robot_model, EMPTY, None, joints, commands, self.previewing, lean)
-        self._alone = lean, at_rest(twin, joints, commands, self.planner.mount_offset, lean)
-        return self._alone[1]
+            learnt, poses = planner.residual_map, RestingPoses.of(planner.chain, rest, gravity)
+            shift = base @ learnt.mean(poses)[0] - (1 - learnt.unknown(poses)[0]) * hysteresis
+        return tip + shift - order.request.targets.tip.position, hysteresis
 
     def _lean(self, hangs: np.ndarray | None) -> Rotation | None:
         """How the arm is turned on its mount, the last where that is seen as it was."""
@@ -309,13 +315,25 @@ class PreviewPlanner:
     def _twin(self, order: Order, joints: np.ndarray, commands: np.ndarray) -> ComposedTwin:
         """It leans as the robot does. The last one where nothing has changed: to compile another takes longer than a
         piece of a preview."""
-        object, hangs = _beside(order), None if order.hangs is None else order.hangs.tobytes()
-        now, (composed, twin), lean = (order.world.obstacles, object, hangs), self._composed, self._lean(order.hangs)
-        if twin is not None and composed == now:
-            twin = at_rest(twin, joints, commands, self.robot_model.robot.mount_offset, lean)
+        return self._composed(order.world, _beside(order), self._lean(order.hangs), joints, commands)
+
+    def _composed(
+        self,
+        world: World,
+        object: WorldObject | None,
+        lean: Rotation | None,
+        joints: np.ndarray,
+        commands: np.ndarray,
+    ) -> ComposedTwin:
+        """At rest at `joints` (7,), rad, and `commands` (K,), m. The last of a `world`, and of EMPTY, is not composed
+        anew."""
+        kind, now = "empty" if world is EMPTY else "", (world.obstacles, object, lean)
+        before, twin = self._twins.get(kind, ((), None))
+        if twin is not None and before == now:
+            twin = at_rest(twin, joints, commands, self.planner.mount_offset, lean)
         else:
-            twin = compose_twin(self.robot_model, order.world, object, joints, commands, self.previewing, lean)
-        self._composed = now, twin
+            twin = compose_twin(self.robot_model, world, object, joints, commands, self.previewing, lean)
+        self._twins[kind] = now, twin
         return twin
 
     def _pieces_of(
@@ -338,13 +356,12 @@ class PreviewPlanner:
     def _predictions(
         self,
         order: Order,
-        plan: Plan,
+        planned: Planned,
         twin: Callable[[], ComposedTwin],
         way: CommandTrajectory,
-        rubbing: np.ndarray | None,
         go_on: Callable[[], None],
     ) -> Iterator[PlanPrediction]:
-        targets, serial = order.request.targets, order.request.serial
+        plan, targets, serial = planned.plan, order.request.targets, order.request.serial
         object, held_object = order.world.object(targets.object) if targets.object else None, _held_object(order)
         if object is not None and held_object is None:
             for prediction in self.foresight.grasp(plan, targets, object, order.world, order.hangs, serial, go_on):
@@ -355,8 +372,8 @@ class PreviewPlanner:
                 plan, targets, held_object, order.world, order.hangs, self._grasped, serial, go_on
             )
         else:
-            learnt = self._learnt(order) if order.rests else None
-            yield self.foresight.free(twin(), way, order.hangs, serial, go_on, learnt, rubbing)
+            learnt = planned.residual_map if order.rests else None
+            yield self.foresight.free(twin(), way, order.hangs, serial, go_on, learnt, planned.hysteresis)
 
 
 class InlinePreviewer:

@@ -39,7 +39,7 @@ class Planner:
     network's answers are corrected, and no obstacle may be in the arm's way. `grasping`: how objects are grasped.
     `advance`: m, the last part of a reach, along the tip's axis, of an arm with a `chain`; `advance_speed`: m/s, of the
     mount there, at most. `residual_map`: by how far the arm's tip rests beside the twin's, where poses tell. `lean`:
-    how the arm is turned on its mount, None where nobody has seen that. `beyond`: by how far a reach is known to end
+    how the arm is turned on its mount, None where nobody has seen that. `overshoot`: by how far a reach is known to end
     beside what all this says, in the base frame, m."""
 
     rigid: RigidIK
@@ -56,7 +56,7 @@ class Planner:
     advance_speed: float = 0.1
     residual_map: ResidualMap | None = None
     lean: Rotation | None = None
-    beyond: Vector = (0.0, 0.0, 0.0)
+    overshoot: Vector = (0.0, 0.0, 0.0)
 
     def plan(
         self, request: Request, world: World, joints: np.ndarray, commands: np.ndarray, beside: float = 0.0
@@ -163,8 +163,8 @@ class Planner:
         """
         turn = base_quaternion(targets.pointing, targets.heading)
         back = conjugate(turn)
-        tip = rotate(back, subtract(subtract(targets.tip.position, self.beyond), targets.rigid.position))
-        down, tolerance = rotate(back, DOWN), self.tolerance + float(np.linalg.norm(self.beyond))
+        tip = rotate(back, subtract(subtract(targets.tip.position, self.overshoot), targets.rigid.position))
+        down, tolerance = rotate(back, DOWN), self.tolerance + float(np.linalg.norm(self.overshoot))
         bent = bend(self.network, tip, down, tolerance, self.chain, self.residual_map, self.lean)
         missed = rotate(turn, subtract(tip, (float(bent.tip[0]), float(bent.tip[1]), float(bent.tip[2]))))
         return add(targets.rigid.position, missed), bent.commands

@@ -54,7 +54,7 @@ def bend(
     """Commands that bring the tip to `tip`, m, within `tolerance` m, under `gravity` (unit vector), all in the base
     frame. With `chain`, the arm's statics correct the network's answer, and the tip foreseen is theirs, moved by
     what is `learnt` of the arm if the network knows of that; then the arm may `lean` on its mount, too: what the
-    network is asked for, and what is learnt, leans with it.
+    network is asked for, and what is learnt, leans with it. By as much as that is elsewhere, the tip may be farther.
 
     Raises:
         InputError: no bend comes so near, or a network of one tilt is asked about gravity out of its plane.
@@ -62,6 +62,7 @@ def bend(
     target, pull, by = tip, gravity, None if chain is None else lean
     if by is not None:
         tip, pull = _turned(by.inv(), tip), _turned(by.inv(), gravity)
+        tolerance += float(np.linalg.norm(np.subtract(target, tip)))
     if network.inputs == len(TILT):
         bent = _at_tilt(network, tip, gravity, chain, learnt)
     else:

@@ -8,10 +8,10 @@ import numpy as np
 
 from trunkline.identification.simulate.resting import LAST, STILL
 from trunkline.recordings.trials.experiments import is_static, is_stepwise
+from trunkline.recordings.trials.recording import PULLED
 from trunkline.recordings.trials.trial import Trial
 
 SAME_GRAVITY = 0.035  # m/s², 0.2° of tilt: an arm held level sags by half a millimetre more or less then
-SAME_PULL = 1e-3  # m, of every tendon
 SAME_LOAD = 1e-3  # kg
 FEWEST = 3  # trials that end alike, below which they say nothing
 
@@ -83,7 +83,7 @@ def _same(first: Trial, second: Trial) -> bool:
     if first.tendons != second.tendons or not first.tendons:
         return first.tendons == second.tendons
     pulls = [np.maximum(trial.commands[-1], 0) for trial in (first, second)]  # slack is slack, by however much
-    return bool(np.abs(pulls[0] - pulls[1]).max() < SAME_PULL)
+    return bool(np.abs(pulls[0] - pulls[1]).max() < PULLED[first.command_unit])
 
 
 def _scatter(shapes: np.ndarray) -> np.ndarray:

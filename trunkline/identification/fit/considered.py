@@ -228,11 +228,12 @@ def _trial_changes(problem: Problem, sizes: Tolerances) -> dict[Key, Callable[[E
         turn = Rotation.from_rotvec(sizes.gravity * np.eye(3)[axis])
         listed["gravity", name] = lambda e, turn=turn: replace(e, gravity=turn.apply(e.gravity))
     pulled = [e for e in problem.experiments if not e.slack(problem.model)]
-    for cable in range(problem.model.nu if sizes.zero and pulled else 0):
+    lengths = ArmModel(problem.model).commands == "length"
+    for cable in range(problem.model.nu if sizes.zero and pulled and lengths else 0):
         offset = sizes.zero * np.eye(problem.model.nu)[cable]
         listed["zero", str(cable + 1)] = lambda e, d=offset: replace(e, controls=e.controls + d)
     driven = any(not is_static(e.kind) for e in pulled)
-    if sizes.backlash and driven and not ArmModel(problem.model).backlash:
+    if sizes.backlash and driven and lengths and not ArmModel(problem.model).backlash:
         listed["backlash", ""] = lambda e: _with_play(e, sizes.backlash)
     return listed
 

@@ -18,6 +18,7 @@ APART = 0.15  # as a share of a range, in one parameter at least, from one anoth
 CANDIDATES = 12  # drawn beside what differential evolution found, for the other starts
 ITERATIONS, TOLERANCE = 25, 1e-3  # of least squares after differential evolution
 AGREEING = 1.05  # times the least loss
+FORESEEN = 0.1  # of a step's gain, by how much that may be off which a Jacobian foresaw, to go on with it
 Report = Callable[[float], None]  # called with the best loss after each generation or iteration
 Expect = Callable[[int], None]  # called with how many more of those there will be than expected so far, or fewer
 
@@ -179,60 +180,103 @@ class _Ended(Exception):
     """A descent has come to its end at the candidate that scipy asks derivatives of."""
 
 
+class _Misled(Exception):
+    """A Jacobian that was updated leads down no further."""
+
+
+@dataclass
+class _Local:
+    """Residuals (R,) at a candidate (P,) and their Jacobian (R, P), by differences there, or else updated by steps."""
+
+    vector: np.ndarray
+    residuals: np.ndarray
+    jacobian: np.ndarray
+    updated: bool = False
+
+    def foreseen(self, vector: np.ndarray) -> np.ndarray:
+        return self.residuals + self.jacobian @ (vector - self.vector)
+
+    def moved(self, vector: np.ndarray, residuals: np.ndarray) -> "_Local":
+        """At `vector`, with the least change by which the Jacobian would have foreseen these residuals."""
+        step = vector - self.vector
+        change = np.outer(residuals - self.foreseen(vector), step / (step @ step))
+        return _Local(vector.copy(), residuals, self.jacobian + change, True)
+
+
 def descend(
     problem: Problem, start: np.ndarray, iterations: int, tolerance: float, report: Report, hasty: bool = False
 ) -> SearchResult:
-    """Least squares on the loss's residuals. Only a step that is taken, and is not the last, costs a Jacobian.
+    """Least squares on the loss's residuals.
 
-    It ends with the first step that gains less than `tolerance` of the loss, also where less was gained than expected:
-    there scipy's own rule goes on, in ever smaller steps along a kink. If `hasty`, with the first iterate after the
-    start at which a parameter does not matter, too.
+    A step whose gain the Jacobian foresaw updates it (Broyden 1965), which costs nothing; after others it is made anew,
+    by differences. The end is the first step by one of these that gains less than `tolerance` of the loss, also where
+    less was gained than expected: there scipy's own rule goes on, in ever smaller steps along a kink. If `hasty`, it
+    is the first iterate after the start at which a parameter does not matter, too.
     """
     convergence = Convergence()
     tried: dict[bytes, list[np.ndarray]] = {}
     matters = np.ones(len(start), dtype=bool)
     low, high = problem.bounds()
+    here, spent = np.clip(start, low + 1e-9, high - 1e-9), 0
+    local: _Local | None = None
 
     def blocks_at(vector: np.ndarray) -> list[np.ndarray]:
+        nonlocal spent
         key = vector.tobytes()
         if key not in tried:
             tried[key] = [block[0] for block in problem.residuals(vector[None])]
+            spent += 1
         return tried[key]
 
     def residuals(vector: np.ndarray) -> np.ndarray:
-        return np.concatenate([*blocks_at(vector), problem.prior(vector[None])[0]])
+        values = np.concatenate([*blocks_at(vector), problem.prior(vector[None])[0]])
+        if local is not None and local.updated and 0.5 * values @ values >= convergence.best[-1]:
+            raise _Misled
+        return values
 
     def derivatives(vector: np.ndarray) -> np.ndarray:
-        blocks = residuals(vector)
-        best = convergence.best
-        best.append(0.5 * float(blocks @ blocks))
-        convergence.mean.append(best[-1])
-        report(best[-1])
-        at_end = len(best) > 1 and best[-2] - best[-1] < tolerance * best[-2]
-        if at_end:
-            raise _Ended(vector)
-        linear = linearise(problem, vector, blocks_at(vector))
+        nonlocal here, local
+        before, local = local, None
+        values, blocks, best = residuals(vector), blocks_at(vector), convergence.best
+        tried.clear()  # steps before this iterate are not tried again
+        tried[vector.tobytes()] = blocks
+        if not best or (vector != here).any():
+            best.append(0.5 * float(values @ values))
+            convergence.mean.append(best[-1])
+            report(best[-1])
+        here = vector.copy()
+        if before is not None:
+            gain = best[-2] - best[-1]
+            if gain < tolerance * best[-2]:
+                raise _Misled if before.updated else _Ended
+            foreseen = before.foreseen(vector)
+            if abs(0.5 * foreseen @ foreseen - best[-1]) <= FORESEEN * gain:
+                local = before.moved(vector, values)
+                return local.jacobian
+        linear = linearise(problem, vector, blocks)
         matters[:] = ~_flat(linear)
         if hasty and len(best) > 1 and not matters.all():
-            raise _Ended(vector)
-        tried.clear()  # steps before this iterate are not tried again
-        tried[vector.tobytes()] = linear.residuals
+            raise _Ended
         prior = np.zeros(len(vector)) if linear.prior is None else linear.prior
-        return np.concatenate([*linear.jacobians, np.diag(prior)])
+        local = _Local(here, values, np.concatenate([*linear.jacobians, np.diag(prior)]))
+        return local.jacobian
 
-    inside = np.clip(start, low + 1e-9, high - 1e-9)
-    try:
-        result = least_squares(
-            residuals, inside, derivatives, bounds=(low, high), max_nfev=iterations, ftol=tolerance,
-            xtol=STEP_TOLERANCE,
-        )  # fmt: skip
-        vector, loss, converged = result.x, float(result.cost), result.status != 0
-    except _Ended as end:
-        vector, loss, converged = end.args[0], convergence.best[-1], True
-    if loss != convergence.best[-1]:
-        convergence.best.append(loss)
-        convergence.mean.append(loss)
-    return SearchResult(vector, loss, convergence, converged, blocks_at(vector), ~matters)
+    converged = False
+    while not converged and spent < iterations:
+        local = None
+        try:
+            result = least_squares(
+                residuals, here, derivatives, bounds=(low, high), max_nfev=iterations - spent + bool(tried),
+                ftol=tolerance, xtol=STEP_TOLERANCE,
+            )  # fmt: skip
+            if result.status == 0:
+                break
+            converged = local is None or not local.updated
+        except _Misled:
+            continue
+        except _Ended:
+            converged = True
+    return SearchResult(here, convergence.best[-1], convergence, converged, blocks_at(here), ~matters)
 
 
 def _evolve(

@@ -7,8 +7,8 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz
-from trunkline.identification.parameters.parameter import ArmPart, Fields, Parameter, moving
-from trunkline.model.arm_model import BRANCH, DIAGONAL_SHARE, HINGE_SHARE, SLIDER, ArmModel
+from trunkline.identification.parameters.parameter import ArmPart, Fields, Parameter, moving, pulled
+from trunkline.model.arm_model import AXIAL_STIFFNESS, BRANCH, DIAGONAL_SHARE, HINGE_SHARE, SLIDER, ArmModel
 from trunkline.recordings.trials.experiments import ExperimentKind
 
 SHORTEST = 1e-6  # m; a unit whose ends are nearer to each other has no line along which its hinges may move
@@ -67,6 +67,15 @@ def section_stiffness(number: int) -> Parameter:
     lacking = f"found it for an arm without section {number}, expected build_mjcf.arm of the kind sections"
     part = ArmPart(lambda arm: len(arm.sections) >= number, lacking)
     return Parameter("", STIFFNESS_FIELDS, read, write, part=part)
+
+
+def _read_axial(model: mujoco.MjModel) -> float:
+    return float(ArmModel(model).axial_stiffness[0])
+
+
+def _write_axial(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
+    """EA of the first unit; the others keep their ratios to it."""
+    fields["numeric_data"][:, ArmModel(model).places(AXIAL_STIFFNESS)] *= (values / _read_axial(model))[:, None]
 
 
 def unit_ends(model: mujoco.MjModel) -> np.ndarray:
@@ -219,6 +228,13 @@ JOINT_PARAMETERS: dict[str, Parameter] = {
         identifiable_from=_start_measured,
     ),
     "hardening": Parameter("1/rad²", STIFFNESS_FIELDS, _read_hardening, _write_hardening),
+    "axial_stiffness": Parameter(
+        "N", ("numeric_data",), _read_axial, _write_axial, identifiable_from=pulled,
+        part=ArmPart(
+            lambda arm: len(arm.axial_stiffness) > 0,
+            "found it for units that keep their lengths, expected build_mjcf.arm.sections with axial_stiffness",
+        ),
+    ),
     "joint_friction": Parameter(
         "rad", ("dof_frictionloss", "jnt_stiffness"),
         lambda m: float(m.dof_frictionloss[0] / m.jnt_stiffness[0]), _write_friction, identifiable_from=moving,

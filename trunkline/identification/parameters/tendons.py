@@ -12,13 +12,21 @@ from trunkline.identification.parameters.parameter import (
     pulled,
     pulled_and_moving,
 )
-from trunkline.model.arm_model import BACKLASH, CAPSTAN_FRICTION, PRELOAD, RATE_LIMIT, WINDING, ArmModel
+from trunkline.model.arm_model import BACKLASH, CAPSTAN_FRICTION, FORCE_SCALE, PRELOAD, RATE_LIMIT, WINDING, ArmModel
 from trunkline.recordings.trials.experiments import ExperimentKind
 
 TENDONS = ArmPart(
     lambda arm: arm.model.nu > 0,
     "found it for an arm without tendons, expected parameters of joints alone; such an arm's pipeline ends with `dvc "
     "repro identify_damping`",
+)
+HOLDING = ArmPart(  # lengths
+    lambda arm: TENDONS.has(arm) and arm.commands == "length",
+    f"{TENDONS.lacking}; or for motors that are commanded by force, which have no gain: expected `force_scale`",
+)
+PULLING = ArmPart(
+    lambda arm: arm.commands == "force" and arm.places(FORCE_SCALE).size > 0,
+    "found it for motors that are not commanded by force, expected build_mjcf.actuation.commands: force",
 )
 DELAYS = ArmPart(
     lambda arm: arm.model.nhistory > 0,
@@ -28,7 +36,10 @@ DELAYS = ArmPart(
 HOLES = ArmPart(
     lambda arm: arm.guide_holes.size > 0, "found it for cables that do not rub, expected build_mjcf.holes: rubbing"
 )
-UNEVEN = "found it for evenly spread tendons, expected tendons that are described one by one in build_mjcf.arm"
+UNEVEN = (
+    "found it for evenly spread tendons, or motors that are commanded by force, expected tendons that are described "
+    "one by one in build_mjcf.arm, and commanded by length"
+)
 
 
 def _winches(name: str) -> ArmPart:
@@ -82,7 +93,7 @@ def _gain_ratio(motor: int) -> Parameter:
         fields["actuator_biasprm"][:, motor - 1, 1] = -gain
 
     lacking = f"found it for an arm without motor {motor}, expected a ratio for each motor that it has but the first"
-    part = ArmPart(lambda arm: arm.model.nu >= motor, lacking)
+    part = ArmPart(lambda arm: arm.model.nu >= motor and HOLDING.has(arm), lacking)
     return Parameter("", ("actuator_gainprm", "actuator_biasprm"), read, write, part=part, identifiable_from=pulled)
 
 
@@ -126,6 +137,21 @@ def _write_distance(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -
     fields["site_pos"][:, sites, :2] *= (values / _read_distance(model))[:, None, None]
 
 
+def _read_taper(model: mujoco.MjModel) -> float:
+    sites = _sites(model, 1)
+    return float(np.hypot(*model.site_pos[sites[-1], :2])) / _read_distance(model)
+
+
+def _write_taper(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
+    """Of every cable: what the last of its holes is further out, or less, its others are from hole to hole."""
+    change = values - _read_taper(model)
+    for cable in range(1, model.nu + 1):
+        sites = _sites(model, cable)
+        away = np.hypot(*model.site_pos[sites, :2].T)
+        added = np.outer(change, np.linspace(0, 1, len(sites))) * away[0]
+        fields["site_pos"][:, sites, :2] *= (1 + added / away)[..., None]
+
+
 TENDON_PARAMETERS: dict[str, Parameter] = {
     "tendon_friction": _of_all("N", "tendon_frictionloss", identifiable_from=moving),
     # the smallest speed at which a regularised friction yields falls with it: a slow one lets a hook creep straight
@@ -134,12 +160,12 @@ TENDON_PARAMETERS: dict[str, Parameter] = {
     "capstan_friction": number(CAPSTAN_FRICTION, "", HOLES, _slides),
     "kp": Parameter(
         "N/m", ("actuator_gainprm", "actuator_biasprm"), lambda m: float(m.actuator_gainprm[0, 0]), _write_kp,
-        part=TENDONS, identifiable_from=pulled,
+        part=HOLDING, identifiable_from=pulled,
     ),
     # of motors with their cables, which are not all equally stiff
     "kp_ratio_2": _gain_ratio(2),
     "kp_ratio_3": _gain_ratio(3),
-    "kv": _of_all("N s/m", "actuator_biasprm", 2, -1.0),
+    "kv": _of_all("N s/m", "actuator_biasprm", 2, -1.0, part=HOLDING),
     "force_range": _of_all("N", "actuator_forcerange", 0, -1.0, identifiable_from=pulled),
     "time_constant": _of_all("s", "actuator_dynprm", 0),
     "dead_time": _of_all("s", "actuator_delay", part=DELAYS),
@@ -147,7 +173,11 @@ TENDON_PARAMETERS: dict[str, Parameter] = {
     "backlash": number(BACKLASH, "m", _winches(BACKLASH), _plays),
     # metres of cable that a commanded metre draws in: the drum's radius over what session.yaml takes it for
     "winding": number(WINDING, "", ArmPart(lambda arm: arm.places(WINDING).size > 0, UNEVEN), pulled),
+    # N of tension for each that is commanded: a drum's radius in session.yaml over the true one, or an effort's N
+    "force_scale": number(FORCE_SCALE, "", PULLING, pulled),
     "tendon_distance": Parameter(
         "m", ("site_pos",), _read_distance, _write_distance, part=TENDONS, identifiable_from=pulled
     ),
+    # distance from the axis of the first cable's last hole over that of its first
+    "tendon_taper": Parameter("", ("site_pos",), _read_taper, _write_taper, part=TENDONS, identifiable_from=pulled),
 }  # fmt: skip

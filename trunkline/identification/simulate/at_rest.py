@@ -11,6 +11,7 @@ from trunkline.identification.parameters.parameters import set_fields
 from trunkline.identification.parameters.spool_scale import wound
 from trunkline.identification.simulate.experiment import Experiment
 from trunkline.model.arm_model import ArmModel
+from trunkline.model.simulation.shortening import shorten
 from trunkline.model.simulation.winch import wind
 from trunkline.model.statics.chain import read_chain
 from trunkline.model.statics.equilibria import actuated
@@ -43,6 +44,8 @@ def shapes_at_rest(
     """
     arm, count = ArmModel(model), len(next(iter(fields.values())))
     candidate_model, data = copy.copy(model), mujoco.MjData(model)
+    soft = len(arm.axial_stiffness) > 0
+    pressed = copy.copy(model) if soft else candidate_model  # as short as the tendons of some rows make it
     trial = np.repeat(np.arange(len(experiments)), [e.frames for e in experiments])  # of each of R rows
     starts = np.concatenate([_starts(e) for e in experiments])
     if near is not None:
@@ -60,8 +63,14 @@ def shapes_at_rest(
         turned = gravity @ data.xmat[arm.base_body].reshape(3, 3)  # into the mount's frame, which may be tilted
         sent = np.concatenate([_sent(candidate_model, e) for e in experiments])
         qpos = np.full(angles.shape, np.nan)
-        for load, approach in sorted(set(zip(loads.tolist(), approaches.tolist(), strict=True))):
-            chosen = np.flatnonzero((loads == load) & (approaches == approach))
+        if soft:
+            set_fields(pressed, fields, candidate, data)
+        alike = np.column_stack([loads, approaches, sent if soft else np.zeros((len(sent), 0))])
+        for load, approach, *tensions in np.unique(alike, axis=0):
+            chosen = np.flatnonzero((alike == [load, approach, *tensions]).all(axis=1))
+            if soft:
+                shorten(pressed, candidate_model, np.array(tensions))
+                chain = read_chain(pressed)
             loaded = chain._replace(capstan=approach * chain.capstan).loaded(load)
             guessed = chosen[np.isfinite(starts[chosen]).all(axis=1)]
             solved = actuated_from(loaded, starts[guessed], sent[guessed], turned[guessed])
@@ -76,10 +85,10 @@ def shapes_at_rest(
                 again = actuated_from(loaded, qpos[beside[lost]], sent[chosen[lost]], turned[chosen[lost]])
                 qpos[chosen[lost][again.converged]] = again.qpos[again.converged]
                 iterations += int(again.iterations.sum())
-        for row in np.flatnonzero(np.isfinite(qpos[:, 0])):
-            data.qpos[: qpos.shape[1]] = qpos[row]
-            mujoco.mj_kinematics(candidate_model, data)
-            places[candidate, row] = data.site_xpos[sites]
+            for row in chosen[np.isfinite(qpos[chosen, 0])]:
+                data.qpos[: qpos.shape[1]] = qpos[row]
+                mujoco.mj_kinematics(pressed, data)
+                places[candidate, row] = data.site_xpos[sites]
         if candidate == 0:
             angles = qpos
     edges = np.cumsum([e.frames for e in experiments])[:-1]

@@ -10,6 +10,7 @@ from trunkline.frames import tilt_of_gravity
 from trunkline.identification.simulate.pose_fit import MEASURED_SHARE, fit_pose, measured_pose, start_frames
 from trunkline.model.arm_model import ArmModel
 from trunkline.recordings.trials.experiments import EXPERIMENTS
+from trunkline.recordings.trials.recording import LENGTH, PULLED
 from trunkline.recordings.trials.trial import Trial
 
 WOUND = 5e-3  # m, from which on a tendon counts as wound, and the arm as bent by it
@@ -39,6 +40,8 @@ def check_trials(trials: list[Trial], model: mujoco.MjModel) -> None:
     trials = [trial for trial in trials if len(trial.markers) > 1]  # of a tip alone, many shapes lead there
     trials = [trial for trial in trials if trial.tendons]
     driven = [trial for trial in trials if EXPERIMENTS[trial.experiment].needs_motors]
+    if ArmModel(model).commands == "force":  # by how much a cable gets shorter is no matter of its tension alone
+        driven = []
     for trial in trials:
         if not _by_lengths(trial):
             check_sides(trial, model)
@@ -49,7 +52,7 @@ def check_trials(trials: list[Trial], model: mujoco.MjModel) -> None:
 def _by_lengths(trial: Trial) -> bool:
     """Whether several motors may pull at once, each as far as it likes."""
     kind = EXPERIMENTS[trial.experiment]
-    return kind.needs_motors and kind.level is None
+    return kind.needs_motors and kind.level is None and trial.command_unit == LENGTH
 
 
 def check_names(trial: Trial, model: mujoco.MjModel) -> None:
@@ -64,6 +67,10 @@ def check_names(trial: Trial, model: mujoco.MjModel) -> None:
             if key == "tendons" and names:
                 valid += "; under `tendons` or `motors`, what moves which"
             raise InputError(f"session.yaml: {key}: trial {trial.name}: found {unknown[0]!r}, expected {valid}")
+    if trial.tendons and trial.command_unit != arm.command_unit:
+        means = "build_mjcf.actuation.commands: force" if arm.command_unit == LENGTH else "build_mjcf.actuation"
+        problem = f"found commands in {trial.command_unit}, expected {arm.command_unit}, as the model's motors take"
+        raise InputError(f"session.yaml: motors: trial {trial.name}: {problem}; see {means}")
     if trial.tendons and len(trial.tendons) < len(tendons):
         expected = f"expected all of the model: {', '.join(tendons)}; slack ones as let out"
         used = f"found {', '.join(trial.tendons)} alone"
@@ -84,13 +91,15 @@ def check_sides(trial: Trial, model: mujoco.MjModel) -> None:
     deepest = int(np.argmax(np.where(enough, wound.max(axis=1), -np.inf)))
     pulls = wound[deepest]
     shorter = (_path_lengths(trial, model, start) - _path_lengths(trial, model, deepest))[tendons]
-    if min(np.ptp(pulls), np.ptp(shorter)) < WOUND:
+    least = WOUND if trial.command_unit == LENGTH else PULLED[trial.command_unit]
+    if np.ptp(pulls) < least or np.ptp(shorter) < WOUND:
         return
     agreement, best = _agreement(pulls, shorter), _agreement(np.sort(pulls), np.sort(shorter))
     if agreement >= ALIKE * best:
         return
     most, bent = trial.tendons[int(np.argmax(pulls))], trial.tendons[int(np.argmax(shorter))]
-    fault = f"found {most!r} wound by {1e3 * pulls.max():.0f} mm while the arm bends to the side of {bent!r}"
+    by = f"wound by {1e3 * pulls.max():.0f} mm" if trial.command_unit == LENGTH else f"pulled by {pulls.max():.3g} N"
+    fault = f"found {most!r} {by} while the arm bends to the side of {bent!r}"
     raise InputError(
         f"session.yaml: tendons: trial {trial.name}: {fault}, expected it to bend to the side of what is wound: "
         "are names exchanged, signs reversed, is the base body turned about the arm, or the frame left-handed?"

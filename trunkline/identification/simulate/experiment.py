@@ -7,9 +7,12 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.identification.parameters.per_session import model_in
+from trunkline.identification.parameters.spool_scale import wound
 from trunkline.identification.simulate.checks import check_names
 from trunkline.identification.simulate.loss import LossWeights
 from trunkline.identification.simulate.pose_fit import PoseFit, start_frames, start_of
+from trunkline.model.arm_model import ArmModel
+from trunkline.model.simulation.shortening import shortened
 from trunkline.recordings.trials.experiments import is_static, is_stepwise
 from trunkline.recordings.trials.trial import Trial
 
@@ -30,8 +33,8 @@ class Experiment:
         start: angles of the arm's hinges from which it starts. Shape (n,).
         velocity: with which it starts, rad/s; 0 unless the trial's arm moves then. Shape (n,).
         lead: s from the start to the first frame.
-        controls: commanded tendon lengths, m, held from one frame to the next: row 0 from the start to the first
-            frame, row t from frame t - 1 to frame t. Shape (T, nu).
+        controls: commanded tendon lengths, m, or tensions, N, held from one frame to the next: row 0 from the start to
+            the first frame, row t from frame t - 1 to frame t. Shape (T, nu).
         positions: measured markers, m, base frame. Shape (T, S, 3).
         measured: where they count. Shape (T, S).
         fit: how well the start matches the measurement.
@@ -63,8 +66,10 @@ class Experiment:
 
     def slack(self, model: mujoco.MjModel) -> bool:
         """Whether all cables of `model` are let out throughout, as where the trial commands nothing."""
-        straight = model.tendon_length0[model.actuator_trnid[:, 0]]
-        return bool((self.controls > straight + 0.9 * SLACK).all())
+        arm = ArmModel(model)
+        if arm.commands == "force":
+            return bool((self.controls <= 0).all())
+        return bool((self.controls > arm.controls(np.zeros(model.nu)) + 0.9 * SLACK).all())
 
     def shortened(self, frames: int) -> "Experiment":
         """Its first `frames` frames."""
@@ -90,11 +95,11 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
     positions, measured = trial.positions[window], trial.measured[window]
     if not measured.any():
         raise InputError(f"trial {trial.name}: found no measured frame after its start at {trial.start:.2f} s")
-    fit, start, velocity = start_of(trial, model_in(trial.session, model), start_frame)
-    lengths = commanded_lengths(trial, model)
+    fit, start, velocity = start_of(trial, arm_in(trial, model, start_frame), start_frame)
+    controls = commanded_controls(trial, model)
     if command_delay and model.nu:
-        lengths = np.stack(
-            [np.interp(trial.time - command_delay, trial.time, column) for column in lengths.T], axis=1
+        controls = np.stack(
+            [np.interp(trial.time - command_delay, trial.time, column) for column in controls.T], axis=1
         )
     return Experiment(
         name=trial.name,
@@ -104,7 +109,7 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
         start=start,
         velocity=velocity,
         lead=0.0 if static else _lead(trial, last),
-        controls=lengths[window] if static else 0.5 * (lengths[:-1] + lengths[1:])[last : last + len(positions)],
+        controls=controls[window] if static else 0.5 * (controls[:-1] + controls[1:])[last : last + len(positions)],
         positions=positions,
         measured=measured,
         frame_step=step,
@@ -155,12 +160,20 @@ def _lead(trial: Trial, last: int) -> float:
     return max(float(trial.time[last + 1] - begin), 1e-4)
 
 
-def commanded_lengths(trial: Trial, model: mujoco.MjModel) -> np.ndarray:
-    """Tendon lengths that the trial commands, m; slack where it commands nothing. Shape (T, nu)."""
-    lengths = np.empty((len(trial.time), model.nu))
+def arm_in(trial: Trial, model: mujoco.MjModel, frame: int) -> mujoco.MjModel:
+    """The arm as it was in the trial's session, as short as its tendons make it in a frame."""
+    model = model_in(trial.session, model)
+    if not len(ArmModel(model).axial_stiffness):
+        return model
+    sent = wound(model, commanded_controls(trial, model)[frame : frame + 1])[0]
+    return shortened(model, sent[ArmModel(model).actuators])
+
+
+def commanded_controls(trial: Trial, model: mujoco.MjModel) -> np.ndarray:
+    """Tendon lengths that the trial commands, m, or tensions, N; slack where it commands nothing. Shape (T, nu)."""
+    arm, pulls = ArmModel(model), np.empty((len(trial.time), model.nu))
     for index in range(model.nu):
-        tendon = model.actuator_trnid[index, 0]
-        name = model.tendon(tendon).name
-        pull = trial.commands[:, trial.tendons.index(name)] if name in trial.tendons else -SLACK
-        lengths[:, index] = model.tendon_length0[tendon] - pull
-    return lengths
+        name = model.tendon(model.actuator_trnid[index, 0]).name
+        idle = 0.0 if arm.commands == "force" else -SLACK
+        pulls[:, index] = trial.commands[:, trial.tendons.index(name)] if name in trial.tendons else idle
+    return arm.controls(pulls)

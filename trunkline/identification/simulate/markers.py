@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 
+from trunkline.identification.simulate.experiment import arm_in
 from trunkline.identification.simulate.pose_fit import (
     POSITION_SIGMA,
     PoseProblem,
@@ -42,9 +43,10 @@ def _offsets(model: mujoco.MjModel, trials: list[Trial], moved: np.ndarray) -> n
     normal = np.eye(size) / MARKER_SIGMA**2
     right = -moved.ravel() / MARKER_SIGMA**2
     for trial in trials:
-        pose = measured_pose(trial, start_frames(trial)[1])
-        problem = PoseProblem(model, trial.markers, *pose)
-        jacobian, residual = problem.linearise(fit_pose(model, trial.markers, *pose).qpos, problem.measured)
+        frame = start_frames(trial)[1]
+        pose, arm = measured_pose(trial, frame), arm_in(trial, model, frame)
+        problem = PoseProblem(arm, trial.markers, *pose)
+        jacobian, residual = problem.linearise(fit_pose(arm, trial.markers, *pose).qpos, problem.measured)
         design = np.zeros((len(residual), size))
         for index, rows in zip(problem.measured, problem.position_rows(), strict=True):
             body = model.site_bodyid[problem.sites[index]]

@@ -69,6 +69,8 @@ class Population:
         order = sorted(range(len(experiments)), key=lambda i: -experiments[i].frames)
         self._at_rest = [i for i in order if is_static(experiments[i].kind)]
         moving = [i for i in order if not is_static(experiments[i].kind)]
+        if moving:
+            ArmModel(model).require_stiff_units(f"trial {experiments[moving[0]].name}, which moves")
         slack = {i: experiments[i].slack(model) for i in moving}
         self._in_motion = [
             InMotion(model, {i: experiments[i] for i in moving if slack[i] == group}, group, self._sites, step_factor)

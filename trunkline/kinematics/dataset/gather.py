@@ -55,6 +55,9 @@ def gather(model: mujoco.MjModel, chain: Chain, sampling: Sampling, done: Callab
     """
     if sampling.stroke is not None and len(sections(chain)) == 1:
         raise InputError(f"fk_dataset.stroke: found {sampling.stroke:g}, expected null for an arm of one section")
+    if sampling.stroke is not None and chain.by_force:
+        expected = "expected null where motors are commanded by force: their `max_force` is how far they pull"
+        raise InputError(f"fk_dataset.stroke: found {sampling.stroke:g} m, {expected}")
     deepest = None if sampling.stroke is None else np.full(chain.tendons, sampling.stroke)
     rng = np.random.default_rng(sampling.seed)
     gravity, downs = sampling.gravity, sampling.gravity.downs

@@ -56,6 +56,7 @@ def read_tips(
     if table["theta_g"].abs().min() > 1e-6:
         raise InputError(f"{path}: found no gravity angle of 0, expected one: the hybrid map hangs straight down")
     groups = [group for _, group in table.groupby(table["theta_g"].round(9))]
+    shortest = table[command_columns(chain.tendons)].to_numpy().min(axis=0)
     return ArmTips(
         chain=chain,
         angles=np.array([group["theta_g"].iloc[0] for group in groups]),
@@ -63,6 +64,6 @@ def read_tips(
         directions=soft.directions,
         steps=soft.steps,
         seed=seed,
-        deepest=chain.straight_lengths - table[command_columns(chain.tendons)].to_numpy().min(axis=0),
+        deepest=None if chain.by_force else chain.straight_lengths - shortest,
         learnt=learnt,
     )

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from pydantic import Field
 
+from trunkline.errors import InputError
 from trunkline.model.arm.geometry import ChainGeometry
 from trunkline.model.arm.material import UnitProperties
 from trunkline.model.arm.mjcf import Actuation, Marker, Solver, Tendons, build_spec, unit_name
@@ -82,16 +83,28 @@ class ChainArm(ABC):
         return described_routes(chain, self.tendons, self.hole_ratio)
 
     def build(self, actuation: Actuation, solver: Solver, models: Path) -> CadArm:
-        """The arm from geometry and material alone. `models`, the folder of MJCF files, is idle."""
+        """The arm from geometry and material alone. `models`, the folder of MJCF files, is idle.
+
+        Raises:
+            InputError: beside `commands: force` a tendon has a pretension; without it, units get shorter.
+        """
         actuation = self.actuation or actuation
+        forced = actuation.commands == "force"
+        for number, tendon in enumerate([] if isinstance(self.tendons, int) or not forced else self.tendons):
+            if tendon.pretension:
+                problem = f"found {tendon.pretension:g} N beside `commands: force`, expected none"
+                raise InputError(f"build_mjcf.arm.tendons.{number}.pretension: {problem}: a command of 0 pulls nothing")
         chain = self.chain()
         properties = self.properties(chain)
+        if properties.axial_stiffness is not None and not forced:
+            problem = "found axial_stiffness beside motors that are commanded by length, expected `commands: force`"
+            raise InputError(f"build_mjcf.arm.sections: {problem}: units get shorter by the tension that is sent")
         mass = float(properties.masses.sum()) + self.tip_load
         tendons = Tendons(
             **vars(actuation),
             routes=self._routes(chain),
             described=not isinstance(self.tendons, int),
-            kv=2 * np.sqrt(actuation.kp * mass),  # critical damping, paper section on control parameters
+            kv=2 * np.sqrt((actuation.kp or 0) * mass),  # critical damping, paper section on control parameters
         )
         metrics = {
             "length_m": chain.length,

@@ -10,8 +10,8 @@ from pydantic import Field
 
 from trunkline.errors import InputError
 from trunkline.model.arm.cad import CadArm
-from trunkline.model.arm.mjcf import Actuation, Solver
-from trunkline.model.arm_model import ArmModel
+from trunkline.model.arm.mjcf import Actuation, Solver, pull_with
+from trunkline.model.arm_model import FORCE_SCALE, ArmModel
 from trunkline.model_files import read_spec
 
 CENTER = "_center"  # ends the name of a tracked point's site
@@ -49,9 +49,40 @@ def read_arm(path: Path) -> mujoco.MjSpec:
         raise InputError(f"{path}: no such file, expected a model in MJCF")
     spec = read_spec(path)
     model = spec.compile()
-    if fault := _missing(model) or _unlike(model):
+    if fault := _missing(model) or _unlike(model) or _take_motors(spec, model):
         raise InputError(f"{path}: {fault}")
     return spec
+
+
+def _take_motors(spec: mujoco.MjSpec, model: mujoco.MjModel) -> str | None:
+    """Let every motor, an actuator that exerts its control times a constant, be sent the tension with which it pulls,
+    in place; returns why that cannot be."""
+    named = {model.actuator(index).name: index for index in range(model.nu)}
+    muscles = model.actuator_gaintype == mujoco.mjtGain.mjGAIN_MUSCLE
+    if muscles.any():
+        muscle = model.actuator(int(np.argmax(muscles))).name
+        return f"actuator {muscle!r}: found a muscle, expected `position`, or `motor`: its force depends on its length"
+    fixed = model.actuator_gaintype == mujoco.mjtGain.mjGAIN_FIXED
+    forced = fixed & (model.actuator_biastype == mujoco.mjtBias.mjBIAS_NONE)
+    if not forced.any():
+        return None
+    if not forced.all():
+        motor, other = (model.actuator(int(np.flatnonzero(kind)[0])).name for kind in (forced, ~forced))
+        return f"actuator {motor!r}: found a motor beside {other!r}, which is none, expected motors alone, or none"
+    for name, index in named.items():
+        gear, (low, high) = model.actuator_gear[index, 0], (-np.inf, np.inf)
+        if model.actuator_ctrllimited[index]:
+            low, high = sorted(gear * model.actuator_gainprm[index, 0] * model.actuator_ctrlrange[index])
+        if model.actuator_forcelimited[index]:
+            least, most = sorted(gear * model.actuator_forcerange[index])
+            low, high = max(low, least), min(high, most)
+        if not -np.inf < low < 0 or high > 0:
+            problem = f"found a motor that shortens its tendon by {0.0 - high:g} to {0.0 - low:g} N"
+            return f"actuator {name!r}: {problem}, expected 0 to F: a ctrlrange or forcerange by which it only pulls"
+        pull_with(spec.actuator(name), -low)
+    if not ArmModel(model).places(FORCE_SCALE).size:
+        spec.add_numeric(name=FORCE_SCALE, data=[1.0], size=1)
+    return None
 
 
 def _missing(model: mujoco.MjModel) -> str | None:

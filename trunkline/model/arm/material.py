@@ -19,6 +19,7 @@ class UnitProperties:
         transverse_inertia, axial_inertia: about the unit's centre, kg m².
         stiffness: bending stiffness K_i of the joint at its proximal end, N m/rad.
         damping: D_i of that joint, N m s/rad.
+        axial_stiffness: EA, N; None of units that keep their lengths.
     """
 
     masses: np.ndarray
@@ -26,6 +27,7 @@ class UnitProperties:
     axial_inertia: np.ndarray
     stiffness: np.ndarray
     damping: np.ndarray
+    axial_stiffness: np.ndarray | None = None
 
 
 def wedge_fill(chain: ChainGeometry) -> np.ndarray:

@@ -2,11 +2,12 @@
 
 Names: bodies `base`, `unit_01`…, `tip_load`; hinges `unit_01_x`, `unit_01_y`; sites `unit_01_center` (the tracked
 frame), `unit_01_tendon_1`…, `base_center`, `tip`; tendons `tendon_1`…; actuators `tendon_1_position`…. Markers
-that an arm tracks elsewhere than in its units' centres have their own names: site `<marker>_center`.
+that an arm tracks elsewhere than in its units' centres have their own names: site `<marker>_center`. Actuators that
+are sent tensions are `tendon_1_tension`….
 """
 
-from dataclasses import dataclass
-from typing import Annotated
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
 
 import mujoco
 import numpy as np
@@ -16,7 +17,16 @@ from trunkline.frames import STANDARD_GRAVITY
 from trunkline.model.arm.geometry import ChainGeometry
 from trunkline.model.arm.material import UnitProperties
 from trunkline.model.arm.tendons import Route
-from trunkline.model.arm_model import BACKLASH, PRELOAD, RATE_LIMIT, SECTIONS, TIP_LOAD, WINDING
+from trunkline.model.arm_model import (
+    AXIAL_STIFFNESS,
+    BACKLASH,
+    FORCE_SCALE,
+    PRELOAD,
+    RATE_LIMIT,
+    SECTIONS,
+    TIP_LOAD,
+    WINDING,
+)
 
 TENDON_RGBA = (0.15, 0.15, 0.15, 1)
 LONGEST_DEAD_TIME = 0.2  # s; what a motor remembers of its commands
@@ -36,20 +46,31 @@ class Actuation:
 
     Attributes:
         friction: friction loss of the tendon, N.
-        kp: position gain, N/m.
+        kp: position gain, N/m; None of motors that are commanded by force.
         max_force: largest pull F, N; a tendon cannot push.
-        time_constant: of the first-order filter on the commanded length, s.
+        time_constant: of the first-order filter on the commanded length, or force, s.
         dead_time: from a command to the motor's first answer, s; 0 for motors without.
         rate_limit: of the winch, m/s of cable; 0 for none. backlash: of the winch, m of cable.
+        commands: what motors are sent, and hold: a length of cable, or the force with which they pull it.
     """
 
     friction: Annotated[float, Field(ge=0, le=1000)]
-    kp: Annotated[float, Field(gt=0, le=1e7)]
     max_force: Annotated[float, Field(gt=0, le=1e5)]
     time_constant: Annotated[float, Field(gt=0, le=10)]
     dead_time: Annotated[float, Field(ge=0, le=LONGEST_DEAD_TIME)] = 0.0
     rate_limit: Annotated[float, Field(ge=0, le=100)] = 0.0
     backlash: Annotated[float, Field(ge=0, le=1)] = 0.0
+    commands: Literal["length", "force"] = "length"
+    kp: Annotated[float, Field(gt=0, le=1e7)] | None = field(default=None, kw_only=True)
+
+    def __post_init__(self):
+        if self.commands == "length" and self.kp is None:
+            raise ValueError("kp: missing, expected the position gain of motors that are commanded by length, N/m")
+        if self.commands == "force":
+            for name in ("kp", "rate_limit", "backlash"):
+                if getattr(self, name):
+                    raise ValueError(f"{name}: found {getattr(self, name):g} beside `commands: force`, expected none: "
+                                     "that is of motors that hold lengths")  # fmt: skip
 
 
 @dataclass(kw_only=True)
@@ -123,10 +144,14 @@ def build_spec(
         if cables and getattr(tendons, name):
             spec.add_numeric(name=name, data=[getattr(tendons, name)], size=1)
 
-    if tendons.described:
+    if cables and tendons.commands == "force":
+        spec.add_numeric(name=FORCE_SCALE, data=[1.0], size=1)
+    elif tendons.described:
         preload = [route.pretension / tendons.kp for route in tendons.routes]
         spec.add_numeric(name=WINDING, data=[1.0], size=1)
         spec.add_numeric(name=PRELOAD, data=preload, size=len(preload))
+    if properties.axial_stiffness is not None:
+        spec.add_numeric(name=AXIAL_STIFFNESS, data=properties.axial_stiffness, size=chain.units)
     if chain.sections:
         spec.add_numeric(name=SECTIONS, data=chain.sections, size=len(chain.sections))
 
@@ -216,14 +241,30 @@ def _add_cable(spec: mujoco.MjSpec, index: int, tendons: Tendons, solver: Solver
         width=0.0008,
         rgba=TENDON_RGBA,
     )
-    actuator = spec.add_actuator(name=f"{name}_position", target=name, trntype=mujoco.mjtTrn.mjTRN_TENDON)
-    actuator.set_to_position(kp=tendons.kp, kv=tendons.kv, timeconst=tendons.time_constant)
-    actuator.forcelimited, actuator.forcerange = True, [-tendons.max_force, 0]
+    forced = tendons.commands == "force"
+    name = f"{name}_{'tension' if forced else 'position'}"
+    actuator = spec.add_actuator(name=name, target=cable.name, trntype=mujoco.mjtTrn.mjTRN_TENDON)
+    if forced:
+        pull_with(actuator, tendons.max_force)
+        actuator.dyntype, actuator.dynprm[0] = mujoco.mjtDyn.mjDYN_FILTEREXACT, tendons.time_constant
+    else:
+        actuator.set_to_position(kp=tendons.kp, kv=tendons.kv, timeconst=tendons.time_constant)
+        actuator.forcelimited, actuator.forcerange = True, [-tendons.max_force, 0]
     if tendons.dead_time:
         actuator.delay = tendons.dead_time
         actuator.nsample = int(np.ceil(LONGEST_DEAD_TIME / solver.timestep)) + 1
         actuator.interp = 1  # linear: else a dead time that is longer by less than a step changes nothing
     return cable
+
+
+def pull_with(actuator, most: float) -> None:
+    """Let an actuator on a tendon pull with the force that it is sent, from 0 to `most` N, in place: a force that
+    shortens a tendon is negative to MuJoCo."""
+    actuator.gaintype, actuator.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_NONE
+    actuator.gainprm, actuator.biasprm = np.eye(len(actuator.gainprm))[0] * -1.0, np.zeros(len(actuator.biasprm))
+    actuator.gear = np.eye(6)[0]
+    actuator.ctrllimited, actuator.ctrlrange = True, [0, most]
+    actuator.forcelimited, actuator.forcerange = True, [-most, 0]
 
 
 def _add_holes(body, name: str, place: int, height: float, routes: list[Route], cables: list) -> None:

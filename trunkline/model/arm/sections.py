@@ -1,6 +1,6 @@
 """A chain of sections, each of equal units of its own: a robot of several segments, straight where nothing pulls."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -16,7 +16,8 @@ from trunkline.model.arm.uniform import slender_properties
 class Section:
     """length: m. units: how many it is cut into. width: m. mass: kg, of all of it.
 
-    Either bending_stiffness, EI in N m², or joint_stiffness, K of each of its joints in N m/rad.
+    Either bending_stiffness, EI in N m², or joint_stiffness, K of each of its joints in N m/rad. axial_stiffness: EA in
+    N, of a soft body that tendons shorten; None for one that keeps its length.
     """
 
     length: Annotated[float, Field(ge=0.001, le=10)]
@@ -25,6 +26,7 @@ class Section:
     mass: Annotated[float, Field(gt=0, le=100)]
     bending_stiffness: Annotated[float, Field(gt=0, le=1e5)] | None = None
     joint_stiffness: Annotated[float, Field(gt=0, le=1e5)] | None = None
+    axial_stiffness: Annotated[float, Field(gt=0, le=1e9)] | None = None
 
     def __post_init__(self):
         if (self.bending_stiffness is None) == (self.joint_stiffness is None):
@@ -54,6 +56,10 @@ class Sections(ChainArm):
         self.length = sum(section.length for section in self.sections)
         self.units = sum(section.units for section in self.sections)
         super().__post_init__()
+        soft = [section.axial_stiffness is not None for section in self.sections]
+        if any(soft) and not all(soft):
+            lacking = f"sections.{soft.index(False)}.axial_stiffness"
+            raise ValueError(f"{lacking}: missing, expected it of all sections or of none")
 
     def _each(self, values: list[float]) -> np.ndarray:
         """A number of every section for each of its units. Shape (n,)."""
@@ -71,4 +77,6 @@ class Sections(ChainArm):
     def properties(self, chain: ChainGeometry) -> UnitProperties:
         masses = self._each([section.mass / section.units for section in self.sections])
         stiffness = self._each([section.stiffness for section in self.sections])
-        return slender_properties(chain, masses, stiffness, self.damping_ratio)
+        properties = slender_properties(chain, masses, stiffness, self.damping_ratio)
+        axial = [section.axial_stiffness for section in self.sections if section.axial_stiffness is not None]
+        return replace(properties, axial_stiffness=self._each(axial)) if axial else properties

@@ -71,7 +71,7 @@ def drive(
     which MuJoCo warns are done again with half the step, down to the model's own.
 
     Args:
-        commands: of the position actuators, m, sent at once. Shape (B, K), K in the order of the actuators. Or
+        commands: of the actuators, m or N, sent at once. Shape (B, K), K in the order of the actuators. Or
             trajectories, a row every ROW s and the last one held. Shape (B, T, K).
         gravity: in the base frame, m/s². Shape (3,) or (B, 3).
         seconds: longest time to simulate.
@@ -114,7 +114,7 @@ def _drive(
     trajectories = commands if commands.ndim == 3 else commands[:, None]
     last = (trajectories.shape[1] - 1) * ROW
     batch.expand("opt.gravity")[:] = gravity @ to_world.T
-    straight = np.tile(model.tendon_length0[model.actuator_trnid[:, 0]], (len(commands), 1))
+    straight = np.tile(ArmModel(model).controls(np.zeros(model.nu)), (len(commands), 1))
     hold(batch, model, straight)
     winches = Winches(batch, straight)
     site = model.site(tip_site).id

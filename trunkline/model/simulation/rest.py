@@ -49,7 +49,7 @@ def settle(
     """Let the model hang, draw its tendons in, and step until it rests: the reference for the statics.
 
     Args:
-        commands: target path lengths of the position actuators, m. Shape (B, K), K in the order of the actuators.
+        commands: of the actuators, target path lengths, m, or tensions, N. Shape (B, K), K in their order.
         gravity: in the base frame, m/s². Shape (3,) or (B, 3).
         seconds: longest time to simulate once the tendons are drawn in.
     """
@@ -59,7 +59,7 @@ def settle(
     batch = batch_of(model, len(commands))
     origin, to_world = base_frame(model)
     batch.expand("opt.gravity")[:] = gravity @ to_world.T
-    straight = model.tendon_length0[model.actuator_trnid[:, 0]]
+    straight = ArmModel(model).controls(np.zeros(model.nu))
     hold(batch, model, straight)
     timestep = relax(batch, model)
     control = batch.bind("ctrl")
@@ -101,7 +101,7 @@ def relax(batch: Batch, model: mujoco.MjModel) -> float:
         batch.expand(name)[:] = 0
     batch.expand("dof_damping")[:] = RELAXATION * batch.expand("jnt_stiffness")[:, model.dof_jntid]
     # a step never throws the arm past where its motors pull; their own damping ends where a tendon is slack
-    pull = batch.expand("actuator_gainprm")[:, :, 0]
+    pull = np.maximum(batch.expand("actuator_gainprm")[:, :, 0], 0)  # N/m; a tension that is held has no stiffness
     batch.expand("tendon_damping")[:, model.actuator_trnid[:, 0]] = timestep * pull
     arm = ArmModel(model)
     for group in (*arm.branches, *arm.sliders):

@@ -41,7 +41,7 @@ class Chain(NamedTuple):
         hole_out: site on the unit, from its joint, m. Shape (n, K, 3).
         crosses: 1 where the tendon crosses the unit's joint, else 0. Shape (n, K).
         fixed_length: length of the path between sites on one body, m. Shape (K,).
-        gain: position gain of the tendon's actuator, N/m. Shape (K,).
+        gain: position gain of the tendon's actuator, N/m, 0 of all that hold tensions. Shape (K,).
         max_tension: largest pull of the tendon's actuator, N. Shape (K,).
         capstan: μ of capstan friction; less than zero stands for an arm let go, see
         `trunkline/model/statics/capstan.py`.
@@ -95,6 +95,23 @@ class Chain(NamedTuple):
     @property
     def tendons(self) -> int:
         return len(self.gain)
+
+    @property
+    def by_force(self) -> bool:
+        """Whether its motors are commanded by force: then a command is a tension."""
+        return self.tendons > 0 and not self.gain.any()
+
+    def pulls(self, commands: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """λ and L, in the words of `energy.Pull`, of motors that are sent `commands`, m or N. All of one shape
+        (..., K)."""
+        commands = np.ascontiguousarray(commands, float)
+        if self.by_force:
+            return np.clip(commands, 0, self.max_tension), np.zeros_like(commands)
+        return np.zeros_like(commands), commands
+
+    def commands(self, lengths: np.ndarray, tensions: np.ndarray) -> np.ndarray:
+        """What motors are sent that hold `tensions`, N, at path `lengths`, m. All of shape (..., K)."""
+        return np.array(tensions) if self.by_force else lengths - tensions / self.gain
 
     @property
     def length(self) -> float:
@@ -155,7 +172,7 @@ def read_chain(model: mujoco.MjModel, tip_site: str = "tip") -> Chain:
         hole_out=hole_out,
         crosses=crosses,
         fixed_length=fixed_length,
-        gain=model.actuator_gainprm[arm.actuators, 0],
+        gain=np.maximum(model.actuator_gainprm[arm.actuators, 0], 0),  # a motor that is sent its tension has -1
         max_tension=_max_tensions(arm),
         capstan=arm.capstan_friction,
         slip=arm.slip_length,

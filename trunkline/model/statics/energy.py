@@ -4,8 +4,8 @@
 
 U: elastic joints and constant torques, R: what round ones have beside, P: joint limits, x_i: centres of mass, l_t:
 tendon path lengths. A tendon's energy has the tension Φ' = clip(λ + ρ (l - L), 0, F): a fixed tension (ρ = 0, never
-clipped), a position actuator (λ = 0, ρ = kp, L its command) and the augmented Lagrangian of a cable of length L (ρ a
-penalty) are all of this form.
+clipped; a motor that is commanded by force), a position actuator (λ = 0, ρ = kp, L its command) and the augmented
+Lagrangian of a cable of length L (ρ a penalty) are all of this form.
 """
 
 from typing import NamedTuple

@@ -33,7 +33,7 @@ class Equilibrium:
         lengths: path length of each tendon, slack ones included, m. Shape (B, K).
         tensions: N, not negative. Shape (B, K).
         commands: what position actuators are sent so that they hold this, l - T / kp: a slack tendon's path length,
-            less than it where a motor pulls, m. Shape (B, K).
+            less than it where a motor pulls, m; of motors that are commanded by force the tensions, N. Shape (B, K).
         residual: largest joint torque out of balance, N m. Shape (B,).
         iterations: of Newton's method, all steps of the continuation together. Shape (B,).
         converged: whether this is a stable equilibrium to tolerance. Shape (B,).
@@ -79,14 +79,15 @@ def equilibrium_paths(chain: Chain, tensions: np.ndarray, gravity: np.ndarray) -
 
 
 def actuated(chain: Chain, commands: np.ndarray, gravity: np.ndarray) -> Equilibrium:
-    """Equilibria under the model's position actuators: tension clip(kp (l - command), 0, F).
+    """Equilibria under the model's actuators: tension clip(kp (l - command), 0, F), or clip(command, 0, F) of motors
+    that are commanded by force.
 
     Args:
-        commands: target path lengths, m. Shape (B, K).
+        commands: target path lengths, m, or tensions, N. Shape (B, K).
         gravity: Shape (3,) or (B, 3).
     """
-    commands = np.ascontiguousarray(commands, float)[:, None, :]
-    return follow(chain, np.zeros_like(commands), commands, gravity, chain.gain, chain.max_tension)
+    tensions, lengths = chain.pulls(np.ascontiguousarray(commands, float)[:, None, :])
+    return follow(chain, tensions, lengths, gravity, chain.gain, chain.max_tension)
 
 
 def forward(chain: Chain, lengths: np.ndarray, gravity: np.ndarray) -> Equilibrium:
@@ -188,7 +189,7 @@ def equilibria(chain: Chain, rows: EquilibriumRows) -> Equilibrium:
     rotation = Rotation.from_matrix(rows.rotation, assume_valid=True)
     values = rows._asdict() | {
         "position": rows.position + rows.rotation @ chain.tip,
-        "commands": rows.lengths - rows.tensions / chain.gain,
+        "commands": chain.commands(rows.lengths, rows.tensions),
     }
     del values["rotation"]
     return Equilibrium(quaternion=wxyz_from_rotation(rotation * rotation_from_wxyz(chain.tip_quaternion)), **values)

@@ -57,7 +57,7 @@ def friction_band(
     joint_friction: np.ndarray,
     capstan: float = 0.0,
 ) -> Band:
-    """Both ends of the band for N samples, their position actuators' commands held.
+    """Both ends of the band for N samples, their actuators' commands held.
 
     Args:
         tensions: of the samples at rest without friction, N. Shape (N, K).
@@ -69,7 +69,7 @@ def friction_band(
     chain = chain.smooth
     way = equilibrium_paths(chain, tensions[:, None] * np.array([BACK, 1.0])[:, None], gravity)
     before, here = way[0::2], way[1::2]
-    commands = here.lengths - tensions / chain.gain
+    commands = chain.commands(here.lengths, tensions)
     slides = np.sign(here.lengths - before.lengths), np.sign(here.qpos - before.qpos).reshape(-1, chain.units, 2)
     doubled = with_friction(chain)
     ends = []
@@ -90,11 +90,12 @@ def with_friction(chain: Chain) -> Chain:
 
 
 def _fixed_commands(chain: Chain, commands, friction, torques, gravity) -> Equilibrium:
-    """Equilibria under actuators that hold `commands` (N, K), m, constant tensions `friction` (N, K), N, and torques
-    at the joints (N, n, 2), N m."""
+    """Equilibria under actuators that are sent `commands` (N, K), m or N, constant tensions `friction` (N, K), N, and
+    torques at the joints (N, n, 2), N m."""
     tendons = commands.shape[1]
-    tensions = np.concatenate([np.zeros_like(commands), friction], axis=1)[:, None]
-    lengths = np.concatenate([commands, np.zeros_like(commands)], axis=1)[:, None]
+    pulls = chain._replace(gain=chain.gain[:tendons], max_tension=chain.max_tension[:tendons]).pulls(commands)
+    tensions = np.concatenate([pulls[0], friction], axis=1)[:, None]
+    lengths = np.concatenate([pulls[1], np.zeros_like(commands)], axis=1)[:, None]
     slope = np.concatenate([chain.gain[:tendons], np.zeros(tendons)])
     ceiling = np.concatenate([chain.max_tension[:tendons], np.full(tendons, np.inf)])
     return follow(chain, tensions, lengths, gravity, slope, ceiling, torques=torques)

@@ -30,15 +30,15 @@ def restart(
 
 
 def actuated_from(chain: Chain, qpos: np.ndarray, commands: np.ndarray, gravity: np.ndarray) -> Equilibrium:
-    """Equilibria under the model's position actuators, as `equilibria.actuated`, from the joint angles `qpos`.
+    """Equilibria under the model's actuators, as `equilibria.actuated`, from the joint angles `qpos`.
 
     Args:
         qpos: first guess, rad. Shape (B, nq).
-        commands: target path lengths, m. Shape (B, K).
+        commands: target path lengths, m, or tensions, N. Shape (B, K).
         gravity: m/s². Shape (3,) or (B, 3).
     """
-    tensions = np.zeros((len(qpos), chain.tendons))
-    return _from(chain, qpos, tensions, commands, gravity, plain(chain.gain), plain(chain.max_tension), False)
+    tensions, lengths = chain.pulls(commands)
+    return _from(chain, qpos, tensions, lengths, gravity, plain(chain.gain), plain(chain.max_tension), False)
 
 
 def _from(

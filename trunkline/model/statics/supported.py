@@ -126,19 +126,25 @@ def _require_site_tendons(model: mujoco.MjModel) -> None:
 
 
 def _require_pulling_actuators(model: mujoco.MjModel) -> None:
+    forced = ArmModel(model).commands == "force"
     for actuator in range(model.nu):
         name = model.actuator(actuator).name
+        if model.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_MUSCLE:
+            raise InputError(f"model: actuator {name!r}: found a muscle, expected a position actuator, or a motor")
         if model.actuator_trntype[actuator] != mujoco.mjtTrn.mjTRN_TENDON:
             raise InputError(f"model: actuator {name!r}: found no tendon, expected one that pulls a tendon")
         if model.actuator_gaintype[actuator] != mujoco.mjtGain.mjGAIN_FIXED:
             raise InputError(f"model: actuator {name!r}: found a gain that varies, expected a fixed one")
-        if model.actuator_biastype[actuator] != mujoco.mjtBias.mjBIAS_AFFINE:
+        if not forced and model.actuator_biastype[actuator] != mujoco.mjtBias.mjBIAS_AFFINE:
             raise InputError(f"model: actuator {name!r}: found no affine bias, expected a position actuator")
         if mujoco.mjtDyn(model.actuator_dyntype[actuator]) not in _POSITION_DYNAMICS:
             raise InputError(f"model: actuator {name!r}: found other dynamics, expected none or a filter")
         gain, gear = model.actuator_gainprm[actuator, 0], model.actuator_gear[actuator, 0]
         offset, slope = model.actuator_biasprm[actuator, :2]
-        if gain <= 0 or offset != 0 or not np.isclose(slope, -gain) or gear != 1:
+        if forced and (gain != -1 or gear != 1):
+            expected = "expected a motor that is sent its tension: gain -1, gear 1"
+            raise InputError(f"model: actuator {name!r}: found gain {gain:g}, gear {gear:g}, {expected}")
+        if not forced and (gain <= 0 or offset != 0 or not np.isclose(slope, -gain) or gear != 1):
             raise InputError(
                 f"model: actuator {name!r}: found gain {gain:g}, bias {offset:g} {slope:g}, gear {gear:g}, "
                 "expected a position actuator: kp, bias 0 -kp, gear 1"

@@ -16,7 +16,7 @@ from trunkline.recordings.cleaning.motors import check_motors, read_motors
 from trunkline.recordings.cleaning.reference import Reference, reference_of
 from trunkline.recordings.cleaning.stale_poses import drop_stale_poses
 from trunkline.recordings.cleaning.trial_window import Stretch, check_seen, columns_of, read_stretch, split_base
-from trunkline.recordings.session.session import Session, TrialEntry
+from trunkline.recordings.session.session import FixedBase, Session, TrialEntry
 from trunkline.recordings.session.source import LogSource, open_log
 from trunkline.recordings.signals.clock import OffsetFit, estimate_offset
 from trunkline.recordings.tables.source import TableReader
@@ -67,9 +67,27 @@ def load_raw_trials(
 def _opened(path: Path, session: Session, trial: TrialEntry, tables: TableReader) -> LogSource | InputError:
     """A log, decoded, or a trial's rows of a table; or why it cannot be, for all of its trials."""
     try:
-        return tables.open(trial) if trial.of_table else open_log(path, session)
+        source = tables.open(trial) if trial.of_table else open_log(path, session)
+        if isinstance(session.base, FixedBase) and session.base.body is not None:
+            _put_in_origin(source, session.base.body)
+        return source
     except InputError as error:
         return error
+
+
+def _put_in_origin(source: LogSource, body: str) -> None:
+    """Count all positions from where a body usually is, in place.
+
+    Raises:
+        InputError: there is no such body, or it is never seen.
+    """
+    poses, where = source.poses, f"{source.log.path}: base.body"
+    if body not in poses.names:
+        raise InputError(f"{where}: found {body!r}, expected one of {', '.join(poses.names)}")
+    place = poses.positions[:, poses.names.index(body)]
+    if not np.isfinite(place).any():
+        raise InputError(f"{where}: {body!r} is never seen, expected where the mount is")
+    poses.positions = poses.positions - np.nanmedian(place, axis=0)
 
 
 def _raw_trial(

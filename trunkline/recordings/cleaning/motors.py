@@ -16,6 +16,7 @@ from trunkline.recordings.signals.clock import fit_frames
 from trunkline.recordings.signals.held import OFTEN, to_and_fro, with_corners
 from trunkline.recordings.signals.steps import find_step
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_held
+from trunkline.recordings.trials.recording import FORCE, LENGTH, PULLED
 
 Series = tuple[np.ndarray, np.ndarray]  # times (T,) s and numbers (T, K)
 ROLES = ("command", "tendon position")
@@ -35,6 +36,7 @@ class MotorSignals:
     commands: np.ndarray
     tendon_time: np.ndarray
     tendon_positions: np.ndarray
+    command_unit: str = LENGTH
 
 
 def read_motors(
@@ -81,7 +83,8 @@ def read_motors(
             scales = [scales] if len(series) == 1 else scales[:, None]
             if EXPERIMENTS[experiment].needs_motors:
                 for (seconds, numbers), scale in zip(whole, scales, strict=True):
-                    _one_publisher(seconds, numbers * scale, f"{where}: {stream.topic}", findings)
+                    topic = f"{where}: {stream.topic}"
+                    _one_publisher(seconds, numbers * scale, session.command_unit, topic, findings)
                 last = max((some[0][-1] for some in whole if len(some[0])), default=0.0)
                 if is_held(experiment) and last < -NO_WORD:
                     findings.repairs.append(f"commands end {-last:.1f} s before the poses: the last holds")
@@ -95,7 +98,7 @@ def read_motors(
         if coupling is not None:
             pulls = pulls @ coupling.T
         arrays += [seconds, pulls]
-    return MotorSignals(tuple(tendons), *arrays)
+    return MotorSignals(tuple(tendons), *arrays, session.command_unit)
 
 
 def check_motors(
@@ -256,16 +259,18 @@ def _check_rate(stream: JointStream, role: str, where: str, findings: Findings) 
     raise InputError(f"{where}: {stream.topic}: {role} stamps run {rates}, {remedy}")
 
 
-def _one_publisher(seconds: np.ndarray, pulls: np.ndarray, where: str, findings: Findings) -> None:
-    """Refuse commands (T, K) m at times (T,) s of two publishers, which no motor could follow; warn of a few jumps."""
-    places = to_and_fro(seconds, pulls)
+def _one_publisher(seconds: np.ndarray, pulls: np.ndarray, unit: str, where: str, findings: Findings) -> None:
+    """Refuse commands (T, K) in `unit` at times (T,) s of two publishers, which no motor could follow; warn of a few
+    jumps."""
+    places = to_and_fro(seconds, pulls, PULLED[unit])
     if not places:
         return
     begin = seconds[places[0][0] + 1]
-    far = 1e3 * max(size for *_, size in places)
+    most = max(size for *_, size in places)
+    far = f"{most:.3g} N" if unit == FORCE else f"{1e3 * most:.3g} mm"
     times = "once" if len(places) == 1 else f"{len(places)} times"
     problem = (
-        f"commands jump to and fro {times}, by up to {far:.3g} mm, first at {begin:.2f} s, and "
+        f"commands jump to and fro {times}, by up to {far}, first at {begin:.2f} s, and "
         "are back with the next message or two: do two publishers write to the topic? expected one"
     )
     if len(places) >= OFTEN:

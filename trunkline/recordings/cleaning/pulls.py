@@ -6,6 +6,7 @@ from trunkline.recordings.signals.clock import MIN_TRAVEL
 from trunkline.recordings.signals.smoothing import noise_level
 from trunkline.recordings.trials.experiments import EXPERIMENTS, PULL
 from trunkline.recordings.trials.raw_trial import RawTrial
+from trunkline.recordings.trials.recording import FORCE, PULLED
 
 FOLLOWS, FAILS = 0.9, 0.5  # correlations of a measured tendon with its command's, and with another's
 FITS = 1.25  # factor within which a pull is as its level says, whatever is let out meanwhile
@@ -41,6 +42,8 @@ def check_pulls(raw: RawTrial, length: float, idle: float, factor: float, zeros:
         zeros: as `encoder_zeros` gives them.
     """
     kind = EXPERIMENTS[raw.experiment]
+    if raw.command_unit == FORCE:
+        return _tensions(raw)
     if kind.needs_motors and kind.level is PULL and raw.level is not None:
         for key, pulls in (("commands", raw.commands), ("tendon positions", raw.tendon_positions)):
             # from the straight arm, or where encoders start anywhere, from the trial's begin
@@ -57,6 +60,28 @@ def check_pulls(raw: RawTrial, length: float, idle: float, factor: float, zeros:
         return faults
     if raw.commands.size and raw.tendon_positions.size:
         return _against_commands(raw, factor)
+    return []
+
+
+def _tensions(raw: RawTrial) -> list[str]:
+    """Motors that are commanded by force pull with positive ones, hold these at rest, and none without actuation."""
+    inside = (raw.command_time >= 0) & (raw.command_time <= raw.time[-1])
+    commands = raw.commands[inside] if inside.any() else raw.commands[-1:]
+    if not commands.size:
+        return []
+    kind, felt = EXPERIMENTS[raw.experiment], PULLED[FORCE]
+    lowest, highest = float(commands.min()), float(commands.max())
+    if -lowest > max(felt, highest):
+        problem = f"found tensions from {lowest:.4g} to {0.0 + max(highest, 0.0):.4g} N"
+        return [f"commands: {problem}, expected positive ones where a tendon is pulled: is the sign reversed?"]
+    usual = np.median(commands, axis=0)
+    if not kind.needs_motors and usual.max() > felt:
+        problem = f"{raw.tendons[int(np.argmax(usual))]!r} is pulled by {usual.max():.4g} N"
+        return [f"experiment: commands: {problem}, expected a {raw.experiment} without actuation"]
+    off = np.mean(np.abs(commands - usual) > felt, axis=0)
+    if kind.needs_motors and kind.static and not kind.stepwise and off.max() > 0.5:
+        problem = f"{raw.tendons[int(np.argmax(off))]!r} is pulled by {np.ptp(commands[:, np.argmax(off)]):.4g} N more "
+        return [f"experiment: commands: {problem}at times, expected a {raw.experiment} to hold them"]
     return []
 
 

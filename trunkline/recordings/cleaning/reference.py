@@ -50,7 +50,8 @@ def reference_of(
     base = None if isinstance(session.base, FixedBase) else session.base
     markers, sources = session.markers, [source for _, source, _ in trials]
     if markers is None:
-        names = {name for source in sources for name in source.poses.names if name != session.base}
+        mount = session.base.body if isinstance(session.base, FixedBase) else session.base
+        names = {name for source in sources for name in source.poses.names if name != mount}
         markers = {name: name for name in sorted(names)}
     joint_topics = tuple(sorted({name for source in sources for name in source.joint_topics}))
     reference = Reference(markers, base, METRES_PER[session.frame.unit], None, joint_topics)

@@ -8,8 +8,7 @@ tip. While the motor pays out, the cable slides the other way, and tension rises
 import numpy as np
 
 from trunkline.recordings.trials.raw_trial import RawTrial
-
-LAST_MOTION = 1e-3  # m of the last motion, at least: several times the sliding within which friction turns round
+from trunkline.recordings.trials.recording import PULLED
 
 
 def approach_of(raw: RawTrial) -> int:
@@ -18,18 +17,19 @@ def approach_of(raw: RawTrial) -> int:
     before = raw.command_time + raw.clock_offset <= 0.5 * raw.time[-1]
     if not before.any():
         return 0
-    ways = set(last_motions(raw.commands[before])[raw.commands[before][-1] > 0].tolist())
+    motions = last_motions(raw.commands[before], PULLED[raw.command_unit])
+    ways = set(motions[raw.commands[before][-1] > 0].tolist())
     return ways.pop() if len(ways) == 1 else 0
 
 
-def last_motions(commands: np.ndarray) -> np.ndarray:
-    """Of every motor the sign of its last motion by more than `LAST_MOTION`, 0 where there is none. Shape (K,).
+def last_motions(commands: np.ndarray, least: float) -> np.ndarray:
+    """Of every motor the sign of its last motion by more than `least`, 0 where there is none. Shape (K,).
 
     Args:
-        commands: m of pull. Shape (T, K).
+        commands: of pull. Shape (T, K). least: several times the sliding within which friction turns round.
     """
     way = commands[-1] - commands
-    moved = np.abs(way) > LAST_MOTION
+    moved = np.abs(way) > least
     last = len(commands) - 1 - np.argmax(moved[::-1], axis=0)
     signs = np.sign(np.take_along_axis(way, last[None], axis=0)[0])
     return np.where(moved.any(axis=0), signs, 0).astype(int)

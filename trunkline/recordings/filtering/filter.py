@@ -116,6 +116,7 @@ def _trial(
         tendons=raw.tendons,
         commands=commands,
         tendon_positions=wound,
+        command_unit=raw.command_unit,
         repairs=raw.repairs,
     )
 

@@ -23,7 +23,8 @@ from trunkline.recordings.logs.bag2 import bag_with, recording_name, recordings_
 from trunkline.recordings.session.layout import TABLES, Entry, TableLayout, keys_of_blocks
 from trunkline.recordings.session.shared_recordings import check_shared
 from trunkline.recordings.signals.held import Between
-from trunkline.recordings.trials.experiments import EXPERIMENTS, LOAD, ExperimentName, Level
+from trunkline.recordings.trials.experiments import EXPERIMENTS, LOAD, PULL, ExperimentName, Level
+from trunkline.recordings.trials.recording import FORCE, LENGTH
 from trunkline.recordings.trials.splits import SplitName
 from trunkline.settings import read_yaml, rename_keys
 
@@ -87,9 +88,13 @@ class MocapFrame(Entry):
 
 
 class FixedBase(Entry):
-    """Where no body marks the mount: its pose in the motion-capture frame. By default its z axis is up."""
+    """Where no body marks the mount: its pose in the motion-capture frame. By default its z axis is up.
+
+    body: a tracked point on the mount from which `position` is: where it rests in each log, or trial of a table.
+    """
 
     position: Vector
+    body: str | None = None
     quaternion: tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat] | None = None
 
     @model_validator(mode="after")
@@ -122,22 +127,25 @@ class Topics(Entry):
 
 
 UNITS = {"m": 1.0, "mm": 1e-3, "rad": 1.0, "deg": np.pi / 180}
+FORCES = ("N", "Nm", "effort")  # units of motors that are commanded by what they pull with
 
 
 class MotorEntry(Entry):
     """What a motor's name in the log stands for, where that is not the pull of one tendon in metres.
 
-    unit: of its numbers. spool_radius: m, of the drum of one that turns. tendons: name in the model to how far the
-    motor winds it in, times what the number says; less than 0 for one that is paid out.
+    unit: of its numbers: of a length, of a drum's angle, of a tension, of a drum's torque, or "effort", which is N of
+    tension but for a factor that is to be identified. spool_radius: m, of the drum of one that turns. tendons: name in
+    the model to how far the motor winds it in, or by what tension it pulls it, times what the number says; less than 0
+    for one that is paid out.
     """
 
-    unit: Literal["m", "mm", "rad", "deg"]
+    unit: Literal["m", "mm", "rad", "deg", "N", "Nm", "effort"]
     spool_radius: Annotated[FiniteFloat, Field(gt=0, le=1)] | None = None
     tendons: dict[str, FiniteFloat] = Field(min_length=1)
 
     @model_validator(mode="after")
     def _drum(self):
-        turns = self.unit in ("rad", "deg")
+        turns = self.unit in ("rad", "deg", "Nm")
         if turns and self.spool_radius is None:
             raise ValueError(f"spool_radius: missing, expected that of a motor that counts {self.unit}, m")
         if not turns and self.spool_radius is not None:
@@ -151,8 +159,10 @@ class MotorEntry(Entry):
         return {"rad": 2 * np.pi, "deg": 360.0}.get(self.unit)
 
     @property
-    def metres(self) -> float:
-        """Of cable for each unit of its numbers."""
+    def scale(self) -> float:
+        """m of cable, or N of tension in it, for each unit of its numbers."""
+        if self.unit in FORCES:
+            return 1 / (self.spool_radius or 1.0)
         return UNITS[self.unit] * (self.spool_radius or 1.0)
 
 
@@ -273,12 +283,17 @@ class Session(Entry):
     _shared: dict[str, list[str]] = PrivateAttr(default_factory=dict)
     _unlisted: list[str] = PrivateAttr(default_factory=list)
 
+    @property
+    def command_unit(self) -> str:
+        """Of a trial's commands: LENGTH or FORCE."""
+        return FORCE if any(motor.unit in FORCES for motor in (self.motors or {}).values()) else LENGTH
+
     def coupling(self) -> tuple[tuple[str, ...], np.ndarray]:
-        """Names of the tendons that `motors` moves, and by how much, m for each unit of a motor's numbers. Shape
-        (tendons, motors)."""
+        """Names of the tendons that `motors` moves, and by how much, in `command_unit` for each unit of a motor's
+        numbers. Shape (tendons, motors)."""
         motors = list((self.motors or {}).values())
         names = tuple(dict.fromkeys(name for motor in motors for name in motor.tendons))
-        moved = [[motor.metres * motor.tendons.get(name, 0.0) for motor in motors] for name in names]
+        moved = [[motor.scale * motor.tendons.get(name, 0.0) for motor in motors] for name in names]
         return names, np.array(moved).reshape(len(names), len(motors))
 
     def _unturned(self, layout: TableLayout) -> str:
@@ -330,6 +345,25 @@ class Session(Entry):
             twice = next((name for name in names if names.count(name) > 1), None)
             if twice is not None:
                 raise ValueError(f"{key}: found {twice!r} twice, expected each name of the model once")
+        return self
+
+    @model_validator(mode="after")
+    def _of_forces(self):
+        """Motors that are commanded by force are so all of them, and nothing measures them in their unit."""
+        if self.command_unit != FORCE:
+            return self
+        units = {name: motor.unit for name, motor in (self.motors or {}).items()}
+        if lengths := [name for name, unit in units.items() if unit not in FORCES]:
+            expected = f"a unit of force ({', '.join(FORCES)}) as others have it, or all motors by lengths"
+            raise ValueError(f"motors.{lengths[0]}.unit: found {units[lengths[0]]!r}, expected {expected}")
+        if self.topics.of("tendon_positions") or (self.tables is not None and self.tables.tendon_positions):
+            raise ValueError("tendon_positions: found it of motors that are commanded by force, expected none: lengths "
+                             "and forces do not share a unit")  # fmt: skip
+        for index, trial in enumerate(self.trials):
+            if EXPERIMENTS[trial.experiment].level is PULL:
+                problem = f"found a {trial.experiment}, whose level is in mm of pull"
+                expected = "expected a motion, as motors are commanded by force"
+                raise ValueError(f"trials.{index}.experiment: {problem}, {expected}")
         return self
 
     @model_validator(mode="after")

@@ -15,6 +15,7 @@ from trunkline.recordings.logs.mcap_log import Log, Topic
 from trunkline.recordings.logs.messages import JOINTS, POSES, TOPIC_PER_BODY
 from trunkline.recordings.logs.pose_stream import PoseStream, pose_stream
 from trunkline.recordings.session.session import NONE, Session
+from trunkline.recordings.trials.recording import FORCE
 
 Stream = TypeVar("Stream")
 Dated = TypeVar("Dated", PoseStream, JointStream)
@@ -79,7 +80,8 @@ def open_log(path: Path, session: Session) -> LogSource:
     commands, _ = _joints(log, chosen.commands, "command", COMMAND_WORDS, names, session)
     if names is None and commands is not None and commands.unnamed is None:
         names = set(commands.names)
-    tendon_positions, notes = _joints(log, chosen.tendon_positions, "tendon position", POSITION_WORDS, names, session)
+    wound = NONE if session.command_unit == FORCE else chosen.tendon_positions
+    tendon_positions, notes = _joints(log, wound, "tendon position", POSITION_WORDS, names, session)
     poses.notes += notes
     if session.clock != "log":
         poses = without_unset(poses)

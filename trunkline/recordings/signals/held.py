@@ -12,7 +12,7 @@ LEAST = 0.05  # share of an interval's change that a neighbour of a ramp has, th
 CORNER = 1e-6  # s, of the jump from what was held to what is sent
 AWAY = 3  # messages of the other publisher in a row, at most,
 SOON = 0.15  # s, in which the first one is back
-FAR, BACK = 1e-3, 0.2  # m, and share of the way, by which commands go, and are off the way back
+BACK = 0.2  # share of the way by which commands are off the way back
 SMOOTH = 0.2  # share of a jump by which commands go the same way just before: then it is no jump
 OFTEN = 5  # times, from which on it is no chance
 
@@ -46,14 +46,14 @@ def _ramps(steps: np.ndarray, change: np.ndarray) -> np.ndarray:
     return ramp
 
 
-def to_and_fro(time: np.ndarray, commands: np.ndarray) -> list[tuple[int, int, float]]:
-    """Where commands (T, K) m at times (T,) s leave their way for a few messages and are back on it: (the message
-    before, the first one back, by how much, m).
+def to_and_fro(time: np.ndarray, commands: np.ndarray, far: float) -> list[tuple[int, int, float]]:
+    """Where commands (T, K) at times (T,) s leave their way by more than `far` for a few messages and are back on it:
+    (the message before, the first one back, by how much).
 
     So do the messages of two publishers that do not agree, and no motor could follow.
     """
     places, back = [], 0
-    for at in np.flatnonzero(np.abs(np.diff(commands, axis=0)).max(axis=1, initial=0) > FAR):
+    for at in np.flatnonzero(np.abs(np.diff(commands, axis=0)).max(axis=1, initial=0) > far):
         out, before = commands[at + 1] - commands[at], commands[at] - commands[max(at - 1, 0)]
         if before @ out > SMOOTH * (out @ out):  # on its way there before
             continue
@@ -62,7 +62,7 @@ def to_and_fro(time: np.ndarray, commands: np.ndarray) -> list[tuple[int, int, f
                 break
             away = np.abs(commands[at + 1 : at + ahead] - commands[at]).max(axis=1)
             off = float(np.abs(commands[at + ahead] - commands[at]).max())
-            if away.min() > FAR and off < BACK * away.min():
+            if away.min() > far and off < BACK * away.min():
                 places.append((int(at), int(at + ahead), float(away.max())))
                 back = at + ahead - 1
                 break

@@ -14,8 +14,8 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.recordings.session.layout import TEXT, TO_SECONDS, TextForm
+from trunkline.recordings.session.session import FORCES, MotorEntry
 from trunkline.recordings.session.session import UNITS as METRES
-from trunkline.recordings.session.session import MotorEntry
 from trunkline.recordings.tables.arrays import array_columns
 from trunkline.recordings.tables.columns import BLANK, Key, cells_of, opened, seconds_of
 
@@ -316,7 +316,7 @@ def _motors(result: Guess, columns: list[LookedAt]) -> list[LookedAt]:
     motors = [c for c in columns if (MOTOR.fullmatch(c.label) or COMMAND.fullmatch(c.label)) and not _is_text(c)]
     if not motors:
         return columns
-    simple = set(get_args(MotorEntry.model_fields["unit"].annotation)) - {"rad", "deg", "Nm"}  # without a drum
+    simple = set(get_args(MotorEntry.model_fields["unit"].annotation)) - {"rad", "deg", *FORCES}  # no drum, no sign
     units = {c.unit or ("N" if re.search("tension|force", c.label) else None) for c in motors}
     clear = len(units) == 1 and units <= simple
     off = "" if clear else "# "

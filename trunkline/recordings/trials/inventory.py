@@ -4,11 +4,11 @@ import numpy as np
 
 from trunkline.frames import tilt_of_gravity
 from trunkline.recordings.trials.experiments import EXPERIMENTS
+from trunkline.recordings.trials.recording import FORCE, PULLED
 from trunkline.recordings.trials.splits import DECIDING, IDENTIFY, SPLITS
 from trunkline.recordings.trials.trial import Trial, sessions_of
 
 UPRIGHT = np.radians(3)  # of tilt, below which gravity has no direction across the arm
-PULLED = 1e-3  # m, from which on a tendon counts as pulled
 SEVERAL = 0.25  # share of a trial's largest pull, from which on two tendons are pulled together
 WIDEST = 180.0  # deg without a direction, from which on one side of the arm is not seen
 ONE_LINE = 20.0  # deg, within which directions lie in one plane
@@ -47,9 +47,9 @@ def _range(trials: list[Trial]) -> str:
     if tilts and max(tilts) > np.degrees(UPRIGHT):
         ends = dict.fromkeys(f"{tilt:.0f}" for tilt in (min(tilts), max(tilts)))
         text += f"; tilted by {' to '.join(ends)}°"
-    pulls = [float(_drawn(trial).max(initial=0)) for trial in trials]
-    if max(pulls) > PULLED:
-        text += f"; pulls of up to {1e3 * max(pulls):.0f} mm"
+    pulls, unit = [float(_drawn(trial).max(initial=0)) for trial in trials], trials[0].command_unit
+    if max(pulls) > PULLED[unit]:
+        text += f"; pulls of up to {_pull(max(pulls), unit, '.3g', '.0f')}"
     loads = sorted({trial.load for trial in trials})
     if loads != [0.0]:
         text += f"; loads of {', '.join(f'{1e3 * load:.0f}' for load in loads)} g"
@@ -92,20 +92,25 @@ def _bent(trial: Trial) -> float:
     return float(np.arctan2(*(tip[min(start, len(tip) - 1)] - tip[-1])[1::-1]))
 
 
+def _pull(size: float, unit: str, newtons: str, millimetres: str) -> str:
+    return f"{size:{newtons}} N" if unit == FORCE else f"{1e3 * size:{millimetres}} mm"
+
+
 def _drawn(trial: Trial) -> np.ndarray:
-    """How far each tendon is drawn in beyond its least, at most, m. Shape (K,)."""
+    """How far each tendon is drawn in beyond its least, or pulled, at most, in the unit of commands. Shape (K,)."""
     return np.maximum(trial.commands, 0).max(axis=0, initial=0)
 
 
 def _pulls(trials: list[Trial]) -> list[str]:
     if not trials:
         return []
-    lines, most = [], np.max([_drawn(trial) for trial in trials], axis=0)
-    idle = [name for name, pull in zip(trials[0].tendons, most, strict=True) if pull < PULLED]
+    lines, most, unit = [], np.max([_drawn(trial) for trial in trials], axis=0), trials[0].command_unit
+    idle = [name for name, pull in zip(trials[0].tendons, most, strict=True) if pull < PULLED[unit]]
     if len(idle) == len(most):
         if not (pull := most.max(initial=0)):
             return ["no tendon is pulled; if some were, their sign in session.yaml is wrong"]
-        return [f"no tendon is pulled by more than {1e3 * pull:.2g} mm: is the unit in session.yaml right?"]
+        most_pulled = _pull(pull, unit, ".2g", ".2g")
+        return [f"no tendon is pulled by more than {most_pulled}: is the unit in session.yaml right?"]
     if idle:
         lines.append(f"never pulled: {', '.join(idle)}")
     if max(_at_once(trial) for trial in trials) == 1:
@@ -116,4 +121,4 @@ def _pulls(trials: list[Trial]) -> list[str]:
 def _at_once(trial: Trial) -> int:
     """How many tendons are pulled together, at most."""
     pulls = np.maximum(trial.commands, 0)
-    return int((pulls > max(SEVERAL * pulls.max(initial=0), PULLED)).sum(axis=1).max(initial=0))
+    return int((pulls > max(SEVERAL * pulls.max(initial=0), PULLED[trial.command_unit])).sum(axis=1).max(initial=0))

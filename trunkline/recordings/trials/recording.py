@@ -4,6 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+LENGTH, FORCE = "m", "N"  # units of commands: of cable that a motor draws in, or of the tension with which it pulls
+PULLED = {LENGTH: 1e-3, FORCE: 0.05}  # by unit, from which on a tendon counts as pulled
+
 
 @dataclass(kw_only=True)
 class PlannedTrial:
@@ -27,8 +30,8 @@ class TrialRecording(PlannedTrial):
     """A trial of T frames, S markers and K tendons.
 
     time: (T,) s from the first frame. positions (T, S, 3) m, quaternions (T, S, 4) wxyz or None: of the markers.
-    commands, tendon_positions: m of pull, one column a tendon. What else a frame, a clock or a gap means is told by
-    the class that derives from this one.
+    commands: m of pull, or N of tension, as `command_unit` says; tendon_positions: m of pull; one column a tendon. What
+    else a frame, a clock or a gap means is told by the class that derives from this one.
     """
 
     time: np.ndarray
@@ -38,3 +41,4 @@ class TrialRecording(PlannedTrial):
     tendons: tuple[str, ...]
     commands: np.ndarray
     tendon_positions: np.ndarray
+    command_unit: str = LENGTH

@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from trunkline.errors import InputError
-from trunkline.recordings.trials.recording import TrialRecording
+from trunkline.recordings.trials.recording import LENGTH, TrialRecording
 
 FLAG, COUNT, NUMBER, VECTOR = pa.bool_(), pa.int64(), pa.float64(), pa.list_(pa.float64())
 NAME, NAMES = pa.string(), pa.list_(pa.string())
@@ -28,7 +28,8 @@ def write_tables(
     """
     kinds = PLANNED | columns
     rows = [
-        {"trial": trial.name, "session": trial.session, "orientations": trial.quaternions is not None}
+        {"trial": trial.name, "session": trial.session, "orientations": trial.quaternions is not None,
+         "command_unit": trial.command_unit}
         | {name: getattr(trial, name) for name in ("markers", "tendons", *kinds)}
         | {name: len(getattr(trial, field)) for name, field in counts.items()}
         for trial in trials
@@ -37,6 +38,8 @@ def write_tables(
     kinds |= {"markers": NAMES, "tendons": NAMES, "orientations": FLAG}
     if any(trial.session for trial in trials):  # a single session's are without a column that names it
         kinds["session"] = NAME
+    if any(trial.command_unit != LENGTH for trial in trials):  # likewise where all motors draw in lengths
+        kinds["command_unit"] = NAME
     pq.write_table(pa.Table.from_pylist(rows, pa.schema(kinds)), Path(folder) / "trials.parquet")
     pq.write_table(pa.concat_tables(poses), Path(folder) / "poses.parquet")
     pq.write_table(pa.concat_tables(commands), Path(folder) / "commands.parquet")
@@ -47,7 +50,8 @@ def planned(row: dict, columns: dict[str, pa.DataType]) -> dict[str, Any]:
     fields = {name: row[name] for name in (*PLANNED, *columns)}
     vectors = {name: np.array(row[name]) for name, kind in columns.items() if kind == VECTOR}
     names = {"markers": tuple(row["markers"]), "tendons": tuple(row["tendons"])}
-    return fields | vectors | names | {"name": row["trial"], "session": row.get("session", "")}
+    further = {"session": row.get("session", ""), "command_unit": row.get("command_unit", LENGTH)}
+    return fields | vectors | names | further | {"name": row["trial"]}
 
 
 def read_tables(folder: Path, stage: str) -> tuple[list[dict], dict[str, np.ndarray], dict[str, np.ndarray]]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.identification.parameters.per_session import model_in
-from trunkline.identification.simulate.experiment import SLACK, commanded_lengths
+from trunkline.identification.simulate.experiment import SLACK, commanded_controls
 from trunkline.kinematics.dataset.sampling import around_the_arm
 from trunkline.model.arm_model import ArmModel
 from trunkline.model.simulation.rest import base_frame
@@ -38,7 +38,7 @@ class StaticPoses:
 def posed(trials: list[Trial], model: mujoco.MjModel) -> StaticPoses:
     """The poses of trials at rest, the last one of each, with gravity as the mount of `model` has it."""
     order = ArmModel(model).actuators
-    commands = [commanded_lengths(trial, model)[-1][order] for trial in trials]
+    commands = [commanded_controls(trial, model)[-1][order] for trial in trials]
     gravity = np.array([_gravity(trial, model) for trial in trials]).reshape(-1, 3)
     return StaticPoses(gravity, np.array(commands).reshape(-1, model.nu))
 

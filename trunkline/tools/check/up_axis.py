@@ -10,6 +10,7 @@ from trunkline.identification.evaluation.evaluation import Prediction, replay
 from trunkline.identification.fit.identify import with_parameters
 from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.identification.simulate.experiment import Experiment
+from trunkline.model.arm_model import ArmModel
 from trunkline.recordings.cleaning.gravity_direction import AXES, possible_axes
 from trunkline.recordings.signals.base_frame import average_base, gravity_from_up
 from trunkline.recordings.trials.experiments import EXPERIMENTS
@@ -58,7 +59,8 @@ def up_lines(
 
     declared = replay(model, tried, markers)
     off, still = (error(Prediction(replayed, tried)) for replayed in (declared, straight(tried, declared)))
-    if any(EXPERIMENTS[experiment.kind].needs_motors for experiment in tried):
+    lengths = ArmModel(model).commands == "length"  # else motors have no gain
+    if lengths and any(EXPERIMENTS[experiment.kind].needs_motors for experiment in tried):
         guess, by_gain = parameter_named("kp").read(model), {}
         for factor in GAINS:
             geared = with_parameters(model, {"kp": factor * guess})

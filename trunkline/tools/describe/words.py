@@ -94,11 +94,13 @@ def tendon_lines(model: mujoco.MjModel) -> list[str]:
         crossed = arms[arms > 0]
         apart = [1e3 * np.hypot(*place[:2]) for place in (first, last)]
         away = f"{apart[0]:.3g} mm" if np.isclose(*apart, rtol=ALIKE) else f"{apart[0]:.3g} to {apart[1]:.3g} mm"
+        forced = arm.commands == "force"
+        holds = "commanded by force," if forced else f"{model.actuator_gainprm[motor, 0]:.4g} N/m"
         facts = [
             f"at {_angle(model, cable):.1f}°", f"{away} from the axis", f"ends at unit {end}",
             f"{1e3 * model.tendon_length0[cable]:.1f} mm long",
             f"{1e3 * np.radians(1) * crossed.sum():.3g} mm for 1° of each joint that it crosses",
-            f"{model.actuator_gainprm[motor, 0]:.4g} N/m up to {-model.actuator_forcerange[motor, 0]:.4g} N",
+            f"{holds} up to {-model.actuator_forcerange[motor, 0]:.4g} N",
         ]  # fmt: skip
         if len(arm.preload) and arm.preload[index]:
             facts.append(f"{arm.preload[index] * model.actuator_gainprm[motor, 0]:.3g} N at command 0")
@@ -139,13 +141,15 @@ def doubt_lines(model: mujoco.MjModel, session: Session | None) -> list[str]:
     unidentifiable = [name for name, each in parameters if not any(map(each.identifiable_from, experiments))]
     if unidentifiable:
         lines.append(f"no trial of the session ({', '.join(sorted(kinds))}) tells {', '.join(unidentifiable)}")
-    if weightless and model.nu and all(EXPERIMENTS[kind].static for kind in kinds):
+    if weightless and model.nu and arm.commands == "length" and all(EXPERIMENTS[kind].static for kind in kinds):
         lines.append("without gravity and motion, stiffness and kp show in their ratio alone: identify one of them")
     if len(session.markers or {}) == 1:
         lines.append("one tracked point does not tell in which shape the arm is, nor exchanged names of tendons")
     if not weightless and not kinds & {"static_tilt", "static_pull"} and model.nu:
         lines.append("nothing is tilted or held: stiffness comes with the masses and the motors' gain, as a ratio")
-    if arm.rate_limit == 0 and arm.backlash == 0 and model.nu and "motion" in kinds:
+    if model.nu and session.command_unit != arm.command_unit:
+        lines.append(f"session.yaml: motors: commands are in {session.command_unit}, the arm takes {arm.command_unit}")
+    if arm.commands == "length" and arm.rate_limit == 0 and arm.backlash == 0 and model.nu and "motion" in kinds:
         lines.append("winches are taken to wind as they are told: `rate_limit` and `backlash` of `actuation` are 0")
     return lines
 

@@ -54,6 +54,7 @@ def main(arguments: list[str] | None = None) -> int:
     if file is None:
         raise InputError(f"{args.settings}: found no identified model, expected one (run `dvc repro`) or --model")
     model = Twin.load(file).spec.compile()
+    ArmModel(model).require_lengths("record-poses")
     if not model.nu:
         raise InputError(f"{file}: found no motor, expected an arm that pulls cables")
     mounts, downs, stroke = _gravities(args)

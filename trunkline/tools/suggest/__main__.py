@@ -20,6 +20,7 @@ from trunkline.identification.fit.setup import check_parameters
 from trunkline.identification.parameters.per_session import make_room, per_session_names
 from trunkline.identification.stages import STAGES, final_model
 from trunkline.model.arm.kinds import described_arm
+from trunkline.model.arm_model import ArmModel
 from trunkline.model.places import marker_places
 from trunkline.pipeline.config import load_folder, own_or_project, settings_of
 from trunkline.program import add_settings, command_parser
@@ -68,6 +69,7 @@ def main(arguments: list[str] | None = None) -> int:
     spec, source = twin(args.model, args.settings)
     trials = trials_of(args.session, args.settings, "suggest", marker_places(spec.compile()))
     model = with_room(spec, trials, args.settings)
+    ArmModel(model).require_lengths("suggest")
     print(f"twin: {source}", flush=True)
     stages, offered = information_of_stages(model, trials, grid, args.settings, args.only, args.error / 100)
     weights = weights_for(args.goal, stages, model, grid)
