@@ -184,7 +184,7 @@ def test_turning_gravity_is_turning_the_base(tilt):
 def test_any_number_of_tendons_and_a_chain_that_is_no_spiral():
     chain = ChainGeometry(np.full(6, 0.03), np.full(6, 0.04), np.full(6, 0.5), 1.0)
     properties = unit_properties(chain, TPU_95A_MODULUS, TPU_95A_DENSITY, 0.3, 0.1)
-    tendons = Tendons(0.5, 2000, 60, 0.05, routes=even_routes(chain, 4, 0.8), kv=80)
+    tendons = Tendons(0.5, 60, 0.05, kp=2000, routes=even_routes(chain, 4, 0.8), kv=80)
     model = build_spec(chain, properties, tendons, Solver(0.001, 1e-5, *LIMIT, *LIMIT)).compile()
     assert (model.ntendon, model.nq) == (4, 12)
     np.testing.assert_allclose(

@@ -25,7 +25,7 @@ MARKERS = {name: Marker(distance) for name, distance in DISTANCES.items()}
 def model_of(tip_load=0.0, masses=(0.02,), stiffness=0.5, tendons=0) -> mujoco.MjModel:
     properties = uniform_properties(CHAIN, masses, stiffness, 5.0)
     solver = Solver(0.002, 1e-5, *LIMIT, *LIMIT)
-    cables = Tendons(0.1, 200, 20, 0.1, routes=even_routes(CHAIN, tendons, 0.8), kv=10)
+    cables = Tendons(0.1, 20, 0.1, kp=200, routes=even_routes(CHAIN, tendons, 0.8), kv=10)
     return build_spec(CHAIN, properties, cables, solver, tip_load, MARKERS).compile()
 
 
@@ -78,7 +78,7 @@ def test_a_bent_rod_deflects_as_a_beam():
     units, bending = 60, 0.5
     chain = uniform_chain(0.3, 0.05, units, 0.5)
     properties = uniform_properties(chain, [1e-6], bending / chain.lengths[0], 0.3)
-    tendons = Tendons(0, 1, 1, 1, routes=[], kv=1)
+    tendons = Tendons(0, 1, 1, kp=1, routes=[], kv=1)
     spec = build_spec(chain, properties, tendons, Solver(0.001, 1e-5, *LIMIT, *LIMIT))
     model = spec.compile()
     jacobian, data = np.zeros((3, model.nv)), mujoco.MjData(model)
