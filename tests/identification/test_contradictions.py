@@ -24,3 +24,9 @@ def test_what_is_considered_counts_where_a_stage_has_it():
     wide["parameters"]["kp"]["interval_95_given_model"] = [1.0, 1.5]
     assert contradicted({"identify_stiffness": wide}, table(2.1, 3.0, key="interval_95_given_model")) == []
     assert contradicted({"identify_stiffness": table()}, table(2.1, 3.0)) == []
+
+
+def test_parameters_of_a_session_count_too():
+    before, now = ({"parameters": {}, "per_session": table(*ends)["parameters"]} for ends in ((1.0, 2.0), (2.1, 3.0)))
+    (line,) = contradicted({"identify_stiffness": before}, now)
+    assert line.startswith("kp: found 2.1 to 3 here")

@@ -2,20 +2,28 @@
 
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 
 from tests.identification.test_recovery import identified
 from tests.model.simulation.test_shortening import soft_model
-from tests.support.forced_arm import forced_model, forced_pull, holding_model
-from tests.support.noisy_trials import with_values
+from tests.support.forced_arm import MARKERS, forced_model, forced_pull, holding_model
+from tests.support.noisy_trials import WEIGHTS, with_values
 from trunkline.errors import InputError
+from trunkline.identification.evaluation.baselines import noise_floor
+from trunkline.identification.evaluation.evaluation import replay
+from trunkline.identification.fit.considered import considered
+from trunkline.identification.fit.linearisation import linearise
+from trunkline.identification.fit.problem import Bounds, Problem
 from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields, parameter_of, parameters_of
+from trunkline.identification.parameters.tolerances import Tolerances
 from trunkline.identification.simulate.checks import check_trials
 from trunkline.identification.simulate.experiment import prepare
 from trunkline.identification.simulate.markers import with_measured_markers
 from trunkline.identification.simulate.population import Population
 from trunkline.model.simulation.shortening import shortened
+from trunkline.model.statics.chain import read_chain
 
 PULLS = ([6.0, 0, 0, 0], [0, 5.0, 0, 0], [0, 0, 4.0, 0], [0, 2.0, 0, 6.0])
 OF_LENGTHS = ["kp", "kp_ratio_2", "kv", "winding", "preload_1", "rate_limit", "backlash"]
@@ -100,3 +108,38 @@ def test_units_of_the_session_are_those_of_the_model(model):
         check_trials([trial], holding_model())
     with pytest.raises(InputError, match="found commands in m, expected N, as the model's motors take"):
         check_trials([replace(trial, command_unit="m")], model)
+
+
+def test_statics_and_mujoco_pull_as_strongly_as_a_candidate_may(model):
+    """Whatever the arm was described with."""
+    stronger, sent = with_values(forced_model(max_force=3.0), {"force_range": 5.0}), np.array([6.0, 0.0, 0.0, 0.0])
+    data = mujoco.MjData(stronger)
+    data.ctrl[:] = sent
+    mujoco.mj_step(stronger, data, 2000)
+    assert -data.actuator_force[0] == pytest.approx(5.0, abs=1e-3)
+    np.testing.assert_array_equal(read_chain(stronger).pulls(sent)[0], [5.0, 0.0, 0.0, 0.0])
+    lengths = with_values(holding_model(), {"force_range": 5.0})
+    np.testing.assert_array_equal(lengths.actuator_ctrlrange, holding_model().actuator_ctrlrange)
+
+
+def test_a_motor_that_pulls_by_more_than_the_first_is_considered(model):
+    """By what it would change of the trials: one that bends by this motor alone is as if its tension were larger."""
+    trials = [forced_pull(model, pull) for pull in PULLS[:2]]
+    problem = Problem(
+        model, [prepare(trial, model, 1) for trial in trials], MARKERS, {"stiffness": Bounds(0.2, 20.0)}, "positions",
+        WEIGHTS,
+    )  # fmt: skip
+    moves, lines = considered(problem, linearise(problem, problem.start()), Tolerances(gain=0.05), [])
+    assert lines == []
+    assert set(moves) == {("gain", str(motor)) for motor in (2, 3, 4)}
+    assert moves["gain", "2"][0] > 0.005, "what pulls more is held by what is stiffer"
+    np.testing.assert_array_equal([moves["gain", motor] for motor in ("3", "4")], np.zeros((2, 1)))
+
+
+def test_the_noise_floor_is_of_the_arm_as_short_as_it_is_pulled():
+    model = soft_model()
+    trials = [forced_pull(shortened(model, np.array(pull)), pull, markers=SOFT) for pull in SOFT_PULLS]
+    experiments = [prepare(trial, model, 1) for trial in trials]
+    floor = noise_floor(trials, experiments, model, replay(model, experiments, SOFT))
+    for shape, experiment in zip(floor.replay.positions, floor.experiments, strict=True):
+        assert np.linalg.norm(shape - experiment.positions, axis=-1).max() < 1e-4

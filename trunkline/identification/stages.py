@@ -8,6 +8,7 @@ from trunkline.errors import InputError, existing
 
 STAGES = ("identify_stiffness", "identify_damping", "identify_control")  # in their order: each goes on from the last
 MODEL, TABLE = "arm.xml", "parameters.json"
+SCALARS = ("parameters", "per_session")  # a table's tables of parameters of one number
 COMPARED = {"experiments", "frames", "command_delay"}  # what a table has of how trials were compared, see `Compared`
 
 
@@ -52,8 +53,10 @@ def contradicted(tables: dict[str, dict], table: dict) -> list[str]:
     """
     lines = []
     for before, earlier in tables.items():
-        for name in [name for name in table["parameters"] if name in earlier["parameters"]]:
-            ends = [stated_interval(rows["parameters"][name]) for rows in (earlier, table)]
+        rows, rows_before = ({name: row for key in SCALARS for name, row in t.get(key, {}).items()}
+                             for t in (table, earlier))  # fmt: skip
+        for name in [name for name in rows if name in rows_before]:
+            ends = [stated_interval(some[name]) for some in (rows_before, rows)]
             if all(ends) and (ends[0][0] > ends[1][1] or ends[1][0] > ends[0][1]):
                 (low, high), (least, most) = ends
                 lines.append(

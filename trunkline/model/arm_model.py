@@ -129,10 +129,11 @@ class ArmModel:
 
     @cached_property
     def actuators(self) -> np.ndarray:
-        """Number of the actuator that draws each cable in, in the order of the cables. Shape (K,)."""
+        """Number of the actuator that draws each cable in, in the order of the cables; statics refuse a cable that none
+        draws in, and it has none here. Shape (K,)."""
         on_tendons = self.model.actuator_trntype == mujoco.mjtTrn.mjTRN_TENDON  # a joint's motor has the joint there
         drawn = np.where(on_tendons, self.model.actuator_trnid[:, 0], -1)
-        return np.array([np.flatnonzero(drawn == cable)[0] for cable in self.cables], dtype=int)
+        return np.array([np.flatnonzero(drawn == cable)[0] for cable in self.cables if cable in drawn], dtype=int)
 
     @cached_property
     def commands(self) -> Literal["length", "force"]:

@@ -26,7 +26,7 @@ from trunkline.identification.results.parameter_table import parameter_table, un
 from trunkline.identification.results.scoring import Compared, fingerprints, predict, start_fit
 from trunkline.identification.simulate.checks import check_trials
 from trunkline.identification.simulate.experiment import Experiment
-from trunkline.identification.stages import MODEL, STAGES, TABLE, contradicted, read_table, read_tables
+from trunkline.identification.stages import MODEL, SCALARS, STAGES, TABLE, contradicted, read_table, read_tables
 from trunkline.model.arm_model import BACKLASH, CAPSTAN_FRICTION, RATE_LIMIT, ArmModel
 from trunkline.model_files import read_spec
 from trunkline.pipeline.stage import output_folder, write_json, write_metrics
@@ -37,7 +37,6 @@ from trunkline.recordings.trials.trial import Trial, read_trials
 ARTIFACTS = Path("artifacts")
 CAD_MODEL = ARTIFACTS / "build_mjcf/arm.xml"
 TRIALS = Path("data/processed/filter")
-SCALARS = ("parameters", "per_session")  # their tables in parameters.json
 CSV = {"index": False, "float_format": "%.6g"}
 WARN_PCT, REFUSE_PCT = 5.0, 25.0  # of the arm's length by which bodies may be off after a fit
 

@@ -140,3 +140,19 @@ def test_what_the_statics_cannot_reach_is_refused_though_the_network_foresees_it
     network, _, _ = poor(chain, down)
     with pytest.raises(InputError, match="out of reach: the soft arm's tip comes no nearer to its target than"):
         bend(network, (2 * chain.length, 0.0, 0.0), tuple(map(float, down)), 0.02, chain)
+
+
+@pytest.mark.parametrize(("degrees", "within"), [(3.0, True), (45.0, False)])
+def test_an_arm_that_leans_may_miss_by_as_much_as_that_is_but_not_by_any_length(chain, degrees, within):
+    """A target that an upright arm reaches lies off the surface of one that leans aside."""
+    down = downwards(0.6, 1.0)
+    network, target, _ = poor(chain, down)
+    lean = Rotation.from_rotvec(np.radians(degrees) * np.array([0.0, 0.0, 1.0]) + np.radians(degrees) * np.eye(3)[0])
+    missed = bend(network, target, tuple(map(float, down)), 1.0, chain, lean=lean).tip - target
+    tolerance = 0.001
+    if within:
+        assert np.linalg.norm(missed) < tolerance + 0.03
+        bend(network, target, tuple(map(float, down)), tolerance, chain, lean=lean)
+    else:
+        with pytest.raises(InputError, match="out of reach"):
+            bend(network, target, tuple(map(float, down)), tolerance, chain, lean=lean)

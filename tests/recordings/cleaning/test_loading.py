@@ -315,3 +315,24 @@ def test_a_mount_is_stated_from_one_point_of_it(tmp_path):
     np.testing.assert_allclose(origins[0], origins[1], atol=1e-9)
     path.write_text(path.read_text().replace("body: base", "body: bse"))
     refused(taken(tmp_path)[0], "release_a.mcap: base.body: found 'bse', expected one of base, unit_")
+
+
+def test_zeros_are_unseen_wherever_positions_are_counted_from(tmp_path):
+    """A driver that puts a body that it does not see in the origin, which is within reach of the arm."""
+    places = []
+
+    def lose(m):
+        positions = m.positions - np.nanmedian(m.positions[:, 0], axis=0) + [0.3, 0.2, 0.1]
+        positions[50:250:10, 2] = 0.0
+        places.append(positions)
+        return replace(m, positions=positions)
+
+    one_trial(tmp_path, lose)
+    path = tmp_path / "session.yaml"
+    content = yaml.safe_load(path.read_text())
+    base = {"position": [0.0, 0.0, 0.0], "body": "base", "quaternion": [1.0, 0.0, 0.0, 0.0]}
+    path.write_text(yaml.safe_dump(content | {"base": base}))
+    ((raw, findings),) = taken(tmp_path)
+    assert not isinstance(raw, InputError), str(raw)
+    assert np.isnan(raw.positions[50:250:10, 1, 0]).all()
+    assert any("20 " in line for line in findings.repairs)

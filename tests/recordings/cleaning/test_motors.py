@@ -11,11 +11,15 @@ from mcap_ros2.writer import Writer as RosWriter
 
 from tests.recordings.cleaning.test_loading import edit_session, one_trial, taken
 from tests.recordings.filtering.test_gaps import SETTINGS
-from tests.support.sessions import curl_truth, pull_truth
+from tests.support.sessions import LIMITS, curl_truth, pull_truth
 from trunkline.errors import InputError
+from trunkline.recordings.cleaning.loading import _by_motion
 from trunkline.recordings.cleaning.pulls import check_pulls
 from trunkline.recordings.filtering.filter import filter_raw_trial
+from trunkline.recordings.logs.bag2 import read_recording
 from trunkline.recordings.logs.definitions import JOINT_STATE, KNOWN, RIGID_BODIES
+from trunkline.recordings.logs.joint_stream import joint_stream
+from trunkline.recordings.logs.messages import JOINTS
 from trunkline.recordings.trials.inventory import recorded_lines
 
 
@@ -337,3 +341,33 @@ def test_tensions_that_cannot_be_are_named(tmp_path, change, message):
     raw = forced(tmp_path, [4.0, 0.0, 1.5])
     (fault,) = check_pulls(change(raw), 0.5, 0.01, 2.0, {})
     assert re.search(message, fault), fault
+
+
+def test_a_large_tension_may_vary_by_some_of_it_where_it_is_held(tmp_path):
+    raw = forced(tmp_path, [4.0, 0.0, 1.5])
+    wavering = 1.0 + 0.01 * np.sign(np.sin(np.arange(len(raw.commands))))[:, None]
+    assert check_pulls(replace(raw, commands=100 * wavering * raw.commands), 0.5, 0.01, 2.0, {}) == []
+
+
+def test_the_clock_is_not_sought_in_how_an_arm_swings_under_tensions(tmp_path):
+    raw, _ = curl(tmp_path)
+    assert _by_motion(raw, LIMITS) is not None
+    assert _by_motion(replace(raw, command_unit="N"), LIMITS) is None
+
+
+@pytest.mark.parametrize(
+    ("position", "effort", "forces", "numbers"),
+    [([0.3, 1.2], [4.0, 5.0], True, [4.0, 5.0]), ([0.3, 1.2], [4.0, 5.0], False, [0.3, 1.2]),
+     ([], [4.0, 5.0], True, [4.0, 5.0]), ([4.0, 5.0], [], True, [4.0, 5.0])],
+)  # fmt: skip
+def test_forces_are_the_efforts_of_joint_states_where_they_have_any(tmp_path, position, effort, forces, numbers):
+    stamp = {"sec": 1, "nanosec": 0}
+    message = {"header": {"stamp": stamp, "frame_id": ""}, "name": ["a", "b"], "position": position, "velocity": [],
+               "effort": effort}  # fmt: skip
+    with open(tmp_path / "log.mcap", "wb") as file:
+        writer = RosWriter(file)
+        schema = writer.register_msgdef("sensor_msgs/msg/JointState", JOINT_STATE)
+        writer.write_message("/sent", schema, message, log_time=10**9, publish_time=10**9)
+        writer.finish()
+    topic = read_recording(tmp_path / "log.mcap", JOINTS.keys()).topics["/sent"]
+    np.testing.assert_array_equal(joint_stream(topic, forces=forces).positions, [numbers])

@@ -11,6 +11,7 @@ import yaml
 from stages.build_mjcf import main as build_main
 from tests.model.arm.test_sections import ACTUATION, SOLVER, TWO, arm
 from tests.support.folders import ROOT
+from tests.support.forced_arm import forced_model
 from trunkline.errors import InputError
 from trunkline.model.arm.from_file import FromFile
 from trunkline.model.arm.guide_holes import GuideHoles
@@ -72,6 +73,13 @@ def test_what_no_log_will_tell_is_said():
     assert "one tracked point" in text
     whole = doubt_lines(one_side, session(["static_tilt", "release", "motion"]))
     assert not any("tells" in line and "no trial" in line for line in whole)
+
+
+def test_units_of_motors_are_compared_where_a_session_has_any():
+    forced, note = forced_model(), "session.yaml: motors: commands are in m, the arm takes N"
+    assert note not in doubt_lines(forced, session(["static_tilt"]))
+    lengths = {"motors": {"m1": {"unit": "m", "tendons": {"tendon_1": 1}}}}
+    assert note in doubt_lines(forced, session(["static_pull"], **lengths))
 
 
 def test_names_that_the_arm_has_not_are_noted(model):

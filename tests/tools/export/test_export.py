@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.recordings.logs.test_schemas import a_session
 from tests.support.folders import ROOT
+from tests.support.forced_arm import forced_pull, forced_spec
 from tests.support.matched_plant import curl, release, small_model, tilt
 from tests.tools.evaluate.test_evaluate import softer, write_model
 from trunkline.recordings.session.source import open_log
@@ -261,3 +262,21 @@ def test_what_cannot_be_exported_is_one_line_and_leaves_no_file(made, tmp_path, 
         assert main([*words, *more]) == 1
         assert expected in capsys.readouterr().err.splitlines()[-1]
     assert [path.name for path in tmp_path.iterdir()] == ["there.mcap"]
+
+
+def test_tensions_are_newtons_and_no_pulls(tmp_path):
+    spec = forced_spec()
+    model = spec.compile()
+    (tmp_path / "params.yaml").write_text((ROOT / "params.yaml").read_text())
+    (tmp_path / "arm.xml").write_text(spec.to_xml())
+    (tmp_path / "session").mkdir()
+    write_trials(tmp_path / "session", [forced_pull(model, [6.0, 0, 0, 0], "test")])
+    words = [str(tmp_path / name) for name in ("arm.xml", "session", "out.mcap")]
+    assert main([*words, "--settings", str(tmp_path)]) == 0
+    with open(tmp_path / "out.mcap", "rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        sent = {c.topic: message for _, c, _, message in reader.iter_decoded_messages()}
+    assert sent["/commands_N"].tendon_1 == 6.0
+    assert not {"/commands_mm", "/pulls_mm"} & sent.keys()
+    panel = json.loads((tmp_path / "out.foxglove.json").read_text())["configById"]["Plot!pulls"]
+    assert (panel["title"], panel["paths"][0]["value"]) == ("Tension, N", "/commands_N.tendon_1")

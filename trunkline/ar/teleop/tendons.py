@@ -26,6 +26,7 @@ from trunkline.kinematics.residual.residual_map import ResidualMap
 from trunkline.model.statics.chain import Chain
 
 NO_NETWORK = Fail, InvalidGraph, InvalidProtobuf  # what a file that is none ends with
+LEANING = 0.03  # m, by which an arm that leans may have its tip farther from its target, at most
 BENDS = np.radians(np.arange(-330.0, 331.0, 2.0))  # of the tip in its plane; a spiral curls further than a turn
 
 
@@ -54,7 +55,8 @@ def bend(
     """Commands that bring the tip to `tip`, m, within `tolerance` m, under `gravity` (unit vector), all in the base
     frame. With `chain`, the arm's statics correct the network's answer, and the tip foreseen is theirs, moved by
     what is `learnt` of the arm if the network knows of that; then the arm may `lean` on its mount, too: what the
-    network is asked for, and what is learnt, leans with it. By as much as that is elsewhere, the tip may be farther.
+    network is asked for, and what is learnt, leans with it. By as much as that is elsewhere, LEANING at most,
+    the tip may be farther.
 
     Raises:
         InputError: no bend comes so near, or a network of one tilt is asked about gravity out of its plane.
@@ -62,7 +64,7 @@ def bend(
     target, pull, by = tip, gravity, None if chain is None else lean
     if by is not None:
         tip, pull = _turned(by.inv(), tip), _turned(by.inv(), gravity)
-        tolerance += float(np.linalg.norm(np.subtract(target, tip)))
+        tolerance += min(float(np.linalg.norm(np.subtract(target, tip))), LEANING)
     if network.inputs == len(TILT):
         bent = _at_tilt(network, tip, gravity, chain, learnt)
     else:

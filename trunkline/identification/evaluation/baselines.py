@@ -11,7 +11,7 @@ import numpy as np
 
 from trunkline.identification.evaluation.evaluation import Prediction, Replay, marker_positions
 from trunkline.identification.parameters.per_session import model_in
-from trunkline.identification.simulate.experiment import Experiment
+from trunkline.identification.simulate.experiment import Experiment, arm_in
 from trunkline.identification.simulate.pose_fit import fit_pose, measured_pose, start_frames
 from trunkline.recordings.trials.experiments import is_static, is_stepwise
 from trunkline.recordings.trials.splits import IDENTIFY
@@ -96,14 +96,16 @@ def noise_floor(
 
 
 def _floor(trial: Trial, experiment: Experiment, model: mujoco.MjModel, count: int) -> tuple[Experiment, np.ndarray]:
-    model = model_in(trial.session, model)
     first = 0 if is_static(trial.experiment) else start_frames(trial)[0] + 1
     measured = np.flatnonzero(experiment.measured.any(axis=1))
     frames = measured[np.linspace(0, len(measured) - 1, min(count, len(measured))).round().astype(int)]
-    poses = [fit_pose(model, trial.markers, *measured_pose(trial, first + frame)).qpos for frame in frames]
     parts = {name: getattr(experiment, name)[frames] for name in ("controls", "positions", "measured")}
-    shapes = np.array([marker_positions(model, trial.markers, qpos) for qpos in poses])
-    return replace(experiment, frame_step=0.0, **parts), shapes
+    shapes = []
+    for frame in first + frames:
+        arm = arm_in(trial, model, frame)
+        qpos = fit_pose(arm, trial.markers, *measured_pose(trial, frame)).qpos
+        shapes.append(marker_positions(arm, trial.markers, qpos))
+    return replace(experiment, frame_step=0.0, **parts), np.array(shapes)
 
 
 def _last_shape(experiment: Experiment) -> np.ndarray:

@@ -208,7 +208,7 @@ def _of_models(
 
 
 def _of_trials(problem: Problem, vector: np.ndarray, blocks: list[np.ndarray], sizes: Tolerances) -> Effects:
-    """Residuals' changes with what acts in trials beside the model: gravity, zeros of cables, winches."""
+    """Residuals' changes with what acts in trials beside the model: gravity, zeros of cables, winches, tensions."""
     columns: Effects = dict.fromkeys(_trial_changes(problem, sizes))
     for scale in SCALES:
         for key, change in _trial_changes(problem, sizes.scaled(scale)).items():
@@ -232,6 +232,9 @@ def _trial_changes(problem: Problem, sizes: Tolerances) -> dict[Key, Callable[[E
     for cable in range(problem.model.nu if sizes.zero and pulled and lengths else 0):
         offset = sizes.zero * np.eye(problem.model.nu)[cable]
         listed["zero", str(cable + 1)] = lambda e, d=offset: replace(e, controls=e.controls + d)
+    for motor in range(1, problem.model.nu if sizes.gain and pulled and not lengths else 0):  # it pulls by so much more
+        factor = 1 + sizes.gain * np.eye(problem.model.nu)[motor]
+        listed["gain", str(motor + 1)] = lambda e, f=factor: replace(e, controls=e.controls * f)
     driven = any(not is_static(e.kind) for e in pulled)
     if sizes.backlash and driven and lengths and not ArmModel(problem.model).backlash:
         listed["backlash", ""] = lambda e: _with_play(e, sizes.backlash)

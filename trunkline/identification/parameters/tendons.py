@@ -81,6 +81,13 @@ def _write_kp(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None
     fields["actuator_biasprm"][:, :, 1] = -gains
 
 
+def _write_force_range(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
+    """Of all motors. What is sent tensions is sent no more than it pulls."""
+    fields["actuator_forcerange"][:, :, 0] = -values[:, None]
+    if ArmModel(model).commands == "force":
+        fields["actuator_ctrlrange"][:, :, 1] = values[:, None]
+
+
 def _gain_ratio(motor: int) -> Parameter:
     """Gain of a motor over that of the first: cables and winches are not equally stiff."""
 
@@ -166,7 +173,10 @@ TENDON_PARAMETERS: dict[str, Parameter] = {
     "kp_ratio_2": _gain_ratio(2),
     "kp_ratio_3": _gain_ratio(3),
     "kv": _of_all("N s/m", "actuator_biasprm", 2, -1.0, part=HOLDING),
-    "force_range": _of_all("N", "actuator_forcerange", 0, -1.0, identifiable_from=pulled),
+    "force_range": Parameter(
+        "N", ("actuator_forcerange", "actuator_ctrlrange"), lambda m: float(-m.actuator_forcerange[0, 0]),
+        _write_force_range, part=TENDONS, identifiable_from=pulled,
+    ),
     "time_constant": _of_all("s", "actuator_dynprm", 0),
     "dead_time": _of_all("s", "actuator_delay", part=DELAYS),
     "rate_limit": number(RATE_LIMIT, "m/s", _winches(RATE_LIMIT)),

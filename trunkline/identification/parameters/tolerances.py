@@ -113,7 +113,7 @@ def changes(model: mujoco.MjModel, sizes: Tolerances, moving: bool, pulled: bool
     for cable in range(model.nu if sizes.hole_place and pulled else 0):
         listed += [Perturbation("hole_place", f"{cable + 1} {way}", ("site_pos",), _holes(cable, way, sizes.hole_place))
                    for way in ("out", "round")]  # fmt: skip
-    for motor in range(1, model.nu if sizes.gain and pulled else 0):
+    for motor in range(1, model.nu if sizes.gain and pulled and arm.commands == "length" else 0):
         listed.append(Perturbation("gain", str(motor + 1), MOTOR_FIELDS, _gain(motor, 1 + sizes.gain)))
     for name in ONE_SIDED if moving else ():
         parameter = parameter_named(name)

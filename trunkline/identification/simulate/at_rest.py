@@ -66,8 +66,11 @@ def shapes_at_rest(
         if soft:
             set_fields(pressed, fields, candidate, data)
         alike = np.column_stack([loads, approaches, sent if soft else np.zeros((len(sent), 0))])
-        for load, approach, *tensions in np.unique(alike, axis=0):
-            chosen = np.flatnonzero((alike == [load, approach, *tensions]).all(axis=1))
+        groups = np.unique(alike, axis=0)
+        for load, approach, *tensions in np.tile(groups, (2 if soft else 1, 1)):  # again by neighbours that came later
+            chosen = np.flatnonzero((alike == [load, approach, *tensions]).all(axis=1) & np.isnan(qpos[:, 0]))
+            if not len(chosen):
+                continue
             if soft:
                 shorten(pressed, candidate_model, np.array(tensions))
                 chain = read_chain(pressed)
@@ -102,8 +105,8 @@ def _starts(experiment: Experiment) -> np.ndarray:
 
 
 def _sent(model: mujoco.MjModel, experiment: Experiment) -> np.ndarray:
-    """Lengths of cable at which the motors of `model` stand, m: what winches with backlash have delivered by each
-    frame, of a trial that has several. Shape (T, K)."""
+    """Lengths of cable at which the motors of `model` stand, m, or their tensions, N. What winches with backlash have
+    delivered by each frame, of a trial that has several. Shape (T, K)."""
     arm = ArmModel(model)
     controls, play = wound(model, experiment.controls)[:, arm.actuators], arm.backlash
     if play and experiment.frames > 1:

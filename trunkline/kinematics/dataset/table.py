@@ -51,7 +51,7 @@ def sample_table(
     """About `count` samples under one gravity, thinned in the space of tips.
 
     Columns: theta_g (rad), gx, gy, gz (direction of gravity), x, y, z (m), qw, qx, qy, qz, l1… (m, path lengths), f1…
-    (N, tensions), c1… (m, commands), residual (N m), iterations, set, and the derivatives by tension dx_df1… (tip,
+    (N, tensions), c1… (m or N, commands), residual (N m), iterations, set, and the derivatives by tension dx_df1… (tip,
     m/N), rx_df1… (turn of the tip as a rotation vector in the base frame, rad/N) and dl1_df1… (path lengths, m/N).
     The planar sets are kept beside the thinned samples, thinned along their own curves.
 

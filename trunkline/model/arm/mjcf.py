@@ -146,7 +146,7 @@ def build_spec(
 
     if cables and tendons.commands == "force":
         spec.add_numeric(name=FORCE_SCALE, data=[1.0], size=1)
-    elif tendons.described:
+    elif tendons.described and tendons.kp is not None:
         preload = [route.pretension / tendons.kp for route in tendons.routes]
         spec.add_numeric(name=WINDING, data=[1.0], size=1)
         spec.add_numeric(name=PRELOAD, data=preload, size=len(preload))

@@ -22,6 +22,7 @@ from trunkline.recordings.signals.clock import OffsetFit, estimate_offset
 from trunkline.recordings.tables.source import TableReader
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_stepwise
 from trunkline.recordings.trials.raw_trial import RawTrial
+from trunkline.recordings.trials.recording import FORCE
 
 
 def load_raw_trials(
@@ -84,10 +85,12 @@ def _put_in_origin(source: LogSource, body: str) -> None:
     poses, where = source.poses, f"{source.log.path}: base.body"
     if body not in poses.names:
         raise InputError(f"{where}: found {body!r}, expected one of {', '.join(poses.names)}")
-    place = poses.positions[:, poses.names.index(body)]
+    unseen = (poses.positions == 0).all(axis=2)  # as drivers put it
+    place = np.where(unseen[..., None], np.nan, poses.positions)[:, poses.names.index(body)]
     if not np.isfinite(place).any():
         raise InputError(f"{where}: {body!r} is never seen, expected where the mount is")
-    poses.positions = poses.positions - np.nanmedian(place, axis=0)
+    moved = poses.positions - np.nanmedian(place, axis=0)
+    poses.positions = np.where(unseen[..., None], 0.0, moved)  # for `valid_samples` to count
 
 
 def _raw_trial(
@@ -146,8 +149,9 @@ def _raw_trial(
 
 
 def _by_motion(raw: RawTrial, limits: TrialLimits) -> OffsetFit | None:
-    """By how much the motors' clock is off, by what was wound, or else by what was commanded, while the arm moves."""
-    if EXPERIMENTS[raw.experiment].static:
+    """By how much the motors' clock is off, by what was wound, or else by what was commanded, while the arm moves. None
+    of tensions: by what they hold, an arm lags for as long as it swings."""
+    if EXPERIMENTS[raw.experiment].static or raw.command_unit == FORCE:
         return None
     wound = (raw.tendon_time, raw.tendon_positions)
     motion = wound if len(raw.tendon_time) else (raw.command_time, raw.commands)

@@ -98,7 +98,7 @@ def read_motors(
         if coupling is not None:
             pulls = pulls @ coupling.T
         arrays += [seconds, pulls]
-    return MotorSignals(tuple(tendons), *arrays, session.command_unit)
+    return MotorSignals(tuple(tendons), *arrays, command_unit=session.command_unit)
 
 
 def check_motors(

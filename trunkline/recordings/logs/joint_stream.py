@@ -13,7 +13,7 @@ from trunkline.recordings.logs.samples import union
 
 @dataclass
 class JointStream:
-    """T messages, K joints. stamps, log_times: (T,) ns. positions: (T, K) m, NaN where absent.
+    """T messages, K joints. stamps, log_times: (T,) ns. positions: (T, K) m, or efforts, NaN where absent.
 
     sent: (T, K), which of them a message holds, as a finite number. topic: for people to read, of several.
     timed: whether the messages have stamps; without, stamps are the log times. unnamed, notes: as for poses.
@@ -38,10 +38,11 @@ class JointStream:
         )  # fmt: skip
 
 
-def joint_stream(topic: Topic, name: str | None = None) -> JointStream:
+def joint_stream(topic: Topic, name: str | None = None, forces: bool = False) -> JointStream:
     """All messages of a topic whose schema is in `JOINTS`; numbers without names go by their place, from 1.
 
-    Args: name: of the one number that each message holds, where the topic names it.
+    Args: name: of the one number that each message holds, where the topic names it. forces: whether the numbers are
+    efforts where a message has any, and not positions.
 
     Raises:
         ValueError: the messages cannot be read at all.
@@ -51,7 +52,8 @@ def joint_stream(topic: Topic, name: str | None = None) -> JointStream:
     for rows, message in decode(topic):
         try:
             joints = reader(message)
-            positions = joints.positions.reshape(rows.size, joints.positions.shape[-1])
+            numbers = joints.efforts if forces and joints.efforts is not None else joints.positions
+            positions = numbers.reshape(rows.size, numbers.shape[-1])
         except READING:
             continue
         names = joints.names

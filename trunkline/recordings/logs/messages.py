@@ -29,11 +29,13 @@ class DecodedPoses(NamedTuple):
 
 
 class DecodedJoints(NamedTuple):
-    """positions: (..., K) m. time: (...) ns, names: K; None where the recorder's clock and the session tell."""
+    """positions: (..., K) m. time: (...) ns, names: K; None where the recorder's clock and the session tell. efforts:
+    (..., K) N or Nm, where messages have a field of their own for these; None where not."""
 
     time: np.ndarray | None
     names: list[str] | None
     positions: np.ndarray
+    efforts: np.ndarray | None = None
 
 
 POSES: dict[str, Callable[..., DecodedPoses]] = {}
@@ -151,9 +153,9 @@ def markers(message) -> DecodedPoses:
 
 @joints("sensor_msgs/JointState")
 def joint_state(message) -> DecodedJoints:
-    positions = np.asarray(message.position, dtype=float)
-    names = message.name if any(message.name) or not positions.shape[-1] else None
-    return DecodedJoints(moment(message.header.stamp), names, positions)
+    positions, efforts = (np.asarray(numbers, dtype=float) for numbers in (message.position, message.effort))
+    names = message.name if any(message.name) or not max(positions.shape[-1], efforts.shape[-1]) else None
+    return DecodedJoints(moment(message.header.stamp), names, positions, efforts if efforts.shape[-1] else None)
 
 
 @joints("std_msgs/Float64MultiArray", "std_msgs/Float32MultiArray")

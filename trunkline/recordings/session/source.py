@@ -123,7 +123,7 @@ def _joints(
     names: set[str] | None, session: Session,
 ) -> tuple[JointStream | None, list[str]]:  # fmt: skip
     """The stream of a role, and what is to be said of topics that were left out."""
-    stream, notes = motor_stream(log, wanted, role, words, names)
+    stream, notes = motor_stream(log, wanted, role, words, names, session.command_unit == FORCE)
     if stream is not None and stream.unnamed is not None and session.tendons is None and session.motors is None:
         problem = f"found {stream.unnamed} numbers without names"
         raise InputError(
@@ -134,12 +134,13 @@ def _joints(
 
 def motor_stream(
     log: Log, wanted: str | list[str] | dict[str, str] | None, role: str, words: tuple[str, ...],
-    names: set[str] | None,
+    names: set[str] | None, forces: bool = False,
 ) -> tuple[JointStream | None, list[str]]:  # fmt: skip
     """The topics of a role as one stream, and what is to be said of those that were left out. Several topics hold a
     motor each.
 
     Args: names: of the motors, where they are known; of topics that nobody named those that share none are left out.
+        forces: as of `joint_stream`.
     """
     if wanted == NONE:
         return None, []
@@ -156,7 +157,8 @@ def motor_stream(
     for motor, topic in topics.items():
         if topic is None:
             continue
-        stream = _understood(f"{log.path}: {topic.name}", joint_stream, topic, motor if len(topics) > 1 else None)
+        only = motor if len(topics) > 1 else None
+        stream = _understood(f"{log.path}: {topic.name}", joint_stream, topic, only, forces)
         if wanted is None and names and stream.unnamed is None and stream.names and not names & set(stream.names):
             others = ", ".join(stream.names[:3]) + (", …" if len(stream.names) > 3 else "")
             notes.append(f"{topic.name} left out as {role} topic: found {others}, none of {', '.join(sorted(names))}")

@@ -30,8 +30,9 @@ class TrialRecording(PlannedTrial):
     """A trial of T frames, S markers and K tendons.
 
     time: (T,) s from the first frame. positions (T, S, 3) m, quaternions (T, S, 4) wxyz or None: of the markers.
-    commands: m of pull, or N of tension, as `command_unit` says; tendon_positions: m of pull; one column a tendon. What
-    else a frame, a clock or a gap means is told by the class that derives from this one.
+    commands: m of pull, or N of tension, as `command_unit` says; tendon_positions: m of pull, or the commands again
+    where nothing was measured; one column a tendon. What else a frame, a clock or a gap means is told by the class that
+    derives from this one.
     """
 
     time: np.ndarray

@@ -8,7 +8,7 @@ the arm.
 import sys
 from pathlib import Path
 
-from trunkline.errors import InputError, in_one_line
+from trunkline.errors import in_one_line
 from trunkline.model.arm_model import ArmModel
 from trunkline.model.statics.chain import read_chain
 from trunkline.program import command_parser
@@ -31,9 +31,6 @@ def main(arguments: list[str] | None = None) -> int:
     args = parser.parse_args(arguments)
     model = read_drawing(args.arm, Path("."))
     if model.nu or len(ArmModel(model).cables):
-        for cable in ArmModel(model).cables:  # each tendon has its motor, else nobody knows what they are sent
-            if not (model.actuator_trnid[:, 0] == cable).any():
-                raise InputError(f"model: tendon {model.tendon(cable).name!r}: found 0 actuators, expected 1")
         read_chain(model)  # what the statics cannot solve is told here
     session = None if args.session is None else read_session(args.session)
     for lines in (unit_lines(model), tendon_lines(model), marker_lines(model)):

@@ -147,7 +147,7 @@ def doubt_lines(model: mujoco.MjModel, session: Session | None) -> list[str]:
         lines.append("one tracked point does not tell in which shape the arm is, nor exchanged names of tendons")
     if not weightless and not kinds & {"static_tilt", "static_pull"} and model.nu:
         lines.append("nothing is tilted or held: stiffness comes with the masses and the motors' gain, as a ratio")
-    if model.nu and session.command_unit != arm.command_unit:
+    if model.nu and (session.motors or session.tendons) and session.command_unit != arm.command_unit:
         lines.append(f"session.yaml: motors: commands are in {session.command_unit}, the arm takes {arm.command_unit}")
     if arm.commands == "length" and arm.rate_limit == 0 and arm.backlash == 0 and model.nu and "motion" in kinds:
         lines.append("winches are taken to wind as they are told: `rate_limit` and `backlash` of `actuation` are 0")

@@ -59,7 +59,7 @@ def _run(args: argparse.Namespace) -> int:
             recording.add(track)
         recording.finish()
     beside = args.out.with_suffix(LAYOUT)
-    beside.write_text(json.dumps(layout(tendons), indent=2) + "\n", encoding="utf-8")
+    beside.write_text(json.dumps(layout(tendons, trials[0].command_unit), indent=2) + "\n", encoding="utf-8")
     print(f"export: {args.out}: {args.out.stat().st_size / 1e6:.1f} MB; in Foxglove with the layout {beside.name}")
     return 0
 

@@ -11,11 +11,12 @@ from mcap_protobuf.schema import build_file_descriptor_set
 
 from trunkline.model.arm_model import ArmModel
 from trunkline.program import COMMAND
+from trunkline.recordings.trials.recording import FORCE, LENGTH
 from trunkline.tools.export.messages import BASE, cloud, identifier, line, numbers_type, scene, transforms
 from trunkline.tools.export.tracks import Track
 
 MEASURED, SIMULATED = "measured", "simulated"
-TRIAL, ERRORS, COMMANDS, PULLS = "/trial", "/errors_mm", "/commands_mm", "/pulls_mm"
+TRIAL, ERRORS, COMMANDS, PULLS, TENSIONS = "/trial", "/errors_mm", "/commands_mm", "/pulls_mm", "/commands_N"
 MEAN, TIP = "mean", "tip"
 COLORS = {MEASURED: Color(r=0.13, g=0.13, b=0.13, a=1.0), SIMULATED: Color(r=0.16, g=0.44, b=0.59, a=0.6)}
 BRIGHT = {MEASURED: Color(r=0.9, g=0.62, b=0.0, a=1.0), SIMULATED: Color(r=0.34, g=0.71, b=0.91, a=1.0)}  # on black
@@ -68,8 +69,11 @@ class Recording:
             self._write(f"/{name}/tf", transforms(self._stamp, name, self._markers, places[frame], turned))
         of_markers = dict(zip(map(identifier, self._markers), errors, strict=True))
         self._write(ERRORS, self._errors(**{MEAN: _mean(errors), TIP: errors[self._tip]} | of_markers))
-        for topic, values in ((COMMANDS, track.commands[frame]), (PULLS, track.pulls[frame])):
-            pulls = dict(zip(map(identifier, track.trial.tendons), 1e3 * values, strict=True))
+        moved = {COMMANDS: 1e3 * track.commands[frame], PULLS: 1e3 * track.pulls[frame]}
+        if track.trial.command_unit == FORCE:
+            moved = {TENSIONS: track.commands[frame]}
+        for topic, values in moved.items():
+            pulls = dict(zip(map(identifier, track.trial.tendons), values, strict=True))
             if pulls:
                 self._write(topic, self._pulls(**dict.fromkeys(self._tendons, np.nan) | pulls))
 
@@ -94,16 +98,18 @@ class Recording:
         self._writer.add_message(self._channels[topic], self._stamp, message.SerializeToString(), self._stamp)
 
 
-def layout(tendons: list[str]) -> dict:
-    """What Foxglove imports by "Import layout from file": both arms, errors over time, and pulls if there are any."""
+def layout(tendons: list[str], unit: str = LENGTH) -> dict:
+    """What Foxglove imports by "Import layout from file": both arms, errors over time, and pulls, or tensions, by the
+    commands' `unit`, if there are any."""
     views = {f"/{name}/{what}": {"visible": True} for name in (MEASURED, SIMULATED) for what in ("arm", "tf")}
     camera = {"distance": 1.5, "phi": 75, "thetaOffset": 45, "targetOffset": [0, 0, -0.3], "near": 0.01, "far": 100}
-    series = [(topic, identifier(name)) for name in tendons for topic in (COMMANDS, PULLS)]
+    title, topics = ("Tension, N", (TENSIONS,)) if unit == FORCE else ("Pull, mm", (COMMANDS, PULLS))
+    series = [(topic, identifier(name)) for name in tendons for topic in topics]
     panels = {
         "3D!arm": {"topics": views, "followMode": "follow-none", "followTf": BASE, "cameraState": camera},
         "Plot!errors": _plot("Error, mm", [(ERRORS, MEAN), (ERRORS, TIP)]),
         "RosOut!trials": {"minLogLevel": 1, "topicToRender": TRIAL},
-    } | ({"Plot!pulls": _plot("Pull, mm", series)} if series else {})
+    } | ({"Plot!pulls": _plot(title, series)} if series else {})
     lower = _beside("column", "Plot!pulls", "RosOut!trials", 60) if series else "RosOut!trials"
     whole = _beside("row", "3D!arm", _beside("column", "Plot!errors", lower, 40), 55)
     return {"configById": panels, "globalVariables": {}, "userNodes": {}, "layout": whole}

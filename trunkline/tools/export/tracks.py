@@ -20,7 +20,7 @@ class Track(NamedTuple):
 
     time: s from the first frame. Shape (T,). measured: m, NaN where not seen. Shape (T, S, 3). quaternions: of those,
     wxyz, or None. simulated: the same markers by the model, m; NaN if it does not survive the trial. bodies: all of
-    them by the model, (T, N, 3). commands, pulls: as commanded and as measured, m. Each (T, K).
+    them by the model, (T, N, 3). commands, pulls: as commanded, m or N, and as measured, m. Each (T, K).
     """
 
     trial: Trial
