@@ -378,10 +378,9 @@ def test_which_intervals_of_the_demo_session_hold_the_truth():
     truth = json.loads((ROOT / TRUTH).read_text())
     verdicts = {name: holds(row, expectation(truth, name)) for name, row in identified(ROOT).items()}
     lacks = {"relaxation", "relaxation_time", "relaxation_2", "relaxation_time_2"}  # three branches, the model has two
-    undecided = lacks | {"damping"}  # undetermined, with the model's tolerances
-    assert {name for name, verdict in verdicts.items() if verdict is None} == undecided
+    assert {name for name, verdict in verdicts.items() if verdict is None} == lacks
     assert {name for name, verdict in verdicts.items() if verdict is False} == set()
-    assert len(verdicts) == 15 + len(undecided)
+    assert len(verdicts) == 16 + len(lacks)
 
 
 def test_no_stage_reads_the_truth():

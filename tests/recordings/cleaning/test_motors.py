@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from trunkline.recordings.filtering.filter import filter_raw_trial
 from trunkline.recordings.logs.bag2 import read_recording
 from trunkline.recordings.logs.definitions import JOINT_STATE, KNOWN, RIGID_BODIES
 from trunkline.recordings.logs.joint_stream import joint_stream
-from trunkline.recordings.logs.messages import JOINTS
+from trunkline.recordings.logs.messages import JOINTS, joint_state
 from trunkline.recordings.trials.inventory import recorded_lines
 
 
@@ -371,3 +372,10 @@ def test_forces_are_the_efforts_of_joint_states_where_they_have_any(tmp_path, po
         writer.finish()
     topic = read_recording(tmp_path / "log.mcap", JOINTS.keys()).topics["/sent"]
     np.testing.assert_array_equal(joint_stream(topic, forces=forces).positions, [numbers])
+
+
+def test_a_joint_state_without_efforts_is_read():
+    """JSON may leave an empty list out."""
+    header = SimpleNamespace(stamp=SimpleNamespace(sec=1, nanosec=0))
+    joints = joint_state(SimpleNamespace(header=header, name=["a"], position=[0.1]))
+    assert (joints.positions.tolist(), joints.efforts) == ([0.1], None)

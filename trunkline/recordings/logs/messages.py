@@ -153,7 +153,8 @@ def markers(message) -> DecodedPoses:
 
 @joints("sensor_msgs/JointState")
 def joint_state(message) -> DecodedJoints:
-    positions, efforts = (np.asarray(numbers, dtype=float) for numbers in (message.position, message.effort))
+    positions = np.asarray(message.position, dtype=float)
+    efforts = np.asarray(getattr(message, "effort", []), dtype=float)  # JSON may leave it out
     names = message.name if any(message.name) or not max(positions.shape[-1], efforts.shape[-1]) else None
     return DecodedJoints(moment(message.header.stamp), names, positions, efforts if efforts.shape[-1] else None)
 
