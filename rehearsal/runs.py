@@ -2,10 +2,11 @@
 
 import multiprocessing
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -59,16 +60,22 @@ def wanted(runs: dict[str, int], of_variants: int) -> list[Run]:
     return sorted(plain, key=lambda run: run.seed) + variants
 
 
-def make(runs: list[Run], package: Path, source: RunSource, table: Path, workers: int) -> list[Result]:
-    """Those of `runs` that `table` has not, of this source; then all of `runs` that it has."""
-    made = {run_of(result) for result in source.of(read_results(table))}
+def make(
+    runs: list[Run], package: Path, source: RunSource, table: Path, workers: int, others: Sequence[Path] = ()
+) -> list[Result]:
+    """Those of `runs` that `table` has not, of this source: copied from the tables `others` or made; then all of
+    `runs` that it has."""
+    chosen, made = set(runs), {run_of(result) for result in source.of(read_results(table))}
+    for result in chain.from_iterable(source.of(read_results(other)) for other in others):
+        if run_of(result) in chosen - made:
+            append_result(table, result)
+            made.add(run_of(result))
     missing = [run for run in runs if run not in made]
     for number, (result, seconds) in enumerate(performed(missing, package, workers), start=1):
         append_result(table, replace(result, package=source.package, code=source.code))
         outcome = "success" if result.success else result.cause
         name = f"{result.experiment}, {result.variant}" if result.variant else result.experiment
         print(f"{number} of {len(missing)}: {name} {result.seed}: {outcome}; {seconds:.0f} s of processor", flush=True)
-    chosen = set(runs)
     return [result for result in source.of(read_results(table)) if run_of(result) in chosen]
 
 

@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from rehearsal.experiments.result import LATER, Result, append_result, read_results, share_of, summary
+from rehearsal.experiments.result import LATER, Result, share_of, summary
 from rehearsal.experiments.stated import scores
 from rehearsal.rehearse import OUT
-from rehearsal.runs import Run, make, run_of, source_of, wanted
+from rehearsal.runs import Run, make, source_of, wanted
 from trunkline.ar.preview.package import only_package
 from trunkline.compute.threads import thread_count
 from trunkline.errors import in_one_line
@@ -71,12 +71,8 @@ def main() -> int:
     runs = wanted(RUNS, 0) + [Run("grasp", seed, name) for name in ABLATED for seed in range(RUNS["grasp"])]
     committed = read_yaml(Path("rehearsal/params.yaml")).rehearse.runs.reach
     with recorded("preview_worth"):
-        there = {run_of(result) for result in source.of(read_results(table))}
-        for result in source.of(read_results(OUT / "runs.csv")):
-            if run_of(result) in set(runs) - there:
-                append_result(table, result)
         with redirect_stdout(sys.stderr):  # each run as it ends
-            results = make(runs, package, source, table, thread_count())
+            results = make(runs, package, source, table, thread_count(), [OUT / "runs.csv"])
         reaches = [row for row in results if row.experiment == "reach"]
         new = [row for row in reaches if row.seed >= committed]
         print(coverage_table({"all": reaches, f"those beyond the committed seeds, from {committed} on": new}))

@@ -12,7 +12,7 @@ from matplotlib.image import imread
 
 from rehearsal import __main__ as command
 from rehearsal import runs
-from rehearsal.experiments.result import Result, read_results, summary
+from rehearsal.experiments.result import Result, append_result, read_results, summary
 from rehearsal.report import draw
 from rehearsal.runs import Run, RunSource, make, make_one, source_of, wanted
 from trunkline.ar.preview.package import only_package
@@ -80,6 +80,19 @@ def test_rows_of_another_package_or_code_do_not_count(made, tmp_path, other):
     assert len(made) == 2
     assert (result.package, result.code) == (other.package, other.code)
     assert len(read_results(table)) == 2
+
+
+def test_rows_of_another_table_are_taken_where_code_and_package_are_the_same(made, tmp_path):
+    """Those that are asked for and that the table lacks, and each once."""
+    table, other = tmp_path / "runs.csv", tmp_path / "other.csv"
+    for seed, source in enumerate([SOURCE, SOURCE, replace(SOURCE, package="b"), replace(SOURCE, code="c"), SOURCE]):
+        append_result(other, Result("touch", seed, True, package=source.package, code=source.code, tip_mm=2.0))
+    append_result(table, Result("touch", 0, True, package=SOURCE.package, code=SOURCE.code, tip_mm=1.0))
+    for _ in range(2):
+        results = make(wanted({"touch": 4}, 0), Path("package.tgz"), SOURCE, table, workers=1, others=[other, other])
+    assert [(row.seed, row.tip_mm) for row in results[:2]] == [(0, 1.0), (1, 2.0)]
+    assert [seed for _, seed in made] == [2, 3]
+    assert len(read_results(table)) == 4
 
 
 def test_a_run_that_breaks_off_has_failed(made):
