@@ -4,7 +4,8 @@ Rehearses more than the committed metrics do (rehearsal/params.yaml): 200 reache
 of futures, with the nominal future alone, and confirmed whatever their preview shows. Of the seeds whose first plan
 the operator declines, the last line says how many succeed with that plan confirmed nevertheless.
 
-A row is kept in docs/results/preview_worth.csv when its run ends; stopped, the study goes on from there.
+A row is kept in docs/results/preview_worth.csv when its run ends; stopped, the study goes on from there. Runs of the
+rehearsal (artifacts/rehearse/runs.csv) that are of the same code and package are taken as they are.
 """
 
 import argparse
@@ -15,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
-from rehearsal.experiments.result import LATER, Result, share_of, summary
+from rehearsal.experiments.result import LATER, Result, append_result, read_results, share_of, summary
 from rehearsal.experiments.stated import scores
-from rehearsal.runs import Run, make, source_of, wanted
+from rehearsal.runs import Run, make, run_of, source_of, wanted
 from trunkline.ar.preview.package import only_package
 from trunkline.compute.threads import thread_count
 from trunkline.errors import in_one_line
@@ -26,6 +27,7 @@ from upkeep.rehearsal_table import rehearsal_table
 from upkeep.results import FOLDER, recorded
 
 RUNS = {"reach": 200, "grasp": 34}
+REHEARSED = Path("artifacts/rehearse/runs.csv")
 CONFIRMED = "no_preview"
 ABLATED = ("single", CONFIRMED)  # rehearsal/experiments/ablations.py
 TIMES = dict(zip(LATER, ("at the end", "2 s later", "10 s later"), strict=True))
@@ -69,6 +71,10 @@ def main() -> int:
     runs = wanted(RUNS, 0) + [Run("grasp", seed, name) for name in ABLATED for seed in range(RUNS["grasp"])]
     committed = read_yaml(Path("rehearsal/params.yaml")).rehearse.runs.reach
     with recorded("preview_worth"):
+        there = {run_of(result) for result in source.of(read_results(table))}
+        for result in source.of(read_results(REHEARSED)):
+            if run_of(result) in set(runs) - there:
+                append_result(table, result)
         with redirect_stdout(sys.stderr):  # each run as it ends
             results = make(runs, package, source, table, thread_count())
         reaches = [row for row in results if row.experiment == "reach"]
