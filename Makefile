@@ -36,7 +36,7 @@ small_demo: setup    ## the demo in little under build/, for tests: tests/small_
 test: setup $(TOOLS) browser mono  ## run every test, then lint
 	@status=0; $(MAKE) --no-print-directory small_demo || status=1; \
 	for run in "-m 'not realtime' -n auto --dist loadgroup --max-worker-restart 1" "-m realtime"; do \
-	  echo "python -m pytest $$run"; eval "python -m pytest $$run" || status=1; \
+	  echo "python -m pytest $$run"; eval "python -m pytest --durations 100 --durations-min 2 $$run" || status=1; \
 	done; \
 	ruff check --output-format concise . || status=1; \
 	exit $$status
