@@ -18,6 +18,7 @@ import numpy as np
 
 from rehearsal.experiments.result import LATER, Result, append_result, read_results, share_of, summary
 from rehearsal.experiments.stated import scores
+from rehearsal.rehearse import OUT
 from rehearsal.runs import Run, make, run_of, source_of, wanted
 from trunkline.ar.preview.package import only_package
 from trunkline.compute.threads import thread_count
@@ -27,7 +28,6 @@ from upkeep.rehearsal_table import rehearsal_table
 from upkeep.results import FOLDER, recorded
 
 RUNS = {"reach": 200, "grasp": 34}
-REHEARSED = Path("artifacts/rehearse/runs.csv")
 CONFIRMED = "no_preview"
 ABLATED = ("single", CONFIRMED)  # rehearsal/experiments/ablations.py
 TIMES = dict(zip(LATER, ("at the end", "2 s later", "10 s later"), strict=True))
@@ -72,7 +72,7 @@ def main() -> int:
     committed = read_yaml(Path("rehearsal/params.yaml")).rehearse.runs.reach
     with recorded("preview_worth"):
         there = {run_of(result) for result in source.of(read_results(table))}
-        for result in source.of(read_results(REHEARSED)):
+        for result in source.of(read_results(OUT / "runs.csv")):
             if run_of(result) in set(runs) - there:
                 append_result(table, result)
         with redirect_stdout(sys.stderr):  # each run as it ends
