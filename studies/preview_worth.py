@@ -19,7 +19,7 @@ import numpy as np
 from rehearsal.experiments.result import LATER, Result, append_result, read_results, share_of, summary
 from rehearsal.experiments.stated import scores
 from rehearsal.rehearse import OUT
-from rehearsal.runs import Run, make, run_of, source_of, wanted
+from rehearsal.runs import Run, RunSource, make, run_of, source_of, wanted
 from trunkline.ar.preview.package import only_package
 from trunkline.compute.threads import thread_count
 from trunkline.errors import in_one_line
@@ -63,6 +63,14 @@ def declined_line(grasps: Iterable[Result]) -> str:
     )
 
 
+def take_over(runs: list[Run], rehearsed: Path, source: RunSource, table: Path) -> None:
+    """Append to `table` those of `runs` that it lacks and the table `rehearsed` has, of this source."""
+    missing = set(runs) - {run_of(result) for result in source.of(read_results(table))}
+    for result in source.of(read_results(rehearsed)):
+        if run_of(result) in missing:
+            append_result(table, result)
+
+
 @in_one_line
 def main() -> int:
     argparse.ArgumentParser(prog="studies.preview_worth", description=__doc__).parse_args()
@@ -71,10 +79,7 @@ def main() -> int:
     runs = wanted(RUNS, 0) + [Run("grasp", seed, name) for name in ABLATED for seed in range(RUNS["grasp"])]
     committed = read_yaml(Path("rehearsal/params.yaml")).rehearse.runs.reach
     with recorded("preview_worth"):
-        there = {run_of(result) for result in source.of(read_results(table))}
-        for result in source.of(read_results(OUT / "runs.csv")):
-            if run_of(result) in set(runs) - there:
-                append_result(table, result)
+        take_over(runs, OUT / "runs.csv", source, table)
         with redirect_stdout(sys.stderr):  # each run as it ends
             results = make(runs, package, source, table, thread_count())
         reaches = [row for row in results if row.experiment == "reach"]

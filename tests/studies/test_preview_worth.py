@@ -3,8 +3,9 @@
 import pytest
 
 from rehearsal.experiments.ablations import VARIANTS
-from rehearsal.experiments.result import Result
-from studies.preview_worth import ABLATED, CONFIRMED, coverage_table, declined_line
+from rehearsal.experiments.result import Result, append_result, read_results
+from rehearsal.runs import Run, RunSource
+from studies.preview_worth import ABLATED, CONFIRMED, coverage_table, declined_line, take_over
 
 
 def test_a_tip_counts_within_the_radius_of_its_run_and_at_its_time():
@@ -36,3 +37,14 @@ def test_plans_that_were_declined_are_those_of_runs_with_more_than_one():
 @pytest.mark.parametrize("name", ABLATED)
 def test_what_is_taken_away_is_a_variant_of_a_grasp(name):
     assert name in VARIANTS["grasp"]
+
+
+def test_runs_of_the_rehearsal_are_taken_where_code_and_package_are_the_same(tmp_path):
+    """What the study lacks and asks for, and that once."""
+    rehearsed, table = tmp_path / "runs.csv", tmp_path / "study.csv"
+    for seed, package, code in ((0, "a", "b"), (1, "a", "b"), (2, "other", "b"), (3, "a", "other"), (9, "a", "b")):
+        append_result(rehearsed, Result("reach", seed, True, package=package, code=code, tip_mm=2.0))
+    append_result(table, Result("reach", 0, True, package="a", code="b", tip_mm=1.0))
+    for _ in range(2):
+        take_over([Run("reach", seed) for seed in range(5)], rehearsed, RunSource("a", "b"), table)
+    assert [(row.seed, row.tip_mm) for row in read_results(table)] == [(0, 1.0), (1, 2.0)]
