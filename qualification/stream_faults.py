@@ -96,9 +96,10 @@ class LyingCameras:
             return None
         if not self._switch.value or self._true is None:
             self._true = frame
-        if does == LATE or self._late:
-            self._late.append((time.monotonic() + (DELAY if does == LATE else 0.0), frame))
+        if does == LATE:
+            self._late.append((time.monotonic() + DELAY, frame))
             return self._late.popleft()[1] if self._late[0][0] <= time.monotonic() else None
+        self._late.clear()  # else the queue, as long as before, would keep the stream late for good
         return None if does == SILENT else LIES.get(does, LIES[TRUTH])(frame, self._true)
 
     def close(self) -> None:
