@@ -53,10 +53,12 @@ class Visitors:
 async def refused(guest: Guest) -> str:
     """What it is told, or how it is shown out."""
     with suppress(InputError):
-        await until(lambda: "error" in guest.told or guest.socket.closed, SOON)
+        await until(lambda: "error" in guest.told or guest.socket.closed or guest.task.done(), SOON)
     if "error" in guest.told:
         return guest.told["error"]["reason"]
-    return f"the connection ends, code {guest.socket.close_code}" if guest.socket.closed else "NOTHING"
+    if guest.socket.closed:
+        return f"the connection ends, code {guest.socket.close_code}"
+    return "the connection is cut off" if guest.task.done() else "NOTHING"
 
 
 async def at_door(visitors: Visitors, **headers: str) -> str:
