@@ -20,7 +20,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -36,6 +36,7 @@ ASIDE = ("Digit1", *["ArrowRight"] * 5, "Digit2", *["ArrowRight"] * 5)  # both t
 BACK = ("Digit1", *["ArrowLeft"] * 5, "Digit2", *["ArrowLeft"] * 5)
 PATIENCE, LONGEST = 120.0, 600.0  # s for each of the first steps, and for each task
 PACE, LOOK = 0.2, 0.1  # s between keys, and between looks at the page
+HEARD = 5.0  # s in which targets that were moved are those of the session
 GOAL = 120.0  # s
 MODE = "document.querySelector('#mode').dataset.mode"
 SHOWN = "Boolean(globalThis.trunkline?.loaded && trunkline.frame && trunkline.state)"
@@ -75,17 +76,17 @@ class Visit:
         await page.until(SHOWN, "page shows the robot", PATIENCE)
         self.done("page shows the robot")
         await take_control(page)
-        await press(page, ASIDE)
-        await self.move(page, "reach", INSIDE)
-        await self.move(page, "grasp", f"{INSIDE} && {MARKED}", drags=True)
+        await self.move(page, "reach", INSIDE, ASIDE)
+        await self.move(page, "grasp", f"{INSIDE} && {MARKED}")
         self.holds = bool(await page.value(HELD))
         await press(page, BACK)
-        await self.move(page, "stop", INSIDE, stops=True)
-        await self.move(page, "the same after it", INSIDE)
+        await self.move(page, "stop", INSIDE, BACK, stops=True)
+        await self.move(page, "the same after it", INSIDE, BACK)
 
-    async def move(self, page: Page, task: str, aimed: str, drags: bool = False, stops: bool = False) -> None:
+    async def move(self, page: Page, task: str, aimed: str, keys: tuple[str, ...] = (), stops: bool = False) -> None:
         """Until the robot has arrived, or, if one `stops` it, is stopped. aimed: what is true once a plan can be asked
-        for; until then one `drags` the tip's marker onto the object."""
+        for; until then these `keys` are pressed, also anew where control was lost meanwhile, and targets with it.
+        Without any the tip's marker is dragged onto the object."""
         end, before, moved = time.monotonic() + LONGEST, "", False
         while True:
             if time.monotonic() > end:
@@ -105,7 +106,9 @@ class Visit:
                 await page.until(f"{MODE} === 'stopped'", "stopped", PATIENCE)
                 break
             if mode == "aim" and not await page.value(aimed):
-                await (drag(page) if drags else asyncio.sleep(LOOK))
+                await (press(page, keys) if keys else drag(page))
+                with suppress(InputError):  # the page hears of its targets later
+                    await page.until(aimed, "aimed", HEARD)
             else:
                 await act(page, mode)
             await asyncio.sleep(LOOK)
