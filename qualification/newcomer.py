@@ -36,7 +36,7 @@ ASIDE = ("Digit1", *["ArrowRight"] * 5, "Digit2", *["ArrowRight"] * 5)  # both t
 BACK = ("Digit1", *["ArrowLeft"] * 5, "Digit2", *["ArrowLeft"] * 5)
 PATIENCE, LONGEST = 120.0, 600.0  # s for each of the first steps, and for each task
 PACE, LOOK = 0.2, 0.1  # s between keys, and between looks at the page
-HEARD = 5.0  # s in which targets that were moved are those of the session
+AIM_TIMEOUT = 5.0  # s in which targets that were moved are those of the session
 GOAL = 120.0  # s
 MODE = "document.querySelector('#mode').dataset.mode"
 SHOWN = "Boolean(globalThis.trunkline?.loaded && trunkline.frame && trunkline.state)"
@@ -108,7 +108,7 @@ class Visit:
             if mode == "aim" and not await page.value(aimed):
                 await (press(page, keys) if keys else drag(page))
                 with suppress(InputError):  # the page hears of its targets later
-                    await page.until(aimed, "aimed", HEARD)
+                    await page.until(aimed, "aimed", AIM_TIMEOUT)
             else:
                 await act(page, mode)
             await asyncio.sleep(LOOK)
