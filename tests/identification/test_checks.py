@@ -246,3 +246,11 @@ def test_a_part_of_the_tendons_is_refused(model, curls):
         check_trials([named], model)
     none = replace(some, tendons=(), commands=np.empty((FRAMES, 0)), tendon_positions=np.empty((FRAMES, 0)))
     check_trials([none], model)
+
+
+def test_a_trial_in_no_frame_of_which_enough_is_measured_says_nothing_of_tendons(model, static_pulls):
+    """It was an IndexError; the fit of its start refuses it in a line."""
+    unseen = replace(static_pulls[0], measured=np.zeros_like(static_pulls[0].measured))
+    check_trials([unseen, *static_pulls[1:]], model)
+    with pytest.raises(InputError, match="longer than commanded"):
+        check_trials([unseen, with_columns(static_pulls[1], [1, 0, 2])], model)

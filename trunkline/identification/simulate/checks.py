@@ -113,8 +113,9 @@ def check_lengths(trials: list[Trial], model: mujoco.MjModel) -> None:
     tendons, its own momentum. By how much each would be stretched in all is compared with what is left if names are
     exchanged in the best way; tendons that all pull against each other leave the same with any names. Where two are let
     out by nearly the same, guide holes that are askew look like an exchange too: what is not clear in a trial must not
-    be refuted by the others.
+    be refuted by the others. Nothing is known of trials in no frame of which enough is measured.
     """
+    trials = [trial for trial in trials if len(_seen_frames(trial))]
     stretches = [_stretch(trial, model) for trial in trials]
     for trial, (stretch, mirrored, deepest) in zip(trials, stretches, strict=True):
         exchange = linear_sum_assignment(stretch)
@@ -134,13 +135,18 @@ def check_lengths(trials: list[Trial], model: mujoco.MjModel) -> None:
         )
 
 
+def _seen_frames(trial: Trial) -> np.ndarray:
+    """Frames in which enough markers are measured for a pose."""
+    return np.flatnonzero(trial.measured.mean(axis=1) >= MEASURED_SHARE)
+
+
 def _stretch(trial: Trial, model: mujoco.MjModel) -> tuple[np.ndarray, float, float]:
     """By how much each path is longer than each tendon's command lets it be, m (K commands, K paths), in the mean over
     frames; of all paths, if commands had the other sign; and the deepest pull, in the mean too.
 
     The model's tendons are threaded through poses that were measured.
     """
-    measured = np.flatnonzero(trial.measured.mean(axis=1) >= MEASURED_SHARE)
+    measured = _seen_frames(trial)
     frames = measured[:: max(len(measured) // PLACES, 1)]
     tendons = [model.tendon(name).id for name in trial.tendons]
     shorter = np.array([model.tendon_length0 - _path_lengths(trial, model, frame) for frame in frames])[:, tendons]

@@ -39,12 +39,19 @@ def usual_interval(time: np.ndarray) -> float:
 
 def is_uneven(time: np.ndarray) -> bool:
     """Whether frames at times (T,) s, in order, come almost at once now and then, as no camera takes them."""
-    if len(time) < FEWEST:
-        return False
     steps, interval = np.diff(time), usual_interval(time)
+    if len(time) < FEWEST or _keeps_rates(steps):
+        return False
     jitter = 1.4826 * np.median(np.abs(steps - np.median(steps)))
     short = np.mean(steps < SHORT * interval) > OFTEN
     return bool(short or steps.min() < COINCIDE * interval or jitter > JITTER * interval)
+
+
+def _keeps_rates(steps: np.ndarray) -> bool:
+    """Whether frames come at a rate for `FEW` steps (T,), s, at least before they come at another: so does a log that
+    is thinned out while nothing moves. Frames that were late come after a single long step."""
+    changes = np.flatnonzero(np.abs(np.diff(steps)) > JITTER * np.maximum(steps[1:], steps[:-1])) + 1
+    return bool(np.diff(changes, prepend=0, append=len(steps)).min() >= FEW)
 
 
 def even_times(time: np.ndarray, frames: np.ndarray | None) -> EvenTimes | None:
