@@ -456,7 +456,7 @@ class Page {
     const phase = this.phases.findLast(([, since]) => since <= this.begins + playing.at)?.[0];
     const text = `${playing.at.toFixed(1)} of ${playing.duration.toFixed(1)} s${phase && !this.recording ? `, ${phase}` : ""}`;
     if (find("played").textContent !== text) find("played").textContent = text;
-    const caption = this.recording ? "A recording." : [predictionText(this.prediction), correctionText(this.planned)].filter(Boolean).join(" ");
+    const caption = this.recording ? "A recording." : [predictionText(this.prediction), correctionText(this.planned, this.measured.message)].filter(Boolean).join(" ");
     find("foreseen").toggleAttribute("data-doubtful", !this.recording && isDoubtful(this.prediction));
     if (find("foreseen").textContent !== caption) find("foreseen").textContent = caption;
   }

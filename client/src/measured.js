@@ -94,11 +94,12 @@ function heldText({ from_preview: off, radius }) {
   return `, ${mm(off)} mm from its preview’s end, ${off <= radius ? "within" : off <= FAR * radius ? "beyond" : "far beyond"} the ${mm(radius)} mm stated`;
 }
 
-/** By how much a plan may correct itself, as the message `preview` says; why not, where it was asked to; else "". */
-export function correctionText(preview) {
+/** By how much a plan may correct itself, as the message `preview` says, and whether `cameras` are relied on as yet; why
+ * not, where it was asked to; else "". */
+export function correctionText(preview, cameras) {
   if (!preview) return "";
   const { correction, uncorrected } = preview, mm = (metres) => `${+(1000 * metres).toFixed(1)} mm`;
   if (!correction) return uncorrected ? `It will not correct itself: ${uncorrected}.` : "";
   const { steps, longest, astray } = correction;
-  return `You confirm as well that it corrects itself by the cameras once it has arrived, while the grip is held: by ${steps} steps at most, each of up to ${mm(longest)} of cable, ${mm(steps * longest)} in all, the tip within ${mm(astray)} of its target.`;
+  return `You confirm as well that it corrects itself by the cameras once it has arrived, while the grip is held: by ${steps} steps at most, each of up to ${mm(longest)} of cable, ${mm(steps * longest)} in all, the tip within ${mm(astray)} of its target.${cameras?.fault ? " Cameras are not relied on now: unless they are again by then, it will not." : ""}`;
 }

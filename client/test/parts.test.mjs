@@ -14,7 +14,7 @@ import { matrixOf } from "../src/geoms.js";
 import { Confirming } from "../src/confirming.js";
 import { freeArea } from "../src/views.js";
 import { predictionText, remedy, uiText } from "../src/panel.js";
-import { MeasuredArm, camerasText, colourOf } from "../src/measured.js";
+import { MeasuredArm, camerasText, colourOf, correctionText } from "../src/measured.js";
 import { OFFER, TIP, WRONG, css } from "../src/colours.js";
 
 /** A message `robot` of one row. */
@@ -287,4 +287,11 @@ test("the label at a measured tip, and the arm, have the colour of how far the t
     assert.deepEqual(pen.written, ["7.5 mm", css(colour)]);
     assert.equal(arm.material.color.getHex(), colour);
   }
+});
+
+test("a plan that may correct itself says so only as long as cameras are relied on", () => {
+  const preview = { correction: { steps: 5, longest: 0.005, astray: 0.03 }, uncorrected: "" };
+  assert.match(correctionText(preview, { fault: "" }), /corrects itself .* of up to 5 mm .* within 30 mm of its target\.$/);
+  assert.match(correctionText(preview, { fault: "'tip' is 0.5 m off" }), /Cameras are not relied on now: .* it will not\.$/);
+  assert.equal(correctionText({ correction: null, uncorrected: "it grasps" }, null), "It will not correct itself: it grasps.");
 });
