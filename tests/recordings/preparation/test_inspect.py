@@ -25,7 +25,9 @@ from tests.support.workbench import ROOT
 from trunkline.errors import InputError
 from trunkline.recordings.cleaning.checks import TrialLimits
 from trunkline.recordings.cleaning.loading import load_raw_trials
+from trunkline.recordings.logs.pose_stream import PoseStream
 from trunkline.recordings.preparation.inspect import main
+from trunkline.recordings.preparation.survey import _bodies
 from trunkline.recordings.session.session import read_session
 
 LIMITS = TrialLimits(duration=0.2, coverage=0.3, disorder=0.1, clock_offset=1.0)
@@ -189,6 +191,15 @@ def test_a_unit_that_is_a_guess_is_said_to_be(tmp_path, capsys):
     record(tmp_path, [replace(truth, **far)], instruments())
     assert "unit: cm" in (proposed := inspect(capsys, tmp_path)[1])
     assert "mm for an arm of 40 mm, cm for an arm of 400 mm, inch for an arm of 1.02e+03 mm" in proposed
+
+
+@pytest.mark.parametrize(("lost", "line"), [(False, "; their rate changes; "), (True, "; 2 frames missing in between; ")])
+def test_in_a_log_that_is_thinned_out_no_frame_is_missing(lost, line):
+    times = np.delete(np.arange(64), [20, 40]) * 0.05 if lost else np.cumsum(np.repeat([0.05, 0.267], 32))
+    stamps = (1e9 * times).astype(np.int64)
+    shape = (len(times), 1)
+    poses = PoseStream(stamps, stamps, None, ("tip",), np.ones(shape, bool), np.zeros((*shape, 3)), None)
+    assert line in _bodies(poses)[0]
 
 
 def test_a_damaged_log_is_described_as_such(tmp_path, capsys):

@@ -47,11 +47,22 @@ def is_uneven(time: np.ndarray) -> bool:
     return bool(short or steps.min() < COINCIDE * interval or jitter > JITTER * interval)
 
 
+def changes_rate(time: np.ndarray) -> bool:
+    """Whether frames at times (T,) s, in order, come at a rate and then at another, as in a log that is thinned out while
+    nothing moves: none is missing in between."""
+    steps = np.diff(time)
+    return bool(len(_changes(steps))) and _keeps_rates(steps)
+
+
 def _keeps_rates(steps: np.ndarray) -> bool:
-    """Whether frames come at a rate for `FEW` steps (T,), s, at least before they come at another: so does a log that
-    is thinned out while nothing moves. Frames that were late come after a single long step."""
-    changes = np.flatnonzero(np.abs(np.diff(steps)) > JITTER * np.maximum(steps[1:], steps[:-1])) + 1
-    return bool(np.diff(changes, prepend=0, append=len(steps)).min() >= FEW)
+    """Whether steps (T,), s, are alike for `FEW` at least before they change. Frames that were late come after a single
+    long one."""
+    return bool(np.diff(_changes(steps), prepend=0, append=len(steps)).min() >= FEW)
+
+
+def _changes(steps: np.ndarray) -> np.ndarray:
+    """Which steps differ from the one before."""
+    return np.flatnonzero(np.abs(np.diff(steps)) > JITTER * np.maximum(steps[1:], steps[:-1])) + 1
 
 
 def even_times(time: np.ndarray, frames: np.ndarray | None) -> EvenTimes | None:
