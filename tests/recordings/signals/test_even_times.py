@@ -67,7 +67,9 @@ def test_no_curve_through_samples_that_nearly_coincide():
     assert np.abs(between).max() < 2, "a spline through both goes to 145"
 
 
-@pytest.mark.parametrize(("rates", "frames"), [((20.0, 3.75), (33, 31)), ((120.0, 1.0), (400, 6)), ((3.0, 50.0), (9, 90))])
+@pytest.mark.parametrize(
+    ("rates", "frames"), [((20.0, 3.75), (33, 31)), ((120.0, 1.0), (400, 6)), ((3.0, 50.0), (9, 90))]
+)
 def test_a_log_that_is_thinned_out_while_nothing_moves_is_not_late(rates, frames):
     """A live session's log of a rest was taken for one of 12.6 Hz with 64 frames lost, and stamps that were right were
     moved by up to 1.4 s."""

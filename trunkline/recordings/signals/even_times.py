@@ -48,8 +48,8 @@ def is_uneven(time: np.ndarray) -> bool:
 
 
 def changes_rate(time: np.ndarray) -> bool:
-    """Whether frames at times (T,) s, in order, come at a rate and then at another, as in a log that is thinned out while
-    nothing moves: none is missing in between."""
+    """Whether frames at times (T,) s, in order, come at a rate and then at another, as in a log that is thinned out
+    while nothing moves: none is missing in between."""
     steps = np.diff(time)
     return bool(len(_changes(steps))) and _keeps_rates(steps)
 
