@@ -17,6 +17,7 @@ from rehearsal.animation import animate
 from rehearsal.experiments.bench import bench_of
 from rehearsal.experiments.registry import EXPERIMENTS
 from rehearsal.experiments.result import Result, read_results, summary
+from rehearsal.rehearse import OUT, TABLE
 from rehearsal.report import draw
 from rehearsal.runs import Run, RunSource, make, run_of, source_of, wanted
 from trunkline.ar.preview.package import only_package
@@ -42,11 +43,11 @@ def main() -> int:
     require_checkout(Path("."))
     package = arguments.package or only_package()
     if arguments.animate:
-        animate(bench_of(package), names, arguments.seed, Path("artifacts/rehearse"))
+        animate(bench_of(package), names, arguments.seed, OUT)
         return 0
     runs = wanted({name: arguments.runs for name in names}, arguments.variants)
     source = source_of(package)
-    table, picture = arguments.out / "runs.csv", arguments.out / "rehearsal.png"
+    table, picture = arguments.out / TABLE, arguments.out / "rehearsal.png"
     print(f"table: {table}, a row when a run ends; picture: {picture}, at the end", flush=True)
     results = make_timed(runs, package, source, table, thread_count())
     goals = read_limits(Path("tests/limits.yaml"))["rehearse"]

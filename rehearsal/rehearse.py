@@ -19,7 +19,7 @@ from trunkline.settings import settings
 from upkeep.limits import read_limits
 from upkeep.rehearsal_table import rehearsal_table
 
-OUT = Path("artifacts/rehearse")
+OUT, TABLE = Path("artifacts/rehearse"), "runs.csv"
 
 
 @settings
@@ -38,8 +38,8 @@ class Config:
 def main(config: Config) -> None:
     package = only_package()
     source = source_of(package)
-    results = make(wanted(config.runs, config.of_variants), package, source, OUT / "runs.csv", thread_count())
-    rewrite_results(OUT / "runs.csv", results)
+    results = make(wanted(config.runs, config.of_variants), package, source, OUT / TABLE, thread_count())
+    rewrite_results(OUT / TABLE, results)
     metrics = metrics_of(source, results)
     write_metrics(OUT, metrics)
     draw(results, OUT / "rehearsal.png")

@@ -18,7 +18,7 @@ import numpy as np
 
 from rehearsal.experiments.result import LATER, Result, share_of, summary
 from rehearsal.experiments.stated import scores
-from rehearsal.rehearse import OUT
+from rehearsal.rehearse import OUT, TABLE
 from rehearsal.runs import Run, make, source_of, wanted
 from trunkline.ar.preview.package import only_package
 from trunkline.compute.threads import thread_count
@@ -72,7 +72,7 @@ def main() -> int:
     committed = read_yaml(Path("rehearsal/params.yaml")).rehearse.runs.reach
     with recorded("preview_worth"):
         with redirect_stdout(sys.stderr):  # each run as it ends
-            results = make(runs, package, source, table, thread_count(), [OUT / "runs.csv"])
+            results = make(runs, package, source, table, thread_count(), [OUT / TABLE])
         reaches = [row for row in results if row.experiment == "reach"]
         new = [row for row in reaches if row.seed >= committed]
         print(coverage_table({"all": reaches, f"those beyond the committed seeds, from {committed} on": new}))

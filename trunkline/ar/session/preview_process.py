@@ -27,7 +27,6 @@ from trunkline.compute.threads import thread_count
 from trunkline.errors import InputError
 from trunkline.kinematics.panda.kinematics import mount_pose
 
-NICE = 5  # robot and server go first, but a preview comes on a busy computer too
 PULL = 0.03  # m of the first cable, for a plan that is thrown away
 
 
@@ -124,8 +123,6 @@ def run(
     """The process: until its parent is gone. world: the first plans are likely to be asked for in it."""
     leave_signals_to_parent()
     os.environ["TRUNKLINE_THREADS"] = str(max(thread_count() - 1, 1))  # the rest is the server's and the robot's
-    with suppress(OSError):
-        os.nice(NICE)
     threadpool_limits(1)  # matrices are small; threads that wait for each other cost more than they bring
     end_with_parent()
     package = read_package(path)
