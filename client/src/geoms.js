@@ -4,36 +4,61 @@ import {
   BoxGeometry, BufferAttribute, BufferGeometry, CapsuleGeometry, Color, CylinderGeometry, Matrix4, PlaneGeometry,
   Quaternion, SphereGeometry, Vector3,
 } from "three";
-import { mergeGeometries, toCreasedNormals } from "three/addons/utils/BufferGeometryUtils.js";
+import { mergeGeometries, mergeVertices, toCreasedNormals } from "three/addons/utils/BufferGeometryUtils.js";
 
-const SIDES = 24; // of what is round
+const SIDES = 24, FEW = 12; // of what is round, and where it is drawn with few faces
 const CREASE = (40 * Math.PI) / 180; // faces that meet at less are shaded as one surface
+const SAME = 1e-5; // m between vertices that are drawn as one, and of their normals
 const UPRIGHT = new Matrix4().makeRotationX(Math.PI / 2); // three's cylinders stand along y, MuJoCo's along z
 
 const SHAPES = {
   plane: ([x, y]) => (x > 0 && y > 0 ? new PlaneGeometry(2 * x, 2 * y) : null), // one without end is not drawn
-  sphere: ([radius]) => new SphereGeometry(radius, SIDES, SIDES / 2),
-  ellipsoid: (size) => new SphereGeometry(1, SIDES, SIDES / 2).scale(...size),
-  capsule: ([radius, half]) => new CapsuleGeometry(radius, 2 * half, SIDES / 4, SIDES).applyMatrix4(UPRIGHT),
-  cylinder: ([radius, half]) => new CylinderGeometry(radius, radius, 2 * half, SIDES).applyMatrix4(UPRIGHT),
+  sphere: ([radius], sides) => new SphereGeometry(radius, sides, sides / 2),
+  ellipsoid: (size, sides) => new SphereGeometry(1, sides, sides / 2).scale(...size),
+  capsule: ([radius, half], sides) => new CapsuleGeometry(radius, 2 * half, sides / 4, sides).applyMatrix4(UPRIGHT),
+  cylinder: ([radius, half], sides) => new CylinderGeometry(radius, radius, 2 * half, sides).applyMatrix4(UPRIGHT),
   box: ([x, y, z]) => new BoxGeometry(2 * x, 2 * y, 2 * z),
 };
+
+/** A mesh with the first vertex in each cube of `cell` m, of a small mesh a quarter of it, in place of all others there: a few
+ * of its faces, which are drawn sooner (Rossignac and Borrel 1993). */
+export function clustered({ vertices, faces }, cell) {
+  const firsts = new Map(), kept = [], axes = [0, 1, 2];
+  const longest = Math.max(...axes.map((axis) => spread(vertices.filter((_, index) => index % 3 === axis))));
+  const side = Math.min(cell, longest / 4);
+  const first = (vertex) => {
+    const key = axes.map((axis) => Math.floor(vertices[3 * vertex + axis] / side)).join();
+    if (!firsts.has(key)) firsts.set(key, vertex);
+    return firsts.get(key);
+  };
+  for (let face = 0; face < faces.length; face += 3) {
+    const [a, b, c] = faces.slice(face, face + 3).map(first);
+    if (a !== b && b !== c && c !== a) kept.push(a, b, c);
+  }
+  return { vertices, faces: kept };
+}
+
+function spread(values) {
+  const [least, most] = values.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]);
+  return most - least;
+}
 
 /** A mesh as JSON has it, shaded with creases. */
 export function meshGeometry({ vertices, faces }) {
   const geometry = new BufferGeometry();
   geometry.setAttribute("position", new BufferAttribute(new Float32Array(vertices), 3));
   geometry.setIndex(faces);
-  return toCreasedNormals(geometry, CREASE);
+  return mergeVertices(toCreasedNormals(geometry, CREASE), SAME); // a vertex is moved and lit once, not for each of its faces
 }
 
-/** `{body, shape, size, position, quaternion, rgba, mesh}` merged; null where nothing is drawn. */
-export function mergedGeoms(geoms, meshes) {
+/** `{body, shape, size, position, quaternion, rgba, mesh}` merged; null where nothing is drawn. cell: m, of meshes that are
+ * drawn with few faces; 0 leaves them as they are. */
+export function mergedGeoms(geoms, meshes, cell = 0) {
   const shaded = new Map();
   const parts = [];
   for (const { body, shape, size, position, quaternion, rgba, mesh } of geoms) {
-    if (shape === "mesh" && !shaded.has(mesh)) shaded.set(mesh, meshGeometry(meshes[mesh]));
-    const geometry = shape === "mesh" ? shaded.get(mesh).clone() : SHAPES[shape]?.(size)?.toNonIndexed();
+    if (shape === "mesh" && !shaded.has(mesh)) shaded.set(mesh, meshGeometry(cell ? clustered(meshes[mesh], cell) : meshes[mesh]));
+    const geometry = shape === "mesh" ? shaded.get(mesh).clone() : SHAPES[shape]?.(size, cell ? FEW : SIDES);
     if (!geometry) continue;
     geometry.applyMatrix4(matrixOf(position, quaternion));
     geometry.deleteAttribute("uv");

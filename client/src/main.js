@@ -24,7 +24,7 @@ const TOKEN_KEY = "trunkline.token"; // of this tab, so that a reload need not p
 const RIGID_HAND = "left"; // of the core, `core.rigid_hand`
 const INPUT_RATE = 72; // Hz
 const WIDE = 1200; // pixels of a page on which the keys do not cover the robot
-const COARSE_KEY = "trunkline.coarse"; // of this tab too: drawing was slow, so the next page begins without smooth edges
+const COARSE_KEY = "trunkline.coarse"; // of this tab too: drawing was slow, so the next page begins with what is drawn soonest
 const LATELY = 3; // s for which an event counts as a cause of lost control
 const STANDS = 6; // s for which a line about what was just done stands at most
 const STILL = 0.3; // s without a grip, after which the core's targets are taken over
@@ -32,7 +32,8 @@ const OVER = new Set(["hold", "aim", "follow", "stopped"]); // modes in which no
 const SHOWN_IN = new Set(["preview", "ready", "delay"]);
 const BUSY = new Set(["plan", ...SHOWN_IN, "execute", "follow"]); // modes whose end has a reason to show
 // s that two pictures may take before some are left out, how much longer one then stays, and s that count at most
-const SLOW = 0.06, REST = 2, MOST = 0.08; // together less than the 0.25 s in which who moves the robot has to draw it
+const SLOW = 0.06, REST = 1, MOST = 0.08; // together less than the 0.25 s in which who moves the robot has to draw it
+const LONGEST_STEP = 0.25; // s of a preview between two pictures at most: what is drawn slowly is played slowly, so that all is seen
 const DESKTOP = { position: new Vector3(), quaternion: new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), -Math.PI / 2) };
 
 const find = (id) => document.getElementById(id);
@@ -44,7 +45,7 @@ class Page {
   constructor() {
     const antialias = !isSoftware() && !sessionStorage.getItem(COARSE_KEY);
     this.renderer = new WebGLRenderer({ canvas: find("view"), antialias, alpha: true });
-    this.quality = new Quality(() => this.redraw(), devicePixelRatio);
+    this.quality = new Quality(() => this.redraw(), devicePixelRatio, !antialias);
     this.stopwatch = new Stopwatch(this.renderer.getContext(), clock, (seconds) => this.quality.took(seconds, clock()));
     this.renderer.outputColorSpace = SRGBColorSpace;
     this.renderer.xr.enabled = true;
@@ -74,7 +75,7 @@ class Page {
     this.connect();
     this.buttons();
     this.stand(DESKTOP);
-    this.resize();
+    this.redraw();
     addEventListener("resize", () => this.resize());
     document.addEventListener("visibilitychange", () => (this.hiddenAt = clock()));
     const panels = new ResizeObserver(() => this.resize());
@@ -365,7 +366,7 @@ class Page {
   }
 
   draw(frame) {
-    const now = clock(), dt = Math.min(now - this.before, 0.1);
+    const now = clock(), dt = Math.min(now - this.before, LONGEST_STEP);
     const immersed = Boolean(frame && this.immersive.session && this.immersive.space);
     if (!immersed && now - this.before < REST * this.took) return; // sending and receiving need the processor too
     this.before = now;
@@ -374,6 +375,7 @@ class Page {
     this.mark(this.hands, immersed);
     this.showStatus(immersed, dt);
     if (!immersed) this.orbit.update();
+    this.drawn.coarsen(!immersed && this.quality.isCoarse);
     this.drawn.scene.background = immersed ? null : this.ground;
     this.renderer.render(this.drawn.scene, this.camera);
     this.acknowledge();
@@ -484,7 +486,7 @@ class Page {
     this.drawn.fade(stale);
     const device = immersed ? "controllers" : this.desktop.touches ? "touch" : "keys";
     const pressed = immersed ? HANDS.some((side) => this.hands[side].grip || this.hands[side].trigger) : this.desktop.isPressed;
-    const status = uiText({ state, lease, id: wire?.id ?? "", age: this.rounded(age), up: Boolean(wire?.up && wire.id), reason, ended: this.ended, stale, device, pressed });
+    const status = uiText({ state, lease, id: wire?.id ?? "", age: this.rounded(age), up: Boolean(wire?.up && wire.id), reason, ended: this.ended, stale, device, pressed, awaits: Boolean(this.playing?.shownToEnd && !this.prediction) });
     this.addNotices(status, device);
     this.measured.update(clock());
     const cameras = camerasText(this.measured.message);

@@ -19,9 +19,9 @@ const REMEDIES = { "token: wrong": "This address is not of the session that runs
 /** What to do about the `reason` for which the server has ended a connection. */
 export const remedy = (reason) => (reason in REMEDIES ? `${REMEDIES[reason]} (${reason}).` : reason);
 
-/** The status of `page` in words: `mode`, `title`, `next`, `notice`, whether the robot has `arrived`, and facts by name. `ended`: it will not connect again by itself. `device`: as in `ofDevice`; `pressed`: whether a key, the mouse, a grip or a trigger is. */
+/** The status of `page` in words: `mode`, `title`, `next`, `notice`, whether the robot has `arrived`, and facts by name. `ended`: it will not connect again by itself. `device`: as in `ofDevice`; `pressed`: whether a key, the mouse, a grip or a trigger is. `awaits`: its preview has been shown to its end, and what it foresees is not there. */
 export function uiText(page) {
-  const { state, lease, id, age, up, reason, ended, stale, device = "keys", pressed = false } = page;
+  const { state, lease, id, age, up, reason, ended, stale, device = "keys", pressed = false, awaits = false } = page;
   const immersed = device === "controllers";
   const mode = !up ? (reason === null ? "connecting" : "lost") : (state?.mode ?? "connecting");
   const controls = lease?.holder === id && id !== "";
@@ -38,6 +38,7 @@ export function uiText(page) {
   const action = (immersed ? state?.next : state?.keys) ?? "";
   const instruction = controls && mode === "hold" ? whileHolding(pressed, device) : ofDevice(action, device);
   let next = controls || !lease?.holder ? sentence(instruction) : "You watch. Ask for control to aim.";
+  if (controls && mode === "preview" && awaits) next = "Wait: how sure the preview is, is still being computed.";
   if (!up) next = reason === null ? "Waiting for the server." : `The connection is lost${reason ? `: ${reason}` : ""}. Trying again.`;
   if (!up && ended) next = `The server has ended the connection: ${reason}.`;
   return { mode, title, next, notice: ofDevice((up && state?.notice) || "", device), arrived, facts };

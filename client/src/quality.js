@@ -1,6 +1,7 @@
 // How well the page draws: less well where a picture takes long, so that input never waits for drawing.
 
 const SLOW = 0.06; // s a picture, above which quality is lowered
+const HOPELESS = 0.24; // s, from which on all is lowered at once
 const LIGHT = 0.012; // s, below which it may rise again
 const LOOKS = 5; // pictures whose median counts
 const SETTLES = 1; // s after a change before the next
@@ -8,17 +9,19 @@ const CALM = 10; // s of light pictures before quality rises; it doubles with ea
 const SMALL = 400_000, READABLE = 0.7; // pixels of a window, and how coarse it becomes at most
 const LATE = 0.1; // s between inputs at which they suffer
 
-/** From best to least: pixels drawn for each of the page's, and whether the reach may be shown. */
+/** From best to least: pixels drawn for each of the page's, whether the reach may be shown, and whether robots have few faces. */
 export const LEVELS = [
-  { ratio: 2, reach: true }, { ratio: 1, reach: true }, { ratio: 0.7, reach: true }, { ratio: 0.7, reach: false }, { ratio: 0.5, reach: false },
+  { ratio: 2, reach: true }, { ratio: 1, reach: true }, { ratio: 0.7, reach: true }, { ratio: 0.7, reach: false }, { ratio: 0.5, reach: false, coarse: true },
 ];
 
 export class Quality {
-  /** `apply(level)` is called on each change. `finest`: pixels of the screen for each of the page's. */
-  constructor(apply, finest) {
+  /** `apply(level)` is called on each change. `finest`: pixels of the screen for each of the page's. `isWeak`: drawing is likely
+   * to be slow, so it begins with the least, and control is not lost before that is known. */
+  constructor(apply, finest, isWeak = false) {
     this.apply = apply;
     this.finest = finest;
-    this.at = this.best = LEVELS.findLastIndex(({ ratio }, index) => index === 0 || ratio >= finest);
+    this.best = LEVELS.findLastIndex(({ ratio }, index) => index === 0 || ratio >= finest);
+    this.at = isWeak ? LEVELS.length - 1 : this.best;
     this.recent = [];
     this.seconds = 0; // median of late
     this.since = 0; // s of the page, of the last change
@@ -35,6 +38,10 @@ export class Quality {
     return LEVELS[this.at].reach;
   }
 
+  get isCoarse() {
+    return Boolean(LEVELS[this.at].coarse);
+  }
+
   get isSlow() {
     return this.seconds > SLOW;
   }
@@ -49,7 +56,7 @@ export class Quality {
     if (now - this.since < SETTLES) return;
     if (this.isSlow && this.at + 1 < LEVELS.length) {
       this.calm *= 2;
-      this.change(this.at + 1, now);
+      this.change(this.seconds > HOPELESS ? LEVELS.length - 1 : this.at + 1, now);
     } else if (this.lightSince !== null && now - this.lightSince > this.calm && this.at > this.best) this.change(this.at - 1, now);
   }
 

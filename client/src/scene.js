@@ -10,6 +10,7 @@ import { mergedGeoms } from "./geoms.js";
 import { STRIDE } from "./wire.js";
 
 const UNIT_SCALE = new Vector3(1, 1, 1);
+const CELL = 0.035; // m, of meshes that are drawn with few faces
 const WIDEST = 4; // m, of an obstacle that is drawn; the floor is wider
 const OBJECT = "object"; // the body of the object, where the model has one
 const FADED = 0.35; // of a live robot without new poses
@@ -30,6 +31,7 @@ export class RobotScene {
     this.scene.add(sun);
     this.ground("dark");
     this.reachShown = true;
+    this.isCoarse = false;
   }
 
   /** The floor's grid for a "dark" or a "light" ground. */
@@ -49,8 +51,8 @@ export class RobotScene {
     for (const old of [this.live, this.ghost, this.veil, this.still, this.reach, this.tipReach]) old?.removeFromParent();
     this.count = bodies.length;
     this.bodies = bodies;
-    const moving = mergedGeoms(geoms.filter(({ body }) => body >= 0), meshes);
-    this.still = this.reach = this.tipReach = null;
+    const bodily = geoms.filter(({ body }) => body >= 0), moving = mergedGeoms(bodily, meshes);
+    this.still = this.reach = this.tipReach = this.shapes = null;
     const still = mergedGeoms(geoms.filter(({ body, size }) => body < 0 && size[0] < WIDEST / 2), meshes); // not the floor
     if (moving) {
       this.live = skinned(moving, new MeshLambertMaterial({ vertexColors: true }), bodies.length);
@@ -62,6 +64,8 @@ export class RobotScene {
       this.veil.bindMode = "detached";
       this.veil.bind(this.ghost.skeleton, this.ghost.bindMatrix);
       this.veil.frustumCulled = false;
+      this.shapes = { fine: moving, coarse: mergedGeoms(bodily, meshes, CELL) };
+      this.isCoarse = false;
       [this.live.renderOrder, this.veil.renderOrder, this.ghost.renderOrder] = [0, 1, 2];
       this.ghost.visible = this.veil.visible = this.live.visible = false;
       this.base.add(this.live, this.veil, this.ghost);
@@ -77,6 +81,13 @@ export class RobotScene {
     }
     this.showReach(this.reachShown);
     if (this.world) this.showWorld(this.world);
+  }
+
+  /** Robots with few faces, the preview's without what hides its own far side; or as they are. */
+  coarsen(isCoarse) {
+    if (isCoarse === this.isCoarse || !this.shapes) return;
+    this.isCoarse = isCoarse;
+    for (const robot of [this.live, this.veil, this.ghost]) robot.geometry = this.shapes[isCoarse ? "coarse" : "fine"];
   }
 
   /** Draws by `draw` what is hidden or not there yet as well: to compile it later would take longer than an input may. */
@@ -109,7 +120,8 @@ export class RobotScene {
   /** The preview's robot by the poses from number `start` of `rows` on; null hides it. */
   pretend(rows, start = 0) {
     if (!this.ghost) return;
-    this.ghost.visible = this.veil.visible = rows !== null;
+    this.ghost.visible = rows !== null;
+    this.veil.visible = this.ghost.visible && !this.isCoarse;
     if (rows) setPoses(this.ghost, rows, start);
   }
 

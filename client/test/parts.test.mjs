@@ -10,7 +10,7 @@ import { Group, Ray, Vector3 } from "three";
 import { axisOf, onAxis, objectAt } from "../src/handles.js";
 import { doubtQuestion, isDoubtful, lasts, ofDevice, success, whyLost, whyNothing } from "../src/hints.js";
 import { LEVELS, Quality } from "../src/quality.js";
-import { matrixOf } from "../src/geoms.js";
+import { clustered, matrixOf } from "../src/geoms.js";
 import { Confirming } from "../src/confirming.js";
 import { freeArea } from "../src/views.js";
 import { predictionText, remedy, uiText } from "../src/panel.js";
@@ -93,6 +93,13 @@ test("a robot that has arrived is shown as arrived, until the next plan is asked
   for (const [mode, does] of [["aim", "idle"], ["execute", "running"], ["plan", "done"], ["ready", "done"]]) assert.equal(robot(mode, does), "seen 20 ms ago");
 });
 
+test("a preview that has been shown waits for what it foresees, and says so", () => {
+  const page = { state: { mode: "preview", keys: "watch the preview to its end" }, lease: { holder: "a", clients: [] }, id: "a", up: true, reason: null, age: null };
+  assert.equal(uiText(page).next, "Watch the preview to its end.");
+  assert.match(uiText({ ...page, awaits: true }).next, /^Wait: how sure/);
+  assert.doesNotMatch(uiText({ ...page, awaits: true, state: { mode: "ready" } }).next, /^Wait/);
+});
+
 test("a wrong token comes with a remedy, any other reason as it is", () => {
   assert.match(remedy("token: wrong"), /Open the address anew that the session has printed/);
   assert.equal(remedy("version: found 1"), "version: found 1");
@@ -136,6 +143,20 @@ test("slow pictures lower the quality step by step, the reach before all is coar
   pictures(quality, 0.005, now, now + 1000);
   assert.equal(quality.at, 0);
   assert.equal(quality.hint(true), "");
+});
+
+test("where drawing is likely to be slow, or far too slow, all is lowered at once", () => {
+  assert.equal(new Quality(() => {}, 1, true).at, LEVELS.length - 1);
+  const applied = [], quality = new Quality((level) => applied.push(level), 1);
+  pictures(quality, 0.3, 0, 3);
+  assert.deepEqual(applied, [LEVELS.at(-1)]);
+});
+
+test("a mesh in cells keeps what spans them, each corner once", () => {
+  const vertices = [0, 0, 0, 0.001, 0, 0, 1, 0, 0, 1.001, 0, 0, 0, 1, 0], faces = [0, 2, 4, 1, 3, 4, 0, 1, 4, 2, 3, 4];
+  assert.deepEqual(clustered({ vertices, faces }, 0.1), { vertices, faces: [0, 2, 4, 0, 2, 4] });
+  assert.deepEqual(clustered({ vertices, faces }, 1e-4).faces, faces);
+  assert.equal(clustered({ vertices, faces }, 10).faces.length, 9, "small as it is, it does not vanish");
 });
 
 test("inputs that come late lower the quality too, and a screen of one pixel a pixel begins at the level that shows it", () => {

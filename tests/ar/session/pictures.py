@@ -150,7 +150,7 @@ async def arrive(camera: Camera) -> None:
     there = "Boolean(globalThis.trunkline?.loaded && trunkline.frame && trunkline.state)"
     await camera.until(there, "the page's robot")
     await page.value(f"trunkline.camera.position.set(...{list(EYE)}); trunkline.orbit.target.set(...{list(AT)})")
-    await page.value("trunkline.quality.isFixed = true")
+    await page.value("trunkline.quality.change(trunkline.quality.best, 0), trunkline.quality.isFixed = true")
     await camera.until("!document.querySelector('#control').disabled", "the page's clock")
     await camera.drawn()
 
