@@ -13,6 +13,7 @@ export class Playback {
     this.played = 0; // s, as far as it has been shown
     this.shownToEnd = false; 
     this.paused = false; // by the user's hand
+    this.begun = false; // its first frame has been shown
     this.rest = 0; // s at its end
   }
 
@@ -43,7 +44,8 @@ export class Playback {
       if (this.rest > 1) this.at = 0; // again, after a second at its end
       return false;
     }
-    this.at = Math.min(this.at + dt, this.available);
+    this.at = Math.min(this.at + (this.begun ? dt : 0), this.available); // else its end would come sooner than it lasts
+    this.begun = true;
     this.played = Math.max(this.played, this.at);
     if (!this.whole || this.at < this.available) return false;
     this.rest = 0;

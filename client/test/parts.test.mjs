@@ -63,6 +63,8 @@ test("a preview plays while it comes in, ends once, and cannot be leapt through"
   assert.equal(playback.advance(0.5), false);
   playback.add(0, new Float32Array([0, 1, 2]), false);
   assert.equal(playback.advance(0.5), false);
+  assert.equal(playback.at, 0, "what passed before its first picture is no part of it");
+  assert.equal(playback.advance(0.5), false);
   assert.ok(Math.abs(playback.at - 0.2) < 1e-9, "it waits for what is not there");
   playback.add(3, new Float32Array([3, 4, 5, 6, 7, 8, 9, 10]), true);
   playback.pauseAt(1);
