@@ -23,7 +23,7 @@ const SHAPES = {
 /** A mesh with the first vertex in each cube of `cell` m, of a small mesh a quarter of it, in place of all others there: a few
  * of its faces, which are drawn sooner (Rossignac and Borrel 1993). */
 export function clustered({ vertices, faces }, cell) {
-  const firsts = new Map(), kept = [], axes = [0, 1, 2];
+  const firsts = new Map(), corners = [], axes = [0, 1, 2];
   const longest = Math.max(...axes.map((axis) => spread(vertices.filter((_, index) => index % 3 === axis))));
   const side = Math.min(cell, longest / 4);
   const first = (vertex) => {
@@ -33,9 +33,9 @@ export function clustered({ vertices, faces }, cell) {
   };
   for (let face = 0; face < faces.length; face += 3) {
     const [a, b, c] = faces.slice(face, face + 3).map(first);
-    if (a !== b && b !== c && c !== a) kept.push(a, b, c);
+    if (a !== b && b !== c && c !== a) corners.push(a, b, c);
   }
-  return { vertices, faces: kept };
+  return { vertices, faces: corners };
 }
 
 function spread(values) {
