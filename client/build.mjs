@@ -1,7 +1,7 @@
 // Builds the page of live sessions, one script, one HTML file and an icon, and what a certificate's page has inside, a
 // script and a style sheet. They are committed, so that users need no Node.
 //
-//   node build.mjs            writes trunkline/ar/session/page/ and trunkline/report/certificate/page/
+//   node build.mjs            writes trunkline/ar/page/ and trunkline/report/certificate/page/
 //   node build.mjs --check    compares it with what is there; ends with 1 where a byte differs
 //
 // The same sources give the same bytes: versions are those of package-lock.json, and nothing of the machine goes in.
@@ -35,9 +35,9 @@ async function bundled(entry) {
 /** What is built, bytes by path. */
 async function built() {
   return {
-    [page("ar/session", "app.js")]: await bundled("src/main.js"),
-    [page("ar/session", "index.html")]: readFileSync(join(here, "src", "index.html")),
-    [page("ar/session", "icon.svg")]: readFileSync(join(here, "src", "icon.svg")),
+    [page("ar", "app.js")]: await bundled("src/main.js"),
+    [page("ar", "index.html")]: readFileSync(join(here, "src", "index.html")),
+    [page("ar", "icon.svg")]: readFileSync(join(here, "src", "icon.svg")),
     [page("report/certificate", "viewer.js")]: await bundled("src/certificate/viewer.js"),
     [page("report/certificate", "page.css")]: readFileSync(join(here, "src", "certificate", "page.css")),
   };

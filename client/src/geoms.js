@@ -1,7 +1,7 @@
 // Triangles of the model's geoms, merged into one geometry whose vertices each belong to a body.
 
 import {
-  BoxGeometry, BufferAttribute, BufferGeometry, CapsuleGeometry, Color, CylinderGeometry, Matrix4, PlaneGeometry,
+  Box3, BoxGeometry, BufferAttribute, BufferGeometry, CapsuleGeometry, Color, CylinderGeometry, Matrix4, PlaneGeometry,
   Quaternion, SphereGeometry, Vector3,
 } from "three";
 import { mergeGeometries, mergeVertices, toCreasedNormals } from "three/addons/utils/BufferGeometryUtils.js";
@@ -24,8 +24,8 @@ const SHAPES = {
  * of its faces, which are drawn sooner (Rossignac and Borrel 1993). */
 export function clustered({ vertices, faces }, cell) {
   const firsts = new Map(), corners = [], axes = [0, 1, 2];
-  const longest = Math.max(...axes.map((axis) => spread(vertices.filter((_, index) => index % 3 === axis))));
-  const side = Math.min(cell, longest / 4);
+  const { x, y, z } = new Box3().setFromArray(vertices).getSize(new Vector3());
+  const side = Math.min(cell, Math.max(x, y, z) / 4);
   const first = (vertex) => {
     const key = axes.map((axis) => Math.floor(vertices[3 * vertex + axis] / side)).join();
     if (!firsts.has(key)) firsts.set(key, vertex);
@@ -36,11 +36,6 @@ export function clustered({ vertices, faces }, cell) {
     if (a !== b && b !== c && c !== a) corners.push(a, b, c);
   }
   return { vertices, faces: corners };
-}
-
-function spread(values) {
-  const [least, most] = values.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]);
-  return most - least;
 }
 
 /** A mesh as JSON has it, shaded with creases. */

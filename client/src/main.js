@@ -31,8 +31,6 @@ const STILL = 0.3; // s without a grip, after which the core's targets are taken
 const OVER = new Set(["hold", "aim", "follow", "stopped"]); // modes in which no plan is shown; it may come before its mode does
 const SHOWN_IN = new Set(["preview", "ready", "delay"]);
 const BUSY = new Set(["plan", ...SHOWN_IN, "execute", "follow"]); // modes whose end has a reason to show
-// s that two pictures may take before some are left out, how much longer one then stays, and s that count at most
-const SLOW = 0.06, REST = 1, MOST = 0.08; // together less than the 0.25 s in which who moves the robot has to draw it
 const LONGEST_STEP = 0.25; // s of a preview between two pictures at most: what is drawn slowly is played slowly, so that all is seen
 const DESKTOP = { position: new Vector3(), quaternion: new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), -Math.PI / 2) };
 
@@ -46,7 +44,7 @@ class Page {
     const antialias = !isSoftware() && !sessionStorage.getItem(COARSE_KEY);
     this.renderer = new WebGLRenderer({ canvas: find("view"), antialias, alpha: true });
     this.quality = new Quality(() => this.redraw(), devicePixelRatio, !antialias);
-    this.stopwatch = new Stopwatch(this.renderer.getContext(), clock, (seconds) => this.quality.took(seconds, clock()));
+    this.stopwatch = new Stopwatch(this.renderer.getContext(), clock, (seconds) => this.pictured(seconds));
     this.renderer.outputColorSpace = SRGBColorSpace;
     this.renderer.xr.enabled = true;
     this.camera = new PerspectiveCamera(45, 1, 0.02, 30);
@@ -84,7 +82,7 @@ class Page {
     light.addEventListener("change", () => this.theme(light.matches));
     this.theme(light.matches);
     find("help").open = innerWidth >= WIDE;
-    [this.before, this.took] = [clock(), 0];
+    this.before = clock();
     this.hands = { left: noHand(), right: noHand() };
     // At a desk, hands do not wait for the picture: so slow drawing does not delay inputs.
     setInterval(() => this.immersive.session || this.send(this.atDesk(clock()), false, clock()), 1000 / INPUT_RATE);
@@ -368,7 +366,7 @@ class Page {
   draw(frame) {
     const now = clock(), dt = Math.min(now - this.before, LONGEST_STEP);
     const immersed = Boolean(frame && this.immersive.session && this.immersive.space);
-    if (!immersed && now - this.before < REST * this.took) return; // sending and receiving need the processor too
+    if (!immersed && this.stopwatch.isRunning) return; // pictures that wait for each other would show a robot of long ago
     this.before = now;
     if (immersed) this.send(this.inHeadset(now, frame), true, now);
     this.play(dt);
@@ -378,22 +376,22 @@ class Page {
     this.drawn.coarsen(!immersed && this.quality.isCoarse);
     this.drawn.scene.background = immersed ? null : this.ground;
     this.renderer.render(this.drawn.scene, this.camera);
+    this.pictureOf = this.frame;
+    if (immersed) this.acknowledge();
+    else this.stopwatch.start(now);
+  }
+
+  /** The picture that was begun is there, `seconds` later. */
+  pictured(seconds) {
     this.acknowledge();
-    if (!immersed) this.stopwatch.start(now);
-    this.measure(now);
+    this.quality.took(seconds, clock());
   }
 
-  /** The robot's newest pose is in the picture, where there is one: without it, input does not move the robot. */
+  /** A new pose of the robot is in the picture: without it, input does not move the robot. */
   acknowledge() {
-    if (!this.wire || !this.frame || this.frame === this.drawnFrame || this.renderer.getContext().isContextLost()) return;
-    this.drawnFrame = this.frame;
+    if (!this.wire || !this.pictureOf || this.pictureOf === this.drawnFrame || this.renderer.getContext().isContextLost()) return;
+    this.drawnFrame = this.pictureOf;
     this.wire.drawn = true;
-  }
-
-  /** How long a picture takes where it takes long: until the next could be begun. */
-  measure(now) {
-    const finish = () => (this.took = clock() - now > SLOW ? Math.min(clock() - now, MOST) : 0);
-    requestAnimationFrame(() => requestAnimationFrame(finish));
   }
 
   inHeadset(now, frame) {

@@ -99,9 +99,13 @@ export class Stopwatch {
     Object.assign(this, { gl, now, done, sync: null });
   }
 
+  get isRunning() {
+    return this.sync !== null;
+  }
+
   start(began) {
     const { gl } = this;
-    if (this.sync || gl.isContextLost()) return;
+    if (this.isRunning || gl.isContextLost()) return;
     this.sync = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     gl.flush();
     const look = () => {

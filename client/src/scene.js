@@ -64,7 +64,7 @@ export class RobotScene {
       this.veil.bindMode = "detached";
       this.veil.bind(this.ghost.skeleton, this.ghost.bindMatrix);
       this.veil.frustumCulled = false;
-      this.shapes = { fine: moving, coarse: mergedGeoms(bodily, meshes, CELL) };
+      this.shapes = { fine: moving, coarse: null, makeCoarse: () => mergedGeoms(bodily, meshes, CELL) };
       this.isCoarse = false;
       [this.live.renderOrder, this.veil.renderOrder, this.ghost.renderOrder] = [0, 1, 2];
       this.ghost.visible = this.veil.visible = this.live.visible = false;
@@ -87,7 +87,8 @@ export class RobotScene {
   coarsen(isCoarse) {
     if (isCoarse === this.isCoarse || !this.shapes) return;
     this.isCoarse = isCoarse;
-    for (const robot of [this.live, this.veil, this.ghost]) robot.geometry = this.shapes[isCoarse ? "coarse" : "fine"];
+    if (isCoarse) this.shapes.coarse ??= this.shapes.makeCoarse();
+    for (const robot of [this.live, this.veil, this.ghost]) robot.geometry = isCoarse ? this.shapes.coarse : this.shapes.fine;
   }
 
   /** Draws by `draw` what is hidden or not there yet as well: to compile it later would take longer than an input may. */

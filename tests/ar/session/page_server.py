@@ -282,7 +282,7 @@ async def serve(port: int, folder: Path) -> None:
     subject = Subject(figure.bodies, (), (), STRAIGHT, (figure.bodies[-1], (0.0, 0.0, 0.0)))
     world, previewer = make_world((TABLE,), (CUP,)), InlinePreviewer(planning.answers)
     controller = SessionController(core, robot, previewer, world, 0.1, LogWriter(subject))
-    page, origins = PROJECT / "trunkline/ar/session/page", Origins.of(["127.0.0.1"], port, tls=False)
+    page, origins = PROJECT / "trunkline/ar/page", Origins.of(["127.0.0.1"], port, tls=False)
     alignment = load_folder(SessionConfig, PROJECT / "conf/live").alignment
     anchors = Anchors(folder / "anchors.json")
     server = Server(Composition(

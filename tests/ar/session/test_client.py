@@ -17,7 +17,7 @@ import pytest
 
 from trunkline.pipeline.config import PROJECT
 
-CLIENT, PAGE = PROJECT / "client", PROJECT / "trunkline/ar/session/page"
+CLIENT, PAGE = PROJECT / "client", PROJECT / "trunkline/ar/page"
 BROWSER = os.environ.get("TRUNKLINE_BROWSER", "/usr/bin/chromium")
 WITHOUT = ("parts",)  # tests that need none
 LARGEST = 250_000  # bytes of the page, compressed

@@ -84,6 +84,10 @@ def test_stamp_and_log_clocks(tmp_path):
     ((raw, _),) = taken(tmp_path)
     np.testing.assert_allclose(raw.time[-1], (m.logged[-1] - m.logged[0]) * 1e-9, atol=0.02)
     assert np.diff(raw.time).min() > 0.9 / 120, "what deliveries delayed is evened out"
+    edit_session(tmp_path, "clock: log", "clock: log\neven_times: false")
+    ((raw, findings),) = taken(tmp_path)
+    np.testing.assert_allclose(raw.time, (np.unique(m.logged) - m.logged.min()) * 1e-9, atol=1e-9)
+    assert not any("late" in repair for repair in findings.repairs)
 
 
 def test_markers_by_the_name_of_the_release_before(tmp_path, capsys):

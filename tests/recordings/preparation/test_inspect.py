@@ -193,7 +193,7 @@ def test_a_unit_that_is_a_guess_is_said_to_be(tmp_path, capsys):
     assert "mm for an arm of 40 mm, cm for an arm of 400 mm, inch for an arm of 1.02e+03 mm" in proposed
 
 
-@pytest.mark.parametrize(("lost", "line"), [(False, "; their rate changes; "), (True, "; 2 frames missing in ")])
+@pytest.mark.parametrize(("lost", "line"), [(False, "; they come at uneven times; "), (True, "; 2 frames missing in ")])
 def test_in_a_log_that_is_thinned_out_no_frame_is_missing(lost, line):
     times = np.delete(np.arange(64), [20, 40]) * 0.05 if lost else np.cumsum(np.repeat([0.05, 0.267], 32))
     stamps = (1e9 * times).astype(np.int64)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trunkline.recordings.signals.even_times import changes_rate, even_times, is_uneven
+from trunkline.recordings.signals.even_times import even_times, is_uneven
 from trunkline.recordings.signals.smoothing import resample
 
 RATE = 50.0
@@ -65,24 +65,3 @@ def test_no_curve_through_samples_that_nearly_coincide():
     columns = np.sin(2 * np.pi * taken)[:, None] + rng.normal(0, 1e-3, (len(taken), 1))
     between = resample(logged, columns, np.arange(480) / 120)
     assert np.abs(between).max() < 2, "a spline through both goes to 145"
-
-
-@pytest.mark.parametrize(
-    ("rates", "frames"), [((20.0, 3.75), (33, 31)), ((120.0, 1.0), (400, 6)), ((3.0, 50.0), (9, 90))]
-)
-def test_a_log_that_is_thinned_out_while_nothing_moves_is_not_late(rates, frames):
-    """A live session's log of a rest was taken for one of 12.6 Hz with 64 frames lost, and stamps that were right were
-    moved by up to 1.4 s."""
-    steps = np.repeat(1 / np.array(rates), frames)
-    steps += np.random.default_rng(0).uniform(-0.1, 0.1, len(steps)) * steps
-    time = np.append(0.0, np.cumsum(steps))
-    assert changes_rate(time)
-    assert not is_uneven(time)
-
-
-def test_a_rate_that_does_not_change():
-    frames = np.setdiff1d(np.arange(300), [40, 41, 130])
-    assert not changes_rate(frames / RATE), "frames that were lost"
-    assert not changes_rate(np.arange(300) / RATE)
-    assert not changes_rate(arrivals()[1])
-    assert not changes_rate(in_bursts()[1])

@@ -276,6 +276,7 @@ def _session(reader: LogReader, trials: list[dict]) -> dict:
         "base": reader.begin["mount"],
         "markers": {name: name for name in reader.begin["measured"][1:]},
         "topics": {"poses": MEASURED, "commands": TENDONS_SENT, "tendon_positions": TENDONS},
+        "even_times": False,  # a pose is dated by when it was taken, and looks are seldom where nothing moves
         "trials": trials,
     }
 

@@ -29,7 +29,7 @@ from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT, load_folder
 
-PAGE = Path(__file__).parent / "page"
+PAGE = Path(__file__).parents[1] / "page"
 web_response.SERVER_SOFTWARE = HEADERS["Server"]  # pyright: ignore[reportPrivateImportUsage] # of answers that no handler gives, for which aiohttp has no setting
 
 

@@ -180,7 +180,7 @@ def _together(
     if sent.all():
         _, first = np.unique(seconds, return_index=True)
         if len(first) < len(seconds):
-            dropped = f"{len(seconds) - len(first)} frames with a stamp that was there already dropped"
+            dropped = f"{len(seconds) - len(first)} {role} messages with a stamp that was there already dropped"
             findings.repairs.append(dropped)
         return [(seconds[first], values[first])]
     findings.repairs.append(f"{role} messages that hold some of {len(columns)} motors each put together")

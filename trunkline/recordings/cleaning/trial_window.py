@@ -59,7 +59,7 @@ def read_stretch(
     if session.clock == "stamp":
         _require_fine(poses, f"{where}: {source.pose_topic}")
     check_clocks(poses, session.clock, limits, f"{where}: {source.pose_topic}", findings)
-    if not is_stepwise(trial.experiment):
+    if session.even_times and not is_stepwise(trial.experiment):
         stamps = _evened(stamps, rows, poses, session.clock, findings)
     rows = instants(stamps, rows, findings)
     epoch = int(stamps[rows[0]])
@@ -111,7 +111,7 @@ def _evened(stamps: np.ndarray, rows: np.ndarray, poses: PoseStream, clock: str,
     missing = f", {even.missing} of them missing in between" if even.missing else ""
     findings.repairs.append(
         f"{what} are up to {1e3 * late.max():.0f} ms late, though frames come at {even.rate:.3g} Hz{missing}: their "
-        f"times evened out by {by}"
+        f"times evened out by {by}; `even_times: false` leaves them"
     )
     evened = stamps.copy()
     evened[rows] = stamps[rows[0]] + np.round(even.time * 1e9).astype(np.int64)

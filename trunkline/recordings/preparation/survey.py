@@ -24,7 +24,7 @@ from trunkline.recordings.session.source import (
     topics_in_frames,
     without_unset,
 )
-from trunkline.recordings.signals.even_times import changes_rate, is_uneven
+from trunkline.recordings.signals.even_times import is_uneven
 
 LIVE = "/core/input"  # a topic of a live session alone
 OTHERS = re.compile(r"/headset/|/joint_states$|/joints/command$")  # of people and of the rigid robot
@@ -132,7 +132,6 @@ def _bodies(poses: PoseStream) -> list[str]:
     missing = f"{int(np.sum(np.maximum(np.round(steps) - 1, 0)))} frames missing in between"
     if not np.all(numbers > 0):
         missing = "they come at uneven times" if is_uneven(time) else missing
-        missing = "their rate changes" if changes_rate(time) else missing
     oriented = "with" if poses.quaternions is not None else "without"
     numbers = "" if poses.frames is None else ", with frame numbers"
     lines = [

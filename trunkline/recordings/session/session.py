@@ -13,6 +13,7 @@ from pydantic import (
     Field,
     FiniteFloat,
     PrivateAttr,
+    StrictBool,
     ValidationError,
     field_validator,
     model_validator,
@@ -260,6 +261,8 @@ class Session(Entry):
     bodies: names of the poses, in order, where messages hold them without. A list of tendons does the same for numbers.
     clock: what dates a pose: its header's stamp, the recorder's log time, or its frame number at the rate
     that the stamps show. With `log`, commands and tendon positions are dated by it too.
+    even_times: whether frames that seem late are dated as cameras take them, at one rate; not where every time is known
+    to be right, as in a log that is thinned out while nothing moves.
     tables: how trials are read whose files are no MCAP logs, but tables.
     motors: name in the log to what it moves, in place of `tendons`, where motors count otherwise than in metres of a
     tendon's pull, or move several.
@@ -278,6 +281,7 @@ class Session(Entry):
     bodies: list[str] | None = Field(default=None, min_length=1)
     tables: TableLayout | None = None
     clock: Literal["stamp", "log", "frame"] = "stamp"
+    even_times: StrictBool = True
     commands: Between | None = None
     trials: list[TrialEntry] = Field(min_length=1)
     _shared: dict[str, list[str]] = PrivateAttr(default_factory=dict)

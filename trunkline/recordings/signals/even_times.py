@@ -39,30 +39,12 @@ def usual_interval(time: np.ndarray) -> float:
 
 def is_uneven(time: np.ndarray) -> bool:
     """Whether frames at times (T,) s, in order, come almost at once now and then, as no camera takes them."""
-    steps, interval = np.diff(time), usual_interval(time)
-    if len(time) < FEWEST or _keeps_rates(steps):
+    if len(time) < FEWEST:
         return False
+    steps, interval = np.diff(time), usual_interval(time)
     jitter = 1.4826 * np.median(np.abs(steps - np.median(steps)))
     short = np.mean(steps < SHORT * interval) > OFTEN
     return bool(short or steps.min() < COINCIDE * interval or jitter > JITTER * interval)
-
-
-def changes_rate(time: np.ndarray) -> bool:
-    """Whether frames at times (T,) s, in order, come at a rate and then at another, as in a log that is thinned out
-    while nothing moves: none is missing in between."""
-    steps = np.diff(time)
-    return bool(len(_changes(steps))) and _keeps_rates(steps)
-
-
-def _keeps_rates(steps: np.ndarray) -> bool:
-    """Whether steps (T,), s, are alike for `FEW` at least before they change. Frames that were late come after a single
-    long one."""
-    return bool(np.diff(_changes(steps), prepend=0, append=len(steps)).min() >= FEW)
-
-
-def _changes(steps: np.ndarray) -> np.ndarray:
-    """Which steps differ from the one before."""
-    return np.flatnonzero(np.abs(np.diff(steps)) > JITTER * np.maximum(steps[1:], steps[:-1])) + 1
 
 
 def even_times(time: np.ndarray, frames: np.ndarray | None) -> EvenTimes | None:
