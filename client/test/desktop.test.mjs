@@ -446,7 +446,7 @@ test("a recording is played by the ghost, and a file that is none is refused", a
   assert.deepEqual(wrongs, []);
 });
 
-test("only what was drawn is acknowledged: not by a page that has lost its picture", async (t) => {
+test("a pose is acknowledged when its picture is there, and no other is begun before: not by a page that has lost it", async (t) => {
   const { page } = await open(t, browser, server);
   await loaded(page);
   await until(page, () => globalThis.trunkline.wire.drawn); // it does not control, so no input takes it
@@ -455,6 +455,20 @@ test("only what was drawn is acknowledged: not by a page that has lost its pictu
     await new Promise((resolve) => setTimeout(resolve, 1000 * wait));
     return globalThis.trunkline.wire.drawn;
   }, seconds);
+  const pictures = () => page.evaluate(() => globalThis.trunkline.renderer.info.render.frame);
+  await page.evaluate(async () => {
+    const { renderer, stopwatch, wire } = globalThis.trunkline, gl = renderer.getContext();
+    while (stopwatch.isRunning) await new Promise((resolve) => setTimeout(resolve));
+    gl.getSyncParameter = () => gl.UNSIGNALED; // as long as it is being drawn
+    wire.drawn = false;
+  });
+  await page.waitForTimeout(200);
+  assert.equal(await page.evaluate(() => globalThis.trunkline.wire.drawn), false);
+  const before = await pictures();
+  assert.equal(await after(1), false);
+  assert.equal(await pictures(), before);
+  await page.evaluate(() => delete globalThis.trunkline.renderer.getContext().getSyncParameter);
+  await until(page, () => globalThis.trunkline.wire.drawn);
   await page.evaluate(() => {
     globalThis.lost = globalThis.trunkline.renderer.getContext().getExtension("WEBGL_lose_context");
     globalThis.lost.loseContext();
