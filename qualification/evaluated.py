@@ -5,6 +5,7 @@
 The lab's arm on the Panda of the rehearsal, in one session of reaches; cameras see its mount and every fourth unit,
 with their noise. Its log becomes a session as a live session's does, and `trunkline evaluate` scores the model of the
 tree by it. Then the same log once more, with the bodies where they truly were: what both say differs by the cameras.
+Last, the command that `trunkline live` prints identifies from the session, and both score the model that comes of it.
 """
 
 import json
@@ -14,6 +15,7 @@ from contextlib import redirect_stdout
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from scipy.spatial.transform import Rotation
 
 from demo.plants.stranger_kernel import work_for
@@ -27,12 +29,15 @@ from trunkline.ar.session.arm_cameras import EVERY, MOUNT, MeasuredArm
 from trunkline.ar.session.controller import SessionController
 from trunkline.ar.session.log_format import LogFormat, Subject
 from trunkline.ar.session.log_writer import LogWriter
-from trunkline.ar.session.measured_session import write_session
+from trunkline.ar.session.measured_session import LIST, write_session
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.messages import Pose
+from trunkline.errors import InputError
 from trunkline.frames import wxyz_from_rotation
+from trunkline.identification.evaluation.error_tables import LABELS
 from trunkline.model.arm.mjcf import unit_name
 from trunkline.pipeline.config import PROJECT
+from trunkline.tools.batch.__main__ import main as batch
 from trunkline.tools.evaluate.__main__ import main as evaluate
 
 PLANS, SEED = 10, 52_002
@@ -142,13 +147,25 @@ class MeasuredSession:
         return done
 
 
-def scored(path: Path, folder: Path) -> dict:
-    """Errors of the tree's model by the session of the log at `path`, mm."""
-    lines = write_session(path)
-    print("\n".join(lines), file=sys.stderr)
-    out = folder / f"evaluated_{path.stem}"
-    evaluate([str(MODEL), str(path.with_suffix("")), "--settings", str(PROJECT), "--out", str(out)])
-    return json.loads((out / "metrics.json").read_text())["model"]["by_experiment"]["static_pull"]
+def scored(path: Path, model: Path, folder: Path) -> tuple[pd.DataFrame, set[str]]:
+    """Errors of a model by the session of the log at `path`, a row a plan, and the plans to which it was fitted."""
+    out = folder / f"evaluated_{path.stem}_{model.parts[-2]}"
+    evaluate([str(model), str(path.with_suffix("")), "--settings", str(PROJECT), "--out", str(out)])
+    table, metrics = pd.read_csv(out / "trials.csv"), json.loads((out / "metrics.json").read_text())
+    table = table[table["model"] == LABELS["model"]].set_index("trial")
+    return table, set(metrics["evaluated"]["fitted_to"])
+
+
+def identified(path: Path, folder: Path) -> Path:
+    """The model that comes of the session of the log at `path` by the command that goes with it.
+
+    Raises:
+        InputError: a stage has failed.
+    """
+    name, stage = path.stem, "identify_stiffness"
+    if batch([str(path.with_suffix("") / LIST), "--until", stage, "--out", str(folder / "fleet")]):
+        raise InputError(f"{name}: found a stage that failed, expected a model of {stage}")
+    return folder / "fleet" / name / "artifacts" / stage / "arm.xml"
 
 
 def measure(package: Path, plans: int) -> None:
@@ -157,12 +174,24 @@ def measure(package: Path, plans: int) -> None:
         run = MeasuredSession(bench_of(package), folder)
         done = sum(run.reach() for _ in range(plans))
         run.log.close()
-        cameras, truth = (scored(path, folder) for path in run.log.paths)
-    print(f"| {done} of {plans} plans executed, {cameras['trials']} at rest | by cameras | by the truth | apart |")
-    print("|---|---:|---:|---:|")
-    for key, words in (("e_position_mm", "markers"), ("e_tip_mm", "tip")):
-        apart = abs(cameras[key] - truth[key])
-        print(f"| error of the model, {words}, mm, mean | {cameras[key]:.3g} | {truth[key]:.3g} | {apart:.2g} |")
+        for path in run.log.paths:
+            print("\n".join(write_session(path)))
+        tables = [scored(path, MODEL, folder)[0] for path in run.log.paths]
+        model = identified(run.log.paths[0], folder)
+        by_cameras, fitted = scored(run.log.paths[0], model, folder)
+        identified_tables = [by_cameras, scored(run.log.paths[1], model, folder)[0]]
+    at_rest = [plan for plan in tables[0].index if plan in tables[1].index]
+    unseen = [plan for plan in at_rest if plan not in fitted]
+    print(f"| {done} of {plans} plans executed; error at rest, mm, mean | plans | by cameras | by the truth | apart |")
+    print("|---|---:|---:|---:|---:|")
+    for words, of, chosen in (
+        ("the tree's model", tables, at_rest),
+        ("the same, of plans that none is identified from", tables, unseen),
+        ("the model identified from the others, of the same", identified_tables, unseen),
+    ):
+        for key, what in (("e_position_mm", "markers"), ("e_tip_mm", "tip")):
+            cameras, truth = (table.loc[chosen, key].mean() for table in of)
+            print(f"| {words}: {what} | {len(chosen)} | {cameras:.3g} | {truth:.3g} | {abs(cameras - truth):.2g} |")
 
 
 if __name__ == "__main__":

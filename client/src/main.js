@@ -44,7 +44,7 @@ class Page {
     const antialias = !isSoftware() && !sessionStorage.getItem(COARSE_KEY);
     this.renderer = new WebGLRenderer({ canvas: find("view"), antialias, alpha: true });
     this.quality = new Quality(() => this.redraw(), devicePixelRatio, !antialias);
-    this.stopwatch = new Stopwatch(this.renderer.getContext(), clock, (seconds) => this.pictured(seconds));
+    this.stopwatch = new Stopwatch(this.renderer.getContext(), clock, (seconds) => this.pictureDone(seconds));
     this.renderer.outputColorSpace = SRGBColorSpace;
     this.renderer.xr.enabled = true;
     this.camera = new PerspectiveCamera(45, 1, 0.02, 30);
@@ -155,7 +155,10 @@ class Page {
     this.drawn.load(scene);
     find("certificate").hidden = !certificate;
     find("certificate").href = certificate ?? "";
-    this.drawn.everythingOnce(() => this.renderer.render(this.drawn.scene, this.camera));
+    for (const isCoarse of this.quality.isCoarse ? [true] : [true, false]) {
+      this.drawn.prepare(isCoarse);
+      this.drawn.everythingOnce(() => this.renderer.render(this.drawn.scene, this.camera));
+    }
     this.loaded = digest;
   }
 
@@ -351,8 +354,13 @@ class Page {
     const { innerWidth: width, innerHeight: height } = window;
     const [status, acts] = ["status", "acts"].map((id) => find(id).getBoundingClientRect());
     document.documentElement.style.setProperty("--acts", `${Math.ceil(acts.height)}px`);
-    this.renderer.setPixelRatio(this.quality.ratioOf(width * height));
-    this.renderer.setSize(width, height, false);
+    const size = [width, height, this.quality.ratioOf(width * height)];
+    if (size.join() !== this.size?.join()) {
+      this.size = size;
+      this.renderer.setPixelRatio(size[2]);
+      this.renderer.setSize(width, height, false);
+      this.stopwatch.cancel(); // that clears the picture: the next begins at once, and no pose in it was seen
+    }
     if (!this.desktop.dragging) shape(this.camera, width, height, freeArea(width, height, status, acts));
   }
 
@@ -373,24 +381,24 @@ class Page {
     this.mark(this.hands, immersed);
     this.showStatus(immersed, dt);
     if (!immersed) this.orbit.update();
-    this.drawn.coarsen(!immersed && this.quality.isCoarse);
+    this.drawn.prepare(!immersed && this.quality.isCoarse);
     this.drawn.scene.background = immersed ? null : this.ground;
     this.renderer.render(this.drawn.scene, this.camera);
-    this.pictureOf = this.frame;
+    this.frameInPicture = this.frame;
     if (immersed) this.acknowledge();
     else this.stopwatch.start(now);
   }
 
   /** The picture that was begun is there, `seconds` later. */
-  pictured(seconds) {
+  pictureDone(seconds) {
     this.acknowledge();
     this.quality.took(seconds, clock());
   }
 
   /** A new pose of the robot is in the picture: without it, input does not move the robot. */
   acknowledge() {
-    if (!this.wire || !this.pictureOf || this.pictureOf === this.drawnFrame || this.renderer.getContext().isContextLost()) return;
-    this.drawnFrame = this.pictureOf;
+    if (!this.wire || !this.frameInPicture || this.frameInPicture === this.drawnFrame || this.renderer.getContext().isContextLost()) return;
+    this.drawnFrame = this.frameInPicture;
     this.wire.drawn = true;
   }
 

@@ -101,5 +101,5 @@ export function correctionText(preview, cameras) {
   const { correction, uncorrected } = preview, mm = (metres) => `${+(1000 * metres).toFixed(1)} mm`;
   if (!correction) return uncorrected ? `It will not correct itself: ${uncorrected}.` : "";
   const { steps, longest, astray } = correction;
-  return `You confirm as well that it corrects itself by the cameras once it has arrived, while the grip is held: by ${steps} steps at most, each of up to ${mm(longest)} of cable, ${mm(steps * longest)} in all, the tip within ${mm(astray)} of its target.${cameras?.fault ? " Cameras are not relied on now: unless they are again by then, it will not." : ""}`;
+  return `You confirm as well that it corrects itself by the cameras once it has arrived, while the grip is held: by ${steps} steps at most, each of up to ${mm(longest)} of cable, ${mm(steps * longest)} in all, the tip within ${mm(astray)} of its target.${cameras?.fault ? " Cameras are not relied on now: as long as that is so, it will not." : ""}`;
 }

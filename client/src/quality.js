@@ -105,15 +105,24 @@ export class Stopwatch {
 
   start(began) {
     const { gl } = this;
-    if (this.isRunning || gl.isContextLost()) return;
-    this.sync = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    this.cancel();
+    const sync = gl.isContextLost() ? null : gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    if (!sync) return;
+    this.sync = sync;
     gl.flush();
     const look = () => {
-      if (!gl.isContextLost() && gl.getSyncParameter(this.sync, gl.SYNC_STATUS) !== gl.SIGNALED) return void setTimeout(look, 4);
-      gl.deleteSync(this.sync);
-      this.sync = null;
+      if (this.sync !== sync) return;
+      const isPending = !gl.isContextLost() && gl.getSyncParameter(sync, gl.SYNC_STATUS) === gl.UNSIGNALED; // null after a loss
+      if (isPending) return void setTimeout(look, 4);
+      this.cancel();
       this.done(this.now() - began);
     };
     setTimeout(look, 0);
+  }
+
+  /** Nothing is waited for any more. */
+  cancel() {
+    if (this.sync) this.gl.deleteSync(this.sync);
+    this.sync = null;
   }
 }

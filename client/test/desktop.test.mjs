@@ -85,6 +85,24 @@ test("the page loads with no error and asks nothing of other hosts", async (t) =
   assert.deepEqual(wrongs, []);
 });
 
+test("a robot of few faces, as without a graphics card, is drawn in the pose that is acknowledged", async (t) => {
+  const { page } = await open(t, browser, server);
+  await loaded(page);
+  const apart = await page.evaluate(async () => {
+    const { drawn, quality } = globalThis.trunkline;
+    quality.isFixed = false;
+    quality.at = 4;
+    while (!drawn.live.coarseMesh?.parent || !globalThis.trunkline.stopwatch.isRunning) await new Promise(requestAnimationFrame);
+    const { rows } = globalThis.trunkline.frameInPicture, { geometry, shape } = drawn.live.coarseMesh, last = drawn.bodies.length - 1;
+    const { array } = geometry.attributes.position, bodies = shape.attributes.skinIndex, distances = [];
+    for (let i = 0; i < bodies.count; i++) {
+      if (bodies.getX(i) === last) distances.push(Math.hypot(...[0, 1, 2].map((axis) => array[3 * i + axis] - rows[7 * last + axis])));
+    }
+    return { count: distances.length, most: Math.max(...distances) };
+  });
+  assert.ok(apart.count > 10 && apart.most < 0.1, `${JSON.stringify(apart)}`);
+});
+
 test("a cycle by mouse and keyboard: aim, plan, preview, confirm, execute, done", async (t) => {
   const { page, wrongs } = await open(t, browser, server);
   await loaded(page);
@@ -476,6 +494,27 @@ test("a pose is acknowledged when its picture is there, and no other is begun be
   assert.equal(await after(1), false);
   await page.evaluate(() => globalThis.lost.restoreContext());
   await until(page, () => globalThis.trunkline.wire.drawn);
+  await page.evaluate(async () => { // lost and back while a picture is under way, and nobody looks: its fence is no more
+    const { renderer, stopwatch, wire } = globalThis.trunkline, gl = renderer.getContext();
+    while (!stopwatch.isRunning) await new Promise(requestAnimationFrame);
+    gl.getSyncParameter = () => null;
+    while (stopwatch.isRunning) await new Promise((resolve) => setTimeout(resolve));
+    delete gl.getSyncParameter;
+    wire.drawn = false;
+  });
+  await until(page, () => globalThis.trunkline.wire.drawn);
+  await page.evaluate(() => { // a picture that is cleared before it is there is not waited for, nor acknowledged
+    const { renderer, stopwatch } = globalThis.trunkline, gl = renderer.getContext();
+    gl.getSyncParameter = () => gl.UNSIGNALED;
+    stopwatch.start(0);
+    dispatchEvent(new Event("resize"));
+    globalThis.waits = [stopwatch.isRunning];
+    globalThis.trunkline.size = null;
+    dispatchEvent(new Event("resize"));
+    globalThis.waits.push(stopwatch.isRunning);
+    delete gl.getSyncParameter;
+  });
+  assert.deepEqual(await page.evaluate(() => globalThis.waits), [true, false]);
 });
 
 test("axe finds nothing against the page", async (t) => {
