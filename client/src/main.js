@@ -155,10 +155,8 @@ class Page {
     this.drawn.load(scene);
     find("certificate").hidden = !certificate;
     find("certificate").href = certificate ?? "";
-    for (const isCoarse of this.quality.isCoarse ? [true] : [true, false]) {
-      this.drawn.prepare(isCoarse);
-      this.drawn.everythingOnce(() => this.renderer.render(this.drawn.scene, this.camera));
-    }
+    this.drawn.coarsen(this.quality.isCoarse);
+    this.drawn.everythingOnce(() => this.renderer.render(this.drawn.scene, this.camera));
     this.loaded = digest;
   }
 
@@ -381,7 +379,7 @@ class Page {
     this.mark(this.hands, immersed);
     this.showStatus(immersed, dt);
     if (!immersed) this.orbit.update();
-    this.drawn.prepare(!immersed && this.quality.isCoarse);
+    this.drawn.coarsen(!immersed && this.quality.isCoarse);
     this.drawn.scene.background = immersed ? null : this.ground;
     this.renderer.render(this.drawn.scene, this.camera);
     this.frameInPicture = this.frame;

@@ -1,14 +1,15 @@
-// What is drawn in the robot's base frame: robot, ghost, world, reach.
+// What is drawn in the robot's base frame: robot, ghost, world, reach. A robot is one skinned mesh, a bone a body.
 
 import {
-  BufferAttribute, BufferGeometry, Color, DoubleSide, GridHelper, Group, HemisphereLight, DirectionalLight, Mesh,
-  MeshBasicMaterial, MeshLambertMaterial, Scene, Line, LineBasicMaterial, CatmullRomCurve3, TubeGeometry, Vector3, FrontSide,
+  Bone, BufferAttribute, BufferGeometry, Color, DoubleSide, GridHelper, Group, HemisphereLight, DirectionalLight, Mesh,
+  MeshBasicMaterial, MeshLambertMaterial, Scene, Skeleton, SkinnedMesh, Line, LineBasicMaterial, CatmullRomCurve3,
+  TubeGeometry, Vector3, Quaternion, FrontSide,
 } from "three";
 import { GHOST, MOUNT, REACH, TIP } from "./colours.js";
 import { mergedGeoms } from "./geoms.js";
-import { Robot } from "./robot.js";
 import { STRIDE } from "./wire.js";
 
+const UNIT_SCALE = new Vector3(1, 1, 1);
 const CELL = 0.035; // m, of meshes that are drawn with few faces
 const WIDEST = 4; // m, of an obstacle that is drawn; the floor is wider
 const OBJECT = "object"; // the body of the object, where the model has one
@@ -30,6 +31,7 @@ export class RobotScene {
     this.scene.add(sun);
     this.ground("dark");
     this.reachShown = true;
+    this.isCoarse = false;
   }
 
   /** The floor's grid for a "dark" or a "light" ground. */
@@ -46,18 +48,27 @@ export class RobotScene {
 
   /** The scene as the server has it, anew. */
   load({ bodies, geoms, meshes, shell, reach }) {
-    for (const old of [this.live, this.ghost, this.still, this.reach, this.tipReach]) old?.removeFromParent();
+    for (const old of [this.live, this.ghost, this.veil, this.still, this.reach, this.tipReach]) old?.removeFromParent();
     this.count = bodies.length;
     this.bodies = bodies;
     const bodily = geoms.filter(({ body }) => body >= 0), moving = mergedGeoms(bodily, meshes);
-    this.live = this.ghost = this.still = this.reach = this.tipReach = null;
+    this.still = this.reach = this.tipReach = this.shapes = null;
     const still = mergedGeoms(geoms.filter(({ body, size }) => body < 0 && size[0] < WIDEST / 2), meshes); // not the floor
     if (moving) {
-      this.live = new Robot(moving, new MeshLambertMaterial({ vertexColors: true }), bodies.length, 0);
+      this.live = skinned(moving, new MeshLambertMaterial({ vertexColors: true }), bodies.length);
       const glass = new MeshLambertMaterial({ color: GHOST, emissive: GHOST, emissiveIntensity: 0.4, transparent: true, opacity: 0.6, depthWrite: false });
-      this.ghost = new Robot(moving, glass, bodies.length, 2, true);
-      this.fewFaces = once(() => mergedGeoms(bodily, meshes, CELL));
-      this.base.add(this.live, this.ghost);
+      this.ghost = skinned(moving, glass, bodies.length);
+      // First its depth alone, so that what is behind its own surface does not shine through.
+      const depth = new MeshBasicMaterial({ colorWrite: false });
+      this.veil = new SkinnedMesh(moving, depth);
+      this.veil.bindMode = "detached";
+      this.veil.bind(this.ghost.skeleton, this.ghost.bindMatrix);
+      this.veil.frustumCulled = false;
+      this.shapes = { fine: moving, coarse: null, makeCoarse: () => mergedGeoms(bodily, meshes, CELL) };
+      this.isCoarse = false;
+      [this.live.renderOrder, this.veil.renderOrder, this.ghost.renderOrder] = [0, 1, 2];
+      this.ghost.visible = this.veil.visible = this.live.visible = false;
+      this.base.add(this.live, this.veil, this.ghost);
     }
     if (still) this.base.add((this.still = new Mesh(still, new MeshLambertMaterial({ vertexColors: true }))));
     if (reach) this.base.add((this.reach = shellMesh(new Float32Array(reach.vertices), reach.faces, MOUNT, 0.05)));
@@ -72,9 +83,12 @@ export class RobotScene {
     if (this.world) this.showWorld(this.world);
   }
 
-  /** Before each picture: robots with few faces, the preview's without what hides its own far side, or as they are. */
-  prepare(isCoarse) {
-    for (const robot of [this.live, this.ghost]) robot?.drawWith(isCoarse ? this.fewFaces() : null);
+  /** Robots with few faces, the preview's without what hides its own far side; or as they are. */
+  coarsen(isCoarse) {
+    if (isCoarse === this.isCoarse || !this.shapes) return;
+    this.isCoarse = isCoarse;
+    if (isCoarse) this.shapes.coarse ??= this.shapes.makeCoarse();
+    for (const robot of [this.live, this.veil, this.ghost]) robot.geometry = isCoarse ? this.shapes.coarse : this.shapes.fine;
   }
 
   /** Draws by `draw` what is hidden or not there yet as well: to compile it later would take longer than an input may. */
@@ -93,7 +107,7 @@ export class RobotScene {
   /** The robot as it is: rows of poses, of which the first are the bodies'. */
   pose(rows) {
     if (!this.live) return;
-    this.live.pose(rows);
+    setPoses(this.live, rows, 0);
     this.live.visible = true;
   }
 
@@ -108,7 +122,8 @@ export class RobotScene {
   pretend(rows, start = 0) {
     if (!this.ghost) return;
     this.ghost.visible = rows !== null;
-    if (rows) this.ghost.pose(rows, start);
+    this.veil.visible = this.ghost.visible && !this.isCoarse;
+    if (rows) setPoses(this.ghost, rows, start);
   }
 
   /** The tip's reach for gravity as it is at the target: points in the frame of the mount's target. */
@@ -206,10 +221,27 @@ function stringOf({ position: [x, y, z], diameter, height, shape, quaternion }) 
   return [thread, { shape: "sphere", position: [x, y, top + long], size: [hook] }].map((geom) => ({ body: -1, quaternion: IDENTITY, rgba: THREAD, ...geom }));
 }
 
-/** `make`, which is called when its answer is first wanted. */
-function once(make) {
-  let made = null;
-  return () => (made ??= make());
+/** A mesh whose bones are in the frame of its parent, not in the room's: `detached`, bound by the identity. */
+function skinned(geometry, material, count) {
+  const mesh = new SkinnedMesh(geometry, material);
+  const bones = Array.from({ length: count }, () => new Bone());
+  for (const bone of bones) bone.matrixAutoUpdate = bone.matrixWorldAutoUpdate = false;
+  mesh.bindMode = "detached";
+  mesh.bind(new Skeleton(bones), mesh.matrix.clone());
+  mesh.frustumCulled = false; // its bounds are those of the bodies' own frames
+  return mesh;
+}
+
+const place = new Vector3(), turn = new Quaternion();
+
+function setPoses({ skeleton }, rows, start) {
+  skeleton.bones.forEach((bone, index) => {
+    const at = start + index * STRIDE;
+    place.fromArray(rows, at);
+    turn.set(rows[at + 4], rows[at + 5], rows[at + 6], rows[at + 3]);
+    if (Number.isFinite(place.x)) bone.matrixWorld.compose(place, turn, UNIT_SCALE);
+    else bone.matrixWorld.makeScale(0, 0, 0); // a body without a pose
+  });
 }
 
 /** A surface that one looks through, and that hides nothing. */

@@ -85,24 +85,6 @@ test("the page loads with no error and asks nothing of other hosts", async (t) =
   assert.deepEqual(wrongs, []);
 });
 
-test("a robot of few faces, as without a graphics card, is drawn in the pose that is acknowledged", async (t) => {
-  const { page } = await open(t, browser, server);
-  await loaded(page);
-  const apart = await page.evaluate(async () => {
-    const { drawn, quality } = globalThis.trunkline;
-    quality.isFixed = false;
-    quality.at = 4;
-    while (!drawn.live.coarseMesh?.parent || !globalThis.trunkline.stopwatch.isRunning) await new Promise(requestAnimationFrame);
-    const { rows } = globalThis.trunkline.frameInPicture, { geometry, shape } = drawn.live.coarseMesh, last = drawn.bodies.length - 1;
-    const { array } = geometry.attributes.position, bodies = shape.attributes.skinIndex, distances = [];
-    for (let i = 0; i < bodies.count; i++) {
-      if (bodies.getX(i) === last) distances.push(Math.hypot(...[0, 1, 2].map((axis) => array[3 * i + axis] - rows[7 * last + axis])));
-    }
-    return { count: distances.length, most: Math.max(...distances) };
-  });
-  assert.ok(apart.count > 10 && apart.most < 0.1, `${JSON.stringify(apart)}`);
-});
-
 test("a cycle by mouse and keyboard: aim, plan, preview, confirm, execute, done", async (t) => {
   const { page, wrongs } = await open(t, browser, server);
   await loaded(page);

@@ -6,13 +6,12 @@ import { Playback } from "../src/playback.js";
 import { Recording } from "../src/recording.js";
 import { decode, encode, noHand } from "../src/wire.js";
 import { FROM_CLIENT, FROM_SERVER, HAND, HEAD_BYTES, INPUT_BYTES } from "../src/wire_table.js";
-import { Group, MeshLambertMaterial, Ray, Vector3 } from "three";
+import { Group, Ray, Vector3 } from "three";
 import { axisOf, onAxis, objectAt } from "../src/handles.js";
 import { doubtQuestion, isDoubtful, lasts, ofDevice, success, whyLost, whyNothing } from "../src/hints.js";
 import { LEVELS, Quality } from "../src/quality.js";
-import { clustered, matrixOf, mergedGeoms } from "../src/geoms.js";
+import { clustered, matrixOf } from "../src/geoms.js";
 import { Confirming } from "../src/confirming.js";
-import { Robot } from "../src/robot.js";
 import { freeArea } from "../src/views.js";
 import { predictionText, remedy, uiText } from "../src/panel.js";
 import { MeasuredArm, camerasText, colourOf, correctionText } from "../src/measured.js";
@@ -160,32 +159,6 @@ test("a mesh in cells keeps what spans them, each corner once", () => {
   assert.deepEqual(clustered({ vertices, faces }, 0.1), { vertices, faces: [0, 2, 4, 0, 2, 4] });
   assert.deepEqual(clustered({ vertices, faces }, 1e-4).faces, faces);
   assert.equal(clustered({ vertices, faces }, 10).faces.length, 9, "small as it is, it does not vanish");
-});
-
-test("a robot with few faces has them where its bodies are in the newest pose, and as it is it is skinned", () => {
-  const geoms = [0, 1].map((body) => ({ body, shape: "box", size: [1, 1, 1], position: [0, 0, 2 * body], quaternion: [1, 0, 0, 0], rgba: [1, 1, 1, 1] }));
-  const shape = mergedGeoms(geoms, []), half = Math.SQRT1_2;
-  const drawn = new Robot(shape, new MeshLambertMaterial(), 2, 0, true), rest = shape.attributes;
-  drawn.pose(new Float32Array([NaN, ...Array(6).fill(0), 1, 2, 3, 1, 0, 0, 0, 4, 5, 6, half, half, 0, 0]), 7); // the second a quarter turn about x
-  drawn.drawWith(null);
-  assert.ok(drawn.children.length === 2 && drawn.children.every(({ isSkinnedMesh }) => isSkinnedMesh));
-  const check = ([x, y, z]) => {
-    drawn.drawWith(shape);
-    const [mesh, ...others] = drawn.children, { position, normal } = mesh.geometry.attributes;
-    assert.ok(!others.length && !mesh.isSkinnedMesh);
-    for (let i = 0; i < position.count; i++) {
-      const [a, b, c] = rest.position.array.slice(3 * i, 3 * i + 3), [, , up] = rest.normal.array.slice(3 * i, 3 * i + 3);
-      const [there, turned] = [position, normal].map(({ array }) => [...array.slice(3 * i, 3 * i + 3)]);
-      const [wanted, upwards] = rest.skinIndex.getX(i) ? [[4 + a, 5 - c, 6 + b], [1, -up]] : [[x + a, y + b, z + c], [2, up]];
-      assert.ok(wanted.every((value, axis) => Math.abs(value - there[axis]) < 1e-5), `${there}`);
-      assert.ok(Math.abs(turned[upwards[0]] - upwards[1]) < 1e-5);
-    }
-  };
-  check([1, 2, 3]);
-  drawn.pose(new Float32Array([7, 8, 9, 1, 0, 0, 0, 4, 5, 6, half, half, 0, 0]));
-  check([7, 8, 9]);
-  drawn.drawWith(null);
-  assert.equal(drawn.children.length, 2);
 });
 
 test("inputs that come late lower the quality too, and a screen of one pixel a pixel begins at the level that shows it", () => {
