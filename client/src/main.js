@@ -77,7 +77,7 @@ class Page {
     addEventListener("resize", () => this.resize());
     document.addEventListener("visibilitychange", () => (this.hiddenAt = clock()));
     const panels = new ResizeObserver(() => this.resize());
-    for (const id of ["status", "acts"]) panels.observe(find(id));
+    for (const id of ["status", "acts", "playing"]) panels.observe(find(id));
     const light = matchMedia("(prefers-color-scheme: light)");
     light.addEventListener("change", () => this.theme(light.matches));
     this.theme(light.matches);
@@ -350,8 +350,8 @@ class Page {
   resize() {
     if (this.renderer.xr.isPresenting) return;
     const { innerWidth: width, innerHeight: height } = window;
-    const [status, acts] = ["status", "acts"].map((id) => find(id).getBoundingClientRect());
-    document.documentElement.style.setProperty("--acts", `${Math.ceil(acts.height)}px`);
+    const [status, acts, playing] = ["status", "acts", "playing"].map((id) => find(id).getBoundingClientRect());
+    for (const [name, { height }] of [["--acts", acts], ["--playing", playing]]) document.documentElement.style.setProperty(name, `${Math.ceil(height)}px`);
     const size = [width, height, this.quality.ratioOf(width * height)];
     if (size.join() !== this.size?.join()) {
       this.size = size;

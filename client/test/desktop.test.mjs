@@ -387,6 +387,25 @@ test("in small windows and at 200 % the panels leave the robot visible, from eac
   }
 });
 
+test("the panel of a preview covers no other, however long its words are", async (t) => {
+  const { page } = await open(t, browser, server, { drawn: false });
+  await loaded(page);
+  await page.evaluate(() => {
+    globalThis.trunkline.play = () => {}; // it would write its own
+    document.querySelector("#playing").hidden = false;
+  });
+  for (const [width, height] of [[760, 640], [400, 720], [1280, 720]]) {
+    await page.setViewportSize({ width, height });
+    for (const words of [5, 60, 90]) {
+      await page.evaluate((count) => (document.querySelector("#foreseen").textContent = "as it goes ".repeat(count / 3)), words);
+      await page.waitForTimeout(200);
+      const [panel, help] = await page.evaluate(() => ["#playing", "#help"].map((id) => document.querySelector(id).getBoundingClientRect().toJSON()));
+      const apart = help.bottom <= panel.top || help.left >= panel.right || help.right <= panel.left || help.top >= panel.bottom;
+      assert.ok(apart, `${width} by ${height}, ${words} words`);
+    }
+  }
+});
+
 test("light and dark follow the system", async (t) => {
   const { page } = await open(t, browser, server, { drawn: false });
   await loaded(page);
