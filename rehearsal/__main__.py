@@ -16,8 +16,8 @@ from pathlib import Path
 from rehearsal.animation import animate
 from rehearsal.experiments.bench import bench_of
 from rehearsal.experiments.registry import EXPERIMENTS
-from rehearsal.experiments.result import Result, read_results, summary
-from rehearsal.rehearse import OUT, TABLE
+from rehearsal.experiments.result import Result, read_results
+from rehearsal.rehearse import OUT, TABLE, metrics_of
 from rehearsal.report import draw
 from rehearsal.runs import Run, RunSource, make, run_of, source_of, wanted
 from trunkline.ar.preview.package import only_package
@@ -25,6 +25,7 @@ from trunkline.compute.threads import thread_count
 from trunkline.errors import in_one_line
 from trunkline.pipeline.checkout import require_checkout
 from upkeep.limits import read_limits
+from upkeep.readme import preview_table
 from upkeep.rehearsal_table import rehearsal_table
 
 
@@ -51,7 +52,10 @@ def main() -> int:
     print(f"table: {table}, a row when a run ends; picture: {picture}, at the end", flush=True)
     results = make_timed(runs, package, source, table, thread_count())
     goals = read_limits(Path("tests/limits.yaml"))["rehearse"]
-    print(rehearsal_table(summary(results), goals, f"with package `{source.package}`", variants=True))
+    metrics = metrics_of(source, results)
+    print(rehearsal_table(metrics, goals, f"with package `{source.package}`", variants=True))
+    if stated := preview_table(metrics.get("preview"), goals):
+        print(f"\n{stated}")
     draw(results, picture)
     return 0
 

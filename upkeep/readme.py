@@ -308,12 +308,13 @@ def preview_table(preview: dict | None, goals: dict[str, Limit]) -> str:
         goal = _goal(goals.get("preview.cameras.with.share"), cameras["with"]["share"])
         what = "reach: the tip rests within 10 mm of its target, without / with a correction by cameras"
         lines.append(f"| {what} | {' / '.join(reached)}; {cameras['farther']} led farther off by 2 mm | {goal} |")
-    likelier, previews = lookup(preview, "agreed"), lookup(preview, "previews")
-    goal = _goal(goals.get("preview.agreement"), lookup(preview, "agreement"))
-    lines.append(f"| grasp, hand-over: whether it holds | {likelier} of {previews} as predicted | {goal} |")
-    path = lookup(preview, "path_pct_median")
-    goal = _goal(goals.get("preview.path_pct_median"), path)
-    lines.append(f"| grasp, hand-over: path of the tip | {_number(path)} % of length off, median | {goal} |")
+    if previews := lookup(preview, "previews"):
+        goal = _goal(goals.get("preview.agreement"), lookup(preview, "agreement"))
+        came = f"{lookup(preview, 'agreed')} of {previews} as predicted"
+        lines.append(f"| grasp, hand-over: whether it holds | {came} | {goal} |")
+        path = lookup(preview, "path_pct_median")
+        goal = _goal(goals.get("preview.path_pct_median"), path)
+        lines.append(f"| grasp, hand-over: path of the tip | {_number(path)} % of length off, median | {goal} |")
     return "\n".join(lines)
 
 
