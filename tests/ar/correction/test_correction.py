@@ -310,3 +310,21 @@ def test_where_no_motor_helps_or_the_twin_would_not_rest_nothing_is_sent(chain, 
     loop.measured(start)
     assert loop.ended == "a motor would be at its largest force"
     assert np.array_equal(loop.commands, commands)
+
+
+@pytest.mark.parametrize(("short", "at_most"), [((0, 1, 0), 3.5e-3), ((0, 1, 1), 6e-3)])
+@pytest.mark.parametrize("loose", [2e-3, 4e-3])
+def test_no_step_leads_far_away_where_a_loose_cable_pulls_sooner_than_the_twin_says(chain, short, at_most, loose):
+    """Without the limit by up to 25 mm, with that of each loose cable alone by up to 11 mm."""
+    rng, away = np.random.default_rng(0), []
+    for pull in (0.02, 0.03):
+        commands = pulled(chain, pull, 0.0, 0.0, slack=loose)
+        earlier = loose * np.array(short)  # m by which the arm's cables are shorter than the twin's
+        tip = tip_of(chain, commands - earlier)
+        for direction in rng.normal(size=(8, 3)):
+            target = tip + rng.uniform(2e-3, 8e-3) * direction / np.linalg.norm(direction)
+            loop = TipCorrection(chain, DOWN, target, commands, SETTINGS)
+            while not loop.ended:
+                loop.measured(tip_of(chain, loop.commands - earlier))
+            away.append(max([after - before for before, after in pairwise(loop.errors)], default=0.0))
+    assert max(away) < at_most

@@ -107,6 +107,7 @@ FIGURES = {
         (r"a stream within (0\.1) to (0\.25) s, the tip (0\.1) and (0\.5) s",
          [stream_checks.LASTS, stream_checks.StreamLimits().silence + stream_checks.LASTS, correction_control.STRAYS,
           correction_control.BLIND]),
+        (r"at rest it is awaited for (20) s", [correction_control.PATIENCE]),
         (r"a frame (0\.1) s old, or (0\.15) s without any, is a fault",
          [stream_checks.StreamLimits().age, stream_checks.StreamLimits().silence]),
         (r"at once if a write fails; after (1) s in which data", [LIVE.journal.period + log_writer.LATE]),

@@ -34,6 +34,7 @@ FRICTION = 0.5e-3  # m by which a step may end elsewhere than J says, as cables 
 WORSE = 0.3e-3  # m farther off than before, beyond what a measurement scatters, that make a step a bad one
 STRONGEST = 0.95  # of a motor's largest force, that a step may ask of it
 BEGINS = 1e-3  # m beyond where the twin says that a loose cable pulls, that a step winds it at most
+AWAY = 1e-3  # m by which a loose cable that pulls sooner than the twin says may take the tip farther off
 RELUCTANT = 0.5  # of what is missing, that cables which pull must leave before a loose one is wound up
 NEGLIGIBLE = 1e-5  # m, change of a command that is not sent: a loose cable stays loose
 
@@ -132,13 +133,27 @@ class TipCorrection:
         if steep > self._settings.steepest:
             return self._end(f"the tip moves {steep:.0f} mm for 1 mm of a motor: near snapping through")
         wanted = np.where(moving, np.minimum(self.commands, rest.lengths[0]) - change, self.commands)
-        commands = self.commands + shortened(wanted - self.commands, self._settings.longest)
+        way = shortened(wanted - self.commands, self._settings.longest)
+        began = moving & (rest.tensions[0] == 0)  # at which command a loose cable really pulls, the twin says about
+        commands = self.commands + self._not_farther(missing, way, began & (way < 0)) * way
         foreseen = actuated(chain, commands[None], self._gravity)
         if not foreseen.converged[0] or (foreseen.tensions[0] > STRONGEST * chain.max_tension).any():
             return self._end("a motor would be at its largest force")
-        began = moving & (rest.tensions[0] == 0)  # at which command a loose cable really pulls, the twin says about
         self._step = None if began.any() else (change, tip)
         self.commands, self._rest = commands, foreseen
+
+    def _not_farther(self, missing: np.ndarray, way: np.ndarray, wound: np.ndarray) -> float:
+        """The share of a step `way`, m, (K,), after which the tip is farther off by AWAY at most, if the loose cables
+        that it winds, `wound`, (K,), pull from its beginning on, each alone or all of them: in trials some did, where
+        the twin's were loose by mm."""
+        taut = tip_by_pulls(self._chain, self._rest, self._gravity, wound) if wound.sum() > 1 else self._jacobian
+        distance = np.linalg.norm(missing)
+        room = (distance + AWAY) ** 2 - distance**2
+        share = 1.0
+        for tip in (-self._jacobian @ way, -taut @ way):
+            along, square = missing @ tip, max(float(tip @ tip), NEGLIGIBLE**2)
+            share = min(share, float((along + np.sqrt(along**2 + square * room)) / square))
+        return share
 
     def _change(self, missing: np.ndarray) -> np.ndarray:
         """Of the pulls, m. Shape (K,)."""
@@ -164,17 +179,19 @@ def shortened(vector: np.ndarray, longest: float) -> np.ndarray:
     return vector * min(1.0, longest / max(float(np.linalg.norm(vector)), NEGLIGIBLE))
 
 
-def tip_by_pulls(chain: Chain, rest: Equilibrium, gravity: np.ndarray) -> np.ndarray:
+def tip_by_pulls(chain: Chain, rest: Equilibrium, gravity: np.ndarray, taut: np.ndarray | bool = False) -> np.ndarray:
     """The tip's way by each motor's pull, m/m, of an arm at rest; of a motor whose cable is loose, once it is taut. The
     others that pull stay where they are. NaN where the arm rests only because its motors hold their place, as one that
     is about to snap through may. Shape (3, K).
 
     Args:
         rest: of one arm. gravity: m/s². Shape (3,).
+        taut: cables that count as pulling where they are, as those do that really pull. Shape (K,).
     """
+    pulls = (rest.tensions[0] > 0) | taut
     slopes = sensitivity(chain, rest.qpos, rest.tensions, gravity)
     tip, length = slopes.tip_by_tension[0], slopes.length_by_tension[0]
-    jacobian, pulling = np.zeros((3, chain.tendons)), [int(motor) for motor in np.flatnonzero(rest.tensions[0] > 0)]
+    jacobian, pulling = np.zeros((3, chain.tendons)), [int(motor) for motor in np.flatnonzero(pulls)]
     for motor in range(chain.tendons):
         motors = pulling if motor in pulling else [*pulling, motor]
         pull_by_tension = np.diag(1 / chain.gain[motors]) - length[np.ix_(motors, motors)]

@@ -104,7 +104,8 @@ def _evened(stamps: np.ndarray, rows: np.ndarray, poses: PoseStream, clock: str,
     if even is None:
         shortest = 1e3 * float(np.diff(time).min())
         problem = f"{what} are uneven, the nearest two {shortest:.2g} ms apart, and do not tell which frames"
-        findings.warnings.append(f"{problem} are missing: expected even ones, or frame numbers and `clock: frame`")
+        remedy = "even ones, frame numbers and `clock: frame`, or `even_times: false` where each is known"
+        findings.warnings.append(f"{problem} are missing: expected {remedy}")
         return stamps
     late = even.late - np.quantile(even.late, 0.05)
     by = "their count" if numbers is None else "frame numbers"
