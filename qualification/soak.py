@@ -67,7 +67,7 @@ class ScriptedRobot:
     def follow(self, following: Following) -> str:
         return "follow: not here"
 
-    def permit(self) -> None:
+    def permit(self, waits: bool = False) -> None:
         pass
 
     def stop(self) -> None:

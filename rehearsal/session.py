@@ -67,8 +67,8 @@ class RehearsedRobot:
     def follow(self, following: Following) -> str:
         return self.axes.follow(following, TICK)
 
-    def permit(self) -> None:
-        self._unpermitted, self.moved = 0.0, True
+    def permit(self, waits: bool = False) -> None:
+        self._unpermitted, self.moved, self.axes.waits = 0.0, True, waits
 
     def state(self) -> ExecutorReport:
         report = self.axes.state()

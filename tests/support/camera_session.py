@@ -76,7 +76,7 @@ class PlantRobot:
         self.start, self.stop, self.state = self.follower.start, self.follower.stop, self.follower.state
         self.now = BEGIN
 
-    def permit(self):
+    def permit(self, waits=False):
         """It goes on without."""
 
     def hear(self, age, axes):

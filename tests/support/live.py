@@ -64,7 +64,7 @@ class PlainRobot:
     def follow(self, following):
         return self.robot.follow(following, TICK)
 
-    def permit(self):
+    def permit(self, waits=False):
         self.permits += 1
 
     def stop(self):

@@ -96,7 +96,7 @@ FIGURES = {
         (r"the next input, then (0\.1) s of braking", [BRAKE]),
         (r"(0\.12) s of silence \(`silence`\), (0\.1) s of a lost controller",
          [CORE.safety.silence, CORE.safety.grace]),
-        (r"nothing can begin \| (0\.25) s \|", [controller.UNDRAWN]),
+        (r"after (2) s, and as it follows, holds \| (0\.25) s \|", [controller.MOST_UNDRAWN, controller.UNDRAWN]),
         (r"(0\.25) s, by its stamp or there and back", [clock.LATEST]),
         (r"sends nothing for (1) s", [lease.LEASE_TIMEOUT]),
         (r"at once, or (1) s", [lease.LEASE_TIMEOUT]),

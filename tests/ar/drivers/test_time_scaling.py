@@ -50,6 +50,22 @@ def test_a_stop_keeps_the_limits_and_stays_on_the_way(after):
     assert np.abs(fine - rows[-1]).max(axis=1).min() < 1e-3
 
 
+@pytest.mark.parametrize("after", [0.1, 0.25, 0.4, 0.6, 0.8])
+def test_what_waits_and_goes_on_keeps_the_limits_too(after):
+    plan = planned(np.array([1.0, 0.8, 0.5, 0.8, 0.3, 0.6, 1.0, -0.05, 0.0, 0.0]))
+    smoother, rows = Smoother(START, 10), []
+    robot = TimeScaledRobot(READY, START[7:], PLANNED, "package", lambda q, c, _: rows.append(np.append(q, c)), PANDA)
+    assert robot.start(plan, plan.digest()) == ""
+    while robot.state().mode == "running":
+        robot.advance(TICK)
+        robot.waits = after <= len(rows) * TICK < after + 0.6
+    rows = np.array([smoother.next(row) for row in rows + [rows[-1]] * 30])
+    gain = np.diff(rows[:, :7], n=2, axis=0) / TICK**2
+    assert (np.abs(gain) / ACCELERATION).max() < 1.01
+    assert (np.abs(np.diff(gain, axis=0) / TICK) / JERK).max() < 1.0
+    np.testing.assert_allclose(rows[-1], np.append(plan.joints[-1], plan.commands[-1]), atol=1e-12)
+
+
 def test_a_slow_plan_is_stopped_within_the_brake():
     rows = stopped(planned(np.append(np.full(7, 0.01), [-0.01, 0, 0])), 0.05)
     moving = np.flatnonzero(np.abs(np.diff(rows, axis=0)).max(axis=1) > 1e-12)[-1] + 1

@@ -139,8 +139,8 @@ class Robot:
         self.frozen: RobotState | None = None
         self.is_silent = False
 
-    def permit(self) -> None:
-        pass
+    def permit(self, waits: bool = False) -> None:
+        self.robot.waits = waits
 
     def follow(self, following: Following) -> str:
         return self.robot.follow(following, TICK)

@@ -17,14 +17,14 @@ from trunkline.ar.session import messages
 from trunkline.ar.session.arm_cameras import MeasuredArm
 from trunkline.ar.session.binary import HAND, Received
 from trunkline.ar.session.broadcast import Broadcast
-from trunkline.ar.session.controller import MOST_INPUTS, UNDRAWN, SessionController
+from trunkline.ar.session.controller import MOST_INPUTS, MOST_UNDRAWN, UNDRAWN, SessionController
 from trunkline.ar.session.controller_input import controllers
 from trunkline.ar.session.follow import PLANNER_TIMEOUT
 from trunkline.ar.session.log_writer import LogWriter
 from trunkline.ar.session.previewer import InlinePreviewer, PlanAnswer, PredictionAnswer, PreviewBegun, PreviewPiece
 from trunkline.ar.session.robot_process import RobotState
 from trunkline.ar.teleop.core import Teleoperation
-from trunkline.ar.teleop.executor import FOLLOWS, PlanFollower
+from trunkline.ar.teleop.executor import BRAKE, FOLLOWS, PlanFollower
 from trunkline.ar.teleop.messages import Controller, ExecutorReport, Intent, Obstacle, PlanReport, Pose
 from trunkline.ar.teleop.plan import CorrectionBounds, Plan
 
@@ -56,7 +56,7 @@ class ToldRobot:
     def hear(self, age, axes):
         self.calls.append("hear")
 
-    def permit(self):
+    def permit(self, waits=False):
         self.calls.append("permit")
 
     def stop(self):
@@ -378,8 +378,8 @@ class PlayedRobot(PlanFollower):
     def follow(self, following):
         return super().follow(following, DT)
 
-    def permit(self):
-        self.permits += 1
+    def permit(self, waits=False):
+        self.permits, self.waits = self.permits + 1, waits
 
     def stop(self):
         self.stops += 1
@@ -558,7 +558,7 @@ def hidden(session):
 
 def undrawn(session):
     session.flags = UNSEEN
-    session.wait(UNDRAWN + 2 * DT)
+    session.wait(MOST_UNDRAWN + 2 * DT)
 
 
 def rested(session):
@@ -585,7 +585,7 @@ WAYS = {
     "silence": (lambda s: s.wait(0.6, heard=False), "hold", "client silent for 0.6"),
     "controllers lost": (untracked, "hold", "left controller: not tracked; holding"),
     "hidden": (hidden, "hold", "left controller: not tracked; holding"),
-    "nothing drawn": (undrawn, "hold", "client silent for 0.7"),
+    "nothing drawn": (undrawn, "hold", "client silent for 2."),
     "nobody controls": (lambda s: s.controller.control(None), "hold", "base is not aligned; holding"),
     "somebody else controls": (handed_over, "stopped", "robot: it has come to rest by itself; stopped"),
     "alignment lost": (lambda s: s.controller.align(None, ""), "hold", "base is not aligned; holding"),
@@ -618,15 +618,36 @@ def test_a_robot_under_way_is_told_to_hold_and_does_not_go_on(session, way):
     assert session.robot.permits == before
 
 
-def test_who_moves_the_robot_and_draws_nothing_counts_as_silent_and_is_told_why(session, monkeypatch):
+def test_a_plan_waits_for_the_page_that_draws_too_slowly_and_goes_on_with_its_next_picture(session):
+    session.readied()
+    session.right = {"grip": 1.0, "trigger": 1.0}
+    session.until(lambda intent: intent.mode == "execute")
+    session.right, session.flags = {"grip": 1.0}, UNSEEN
+    assert session.wait(UNDRAWN - DT).motion == "execute"
+    assert session.controller.state_message("somebody").notice == ""
+    assert session.wait(2 * DT).motion == "execute"
+    assert session.controller.state_message("somebody").notice == "waiting for the page, which draws too slowly"
+    session.wait(BRAKE)
+    here = session.robot.joints
+    session.wait(1.0)
+    np.testing.assert_array_equal(session.robot.joints, here)
+    session.flags = TRACKED
+    session.wait(BRAKE)
+    assert np.abs(session.robot.joints - here).max() > 0
+    assert session.controller.state_message("somebody").notice == ""
+    session.wait(1.0)
+    assert session.robot.state().mode == "done"
+
+
+def test_who_draws_nothing_as_a_plan_waits_counts_as_silent_and_is_told_why(session, monkeypatch):
     session.executing()
     events = []
     monkeypatch.setattr(session.controller.log_writer, "event", lambda kind, **fields: events.append((kind, fields)))
     session.flags = UNSEEN
-    assert session.wait(UNDRAWN - DT).motion == "execute"
+    assert session.wait(MOST_UNDRAWN - DT).motion == "execute"
     assert session.wait(2 * DT).mode == "hold"
     notice = session.controller.state_message("somebody").notice
-    assert notice == "the page has drawn nothing for 0.25 s; holding"
+    assert notice == "the page has drawn nothing for 2.01 s; holding"
     assert [fields["notice"] for kind, fields in events if kind == "mode"] == [notice]
     session.assert_it_stays()
     assert session.controller.state_message("somebody").notice == notice
@@ -647,13 +668,15 @@ def test_a_page_that_draws_seldom_moves_the_robot_and_one_that_draws_nothing_aim
         session.wait(UNDRAWN - 2 * DT)
         session.flags = TRACKED
         assert session.tick().motion == "execute"
+        assert not session.robot.waits
 
 
 def test_as_it_follows_who_draws_nothing_counts_as_silent(session):
     session.aimed()
     session.right = {"grip": 1.0, "stick_pressed": 1.0}
     session.until(lambda intent: intent.motion == "follow")
-    undrawn(session)
+    session.flags = UNSEEN
+    session.wait(UNDRAWN + 2 * DT)
     assert session.controller.intent.mode == "hold"
 
 
@@ -663,8 +686,9 @@ def test_what_is_confirmed_by_who_draws_nothing_does_not_begin(session):
     session.wait(UNDRAWN + 2 * DT)
     assert session.controller.intent.mode == "ready"  # nothing moves: the plan is kept
     session.right = {"grip": 1.0, "trigger": 1.0}
-    session.until(lambda intent: intent.mode == "hold", 0.1)
-    assert session.robot.permits == 0
+    before = session.robot.joints
+    session.until(lambda intent: intent.mode == "hold", MOST_UNDRAWN)
+    np.testing.assert_array_equal(session.robot.joints, before)
 
 
 def test_who_takes_over_has_time_to_draw(session):

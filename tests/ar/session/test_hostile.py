@@ -80,6 +80,34 @@ def test_who_says_nothing_is_shown_out():
 
 
 @pytest.mark.realtime
+@pytest.mark.parametrize("pings", [False, True])
+def test_who_says_nothing_and_does_not_close_is_gone_within_five_seconds(pings):
+    """As a program may that knows no more of the protocol than how to open it."""
+
+    async def session():
+        async with laid() as here:
+            host = here.url.removeprefix("http://")
+            reader, writer = await asyncio.open_connection(*host.split(":"))
+            lines = ["GET /ws HTTP/1.1", f"Host: {host}", f"Origin: {here.origin}", "Upgrade: websocket"]
+            lines += ["Connection: Upgrade", "Sec-WebSocket-Version: 13", f"Sec-WebSocket-Key: {'A' * 22}=="]
+            writer.write("\r\n".join([*lines, "", ""]).encode())
+            assert b"101" in await reader.readline()
+
+            async def ping():
+                while pings:
+                    await asyncio.sleep(0.5)
+                    writer.write(b"\x89\x80\0\0\0\0")
+
+            pinging = asyncio.create_task(ping())
+            with suppress(ConnectionError):
+                await asyncio.wait_for(reader.read(-1), 5.0)
+            pinging.cancel()
+            assert not here.server._waiting
+
+    asyncio.run(session())
+
+
+@pytest.mark.realtime
 def test_a_pairing_code_lets_in_and_gives_the_token():
     async def session():
         async with laid() as here:

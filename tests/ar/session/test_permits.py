@@ -26,6 +26,7 @@ from trunkline.ar.session.robot_process import (
     STALE,
     STOPS,
     TIME,
+    WAITS,
     Goal,
     RobotChannel,
     RobotProcess,
@@ -58,8 +59,9 @@ class Played:
         self.robot = PlanFollower(START, STRAIGHT, LIMITS, PACKAGE)
         self.loop, self.now, self.serial = Loop(self.channel, self.robot, self.plant), BEGINS, 0
 
-    def permit(self, serial=None, ago=0.0):
+    def permit(self, serial=None, ago=0.0, waits=False):
         asked = self.channel.requests
+        asked[WAITS] = waits
         asked[PERMIT], asked[PERMITTED] = self.now - ago, self.serial if serial is None else serial
 
     def begin(self, what, stops=None) -> "Played":
@@ -116,6 +118,18 @@ def test_only_a_fresh_permit_for_what_was_started_last_counts(played, what, seri
     played.turn(0.1)
     played.turn(BRAKE + 0.05, serial=serial, ago=ago)
     assert (played.mode == "running") == goes_on
+
+
+def test_a_plan_that_is_permitted_to_wait_rests_on_its_way_and_goes_on_when_it_need_not(played):
+    played.begin(plan_of()).turn(0.5)
+    played.turn(BRAKE + 2 * TICK, waits=True)
+    here = played.robot.joints.copy()
+    played.turn(0.3, waits=True)
+    np.testing.assert_array_equal(played.robot.joints, here)
+    assert played.mode == "running"
+    played.turn(0.3)
+    assert np.abs(played.robot.joints - here).max() > 0
+    assert played.mode == "running"
 
 
 def test_without_a_permit_it_brakes_after_so_long_and_goes_on_by_none(played):

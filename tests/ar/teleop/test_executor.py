@@ -154,6 +154,40 @@ def test_a_stop_takes_as_long_as_it_may_and_counts_once(dt):
     assert made.state().digest == plan.digest()
 
 
+@pytest.mark.parametrize("dt", [0.001, 0.01])
+def test_what_waits_slows_to_rest_on_its_way_and_goes_on_to_the_end_of_its_plan(dt):
+    rows = still(101)
+    rows[:, 0] += 0.5 * LIMITS.velocity[0] * STEP * np.arange(101)
+    made, plan, ways = robot(), plan_of(rows), []
+    assert made.start(plan, plan.digest()) == ""
+    for waits, seconds in ((False, 0.3), (True, 0.5), (False, 0.05), (True, 0.5), (False, 2.0)):
+        made.waits, before = waits, made.joints[0]
+        for _ in range(round(seconds / dt)):
+            made.advance(dt)
+        ways.append(made.joints[0] - before)
+    speed = 0.5 * LIMITS.velocity[0]
+    assert ways[:4] == pytest.approx(speed * np.array([0.3, BRAKE / 2, 0.05 / 4, 0.05 / 4]), rel=0.25)
+    assert made.state().mode == "done"
+    np.testing.assert_allclose(made.joints, plan.joints[-1])
+
+
+def test_a_stop_ends_what_waits():
+    rows = still(101)
+    rows[:, 0] += 0.5 * LIMITS.velocity[0] * STEP * np.arange(101)
+    made, plan = robot(), plan_of(rows)
+    assert made.start(plan, plan.digest()) == ""
+    made.waits, start = True, made.joints
+    made.advance(0.2)
+    np.testing.assert_array_equal(made.joints, start)
+    assert made.state().mode == "running"
+    made.stop()
+    made.advance(0.01)
+    assert made.state().mode == "idle"
+    made.waits, here = False, made.joints
+    made.advance(0.5)
+    np.testing.assert_array_equal(made.joints, here)
+
+
 # --- what a stop does to what runs
 
 

@@ -61,6 +61,7 @@ HERE = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))  # of poses that are in the b
 NUMBER = re.compile(r"[\d.]+")
 DIGITS = 4  # after the decimal point, of targets that are told
 UNDRAWN = 0.25  # s in which who moves the robot may have drawn no new pose of it
+MOST_UNDRAWN = 2.0  # s likewise, in which a plan that runs waits for the next one
 ACTING = ("delay", "execute", "follow")  # modes in which it moves, or is about to
 SWINGS, RARELY = 10.0, 0.25  # s after a motion in which all that cameras see is logged, and from one to the next later
 MOST_INPUTS = 8  # of a tick; older ones than these are left out, presses and all
@@ -72,7 +73,7 @@ class Robot(Protocol):
     def start(self, plan: Plan, digest: str) -> str: ...
     def follow(self, following: Following) -> str: ...
     def hear(self, age: float, axes: np.ndarray | None) -> None: ...
-    def permit(self) -> None: ...
+    def permit(self, waits: bool = False) -> None: ...
     def stop(self) -> None: ...
     def state(self) -> ExecutorReport: ...
     def robot_state(self) -> RobotState: ...
@@ -133,6 +134,7 @@ class SessionController:
         self._last, self._fresh = self._nobody, True
         self._shift = 0.0  # s from a client's stamps to the core's
         self._drawn, self._undrawn = False, 0.0  # since the last tick; s in which who controls has drawn nothing
+        self._waits = False  # for a picture, on the way of a plan
         self.notice = ""  # for all: the core's, or why who controls counts as silent
         self._instead = ("", "")  # a notice of the core's, and what is told instead
         self._stop, self._fault, self._shown_digest, self._since, self._believed = False, "", "", 0.0, ""
@@ -269,8 +271,10 @@ class SessionController:
         joints: Joints = tuple(float(q) for q in robot_state.joints)  # type: ignore[assignment]
         steps = list(self._inputs) or [self._last]
         self._undrawn, self._drawn = 0.0 if self._drawn else self._undrawn + dt, False
-        acts = self.intent is not None and self.intent.mode in ACTING
-        blind = acts and bool(self._inputs) and self._undrawn > UNDRAWN
+        mode = self.intent.mode if self.intent is not None else ""
+        self._waits = mode in ("delay", "execute") and self._undrawn > UNDRAWN
+        most = MOST_UNDRAWN if self._waits else UNDRAWN
+        blind = mode in ACTING and bool(self._inputs) and self._undrawn > most
         if blind:
             steps = [self._silence()]
         self._inputs.clear()
@@ -449,7 +453,7 @@ class SessionController:
             self._fault = fault
             self.robot.stop()
         if not self._fault and not self.correction.over:
-            self.robot.permit()
+            self.robot.permit(self._waits)
 
     def _begin(self, intent: Intent) -> None:
         """Start the plan that was confirmed, or to follow, once."""
@@ -534,7 +538,8 @@ class SessionController:
         touched = hands[self._rigid].target is not None, hands[1 - self._rigid].target is not None
         words = next_action(intent.mode, intent.targets, holder, self.alignment is not None, touched)
         keys = next_key(intent.mode, intent.targets, holder, touched)
-        notice = self.notice or self.refused if holder else ""
+        waits = "waiting for the page, which draws too slowly" if self._waits else ""
+        notice = self.notice or self.refused or waits if holder else ""
         return messages.StateMessage(
             intent.mode, intent.motion, _joined(notice, self.blocked), words, keys,
             round(intent.countdown, 2), intent.preview, intent.execute, _rounded(intent.targets),

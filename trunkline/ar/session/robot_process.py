@@ -32,7 +32,7 @@ TEXT = 240  # bytes of a fault
 MODES = ("idle", "running", "done", "fault")
 # First numbers of the robot's report; axes, sent and measured, object and bodies follow.
 TIME, MODE, SERIAL, HOLD_TIME, READY = range(5)
-PERMIT, PERMITTED, STOPS = range(3)  # of what it is told
+PERMIT, PERMITTED, STOPS, WAITS = range(4)  # of what it is told
 POSE = 7
 
 
@@ -49,7 +49,7 @@ class RobotChannel:
         self.tendons, self.bodies = tendons, bodies
         self.size = 5 + 2 * (JOINTS + tendons) + POSE * (1 + bodies)
         self._numbers, self._number = context.RawArray(ctypes.c_double, self.size), context.RawValue(ctypes.c_uint64, 0)
-        self._requests, self._fault = context.RawArray(ctypes.c_double, 3), context.RawArray(ctypes.c_char, TEXT)
+        self._requests, self._fault = context.RawArray(ctypes.c_double, 4), context.RawArray(ctypes.c_char, TEXT)
         self.plans, self.wake = context.Queue(), context.Semaphore(0)
 
     @property
@@ -180,9 +180,10 @@ class RobotProcess:
         self.channel.plans.put((self._serial, digest, motion, self.channel.requests[STOPS]))
         self.channel.wake.release()
 
-    def permit(self) -> None:
-        """The robot may go on with what was started last, for another DEAD_MAN s."""
+    def permit(self, waits: bool = False) -> None:
+        """The robot may go on with what was started last, for another DEAD_MAN s; along a plan not while it `waits`."""
         requests = self.channel.requests
+        requests[WAITS] = waits
         requests[PERMIT], requests[PERMITTED] = time.monotonic(), self._serial
 
     def stop(self) -> None:

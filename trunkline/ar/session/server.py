@@ -34,7 +34,8 @@ from trunkline.ar.session.scene import Shells
 from trunkline.ar.session.settings import AlignmentSettings
 from trunkline.errors import InputError
 
-HELLO = 3.0  # s for the first message
+HELLO = 3.0  # s for the first message, whatever else comes before it
+CLOSING = 1.0  # s for whoever is shown out to close its end as well
 LARGEST = 64 * 1024  # bytes of a message
 FLOOD = 4000.0  # messages of a client beyond its rate that end it
 MOST_CLIENTS = 64  # and one more, for a stop
@@ -103,7 +104,9 @@ class Server:
         if reason:
             self.composition.log(f"refused {request.remote}: {reason}")
             return web.Response(status=403, text=f"error: {reason}\n")
-        socket = web.WebSocketResponse(max_msg_size=LARGEST, compress=False, heartbeat=HEARTBEAT)
+        socket = web.WebSocketResponse(
+            timeout=CLOSING, max_msg_size=LARGEST, compress=False, heartbeat=HEARTBEAT
+        )
         socket.headers.update(HEADERS)
         await socket.prepare(request)
         self._waiting[socket] = request.remote
@@ -139,7 +142,8 @@ class Server:
             InputError: the first message is no hello that may come in.
         """
         try:
-            message = await socket.receive(timeout=HELLO)
+            async with asyncio.timeout(HELLO):  # that of `receive` begins anew with each ping
+                message = await socket.receive()
         except TimeoutError:
             raise InputError(f"hello: found none within {HELLO:g} s") from None
         if message.type is not WSMsgType.TEXT:

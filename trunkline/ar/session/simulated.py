@@ -21,7 +21,17 @@ from trunkline.ar.hybrid.compose import panda_joints
 from trunkline.ar.hybrid.rollouts import ComposedTwin
 from trunkline.ar.hybrid.torques import bare, servo_commands
 from trunkline.ar.session.bodies import BodyPoses
-from trunkline.ar.session.robot_process import DEAD_MAN, MODES, PERMIT, PERMITTED, STOPS, TELLS, Goal, RobotChannel
+from trunkline.ar.session.robot_process import (
+    DEAD_MAN,
+    MODES,
+    PERMIT,
+    PERMITTED,
+    STOPS,
+    TELLS,
+    WAITS,
+    Goal,
+    RobotChannel,
+)
 from trunkline.ar.teleop.executor import FOLLOWS, PlanFollower
 from trunkline.ar.teleop.following import Following
 from trunkline.ar.teleop.plan import Plan
@@ -168,7 +178,7 @@ class Loop:
             self.robot.stop()
         if stopped or (holds and not self._holds):
             self.hold_time = now
-        self._holds = holds
+        self._holds, self.robot.waits = holds, bool(requests[WAITS])
         if woken:
             self._listens = now + LISTENS
         if now <= self._listens:

@@ -49,8 +49,9 @@ class PlanFollower:
     At every `advance`, `move(joints, commands, dt)` is called with what the axes shall be: rad (7,), m (K,), s. Without
     `move`, the robot is where its plan says.
 
-    A stop slows time down along the plan, to 0 within BRAKE s, so that it ends on the way that was checked. A robot
-    that follows has no such way: it brakes as hard as its limits allow.
+    A stop slows time down along the plan, to 0 within BRAKE s, so that it ends on the way that was checked. While it
+    `waits`, time slows down likewise, and goes on from there once it does not. A robot that follows has no such way: it
+    brakes as hard as its limits allow, and waits for nothing.
     """
 
     def __init__(
@@ -66,7 +67,7 @@ class PlanFollower:
         self._plan: Plan | None = None
         self._follower: Follower | None = None
         self._fault = ""
-        self._time, self._pace, self._braking = 0.0, 1.0, False
+        self._time, self._pace, self._braking, self.waits = 0.0, 1.0, False, False
         self._report = ExecutorReport()
 
     def check(self, plan: Plan) -> str:
@@ -126,9 +127,13 @@ class PlanFollower:
         if self._follower is not None:
             self._go_after(self._follower, dt)
         elif self._plan is not None and self._report.mode == "running":
+            if self.waits and self._time == 0.0:
+                self._pace = 0.0  # it has not begun
             before = self._pace
-            if self._braking:
+            if self._braking or self.waits:
                 self._pace = max(before - self._slowed(dt), 0.0)
+            elif before < 1.0:
+                self._pace = min(before + self._slowed(dt), 1.0)
             self._time += dt * (before + self._pace) / 2
             self.joints, self.commands = self._plan.at(self._time)
             if self._braking and self._pace == 0.0:
@@ -154,5 +159,5 @@ class PlanFollower:
             self._report = ExecutorReport("fault" if self._fault else "idle", FOLLOWS, self._fault)
 
     def _slowed(self, dt: float) -> float:
-        """By how much a stop slows the pace in `dt` s."""
+        """By how much the pace changes at most in `dt` s."""
         return dt / BRAKE
