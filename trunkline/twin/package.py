@@ -108,8 +108,9 @@ def spec_of(files: dict[str, bytes], path: str) -> mujoco.MjSpec:
     except (UnicodeDecodeError, ElementTree.ParseError) as error:
         raise InputError(f"{path}: damaged: found no XML ({error}), expected MJCF") from None
     for element in root.iter():
-        if element.tag == "include" or "file" in element.attrib:
-            other = element.attrib.get("file", "")
+        named = [value for name, value in element.attrib.items() if name.startswith("file")]  # of a cube's sides as well
+        if element.tag == "include" or named:
+            other = "".join(named[:1])
             raise InputError(f"{path}: found <{element.tag}> of the file {other!r}, expected MJCF that reads no other")
     try:
         return mujoco.MjSpec.from_string(text)
