@@ -176,10 +176,15 @@ class Page {
     if (!this.wire.controls) this.inputAt = null;
   }
 
+  /** Whether anything is offered that may be taken. */
+  get offers() {
+    const { rigid, tip, better } = this.state?.targets ?? {};
+    return Boolean(rigid?.offer || tip?.offer || better || this.prediction?.offer);
+  }
+
   /** Shows why a key does nothing, where it does nothing. */
   explain(code) {
-    const { state, lease, wire } = this;
-    const offers = Boolean(state?.targets?.rigid?.offer || state?.targets?.tip?.offer || state?.targets?.better || this.prediction?.offer);
+    const { state, lease, wire, offers } = this;
     const now = { up: Boolean(wire?.up), controls: Boolean(wire?.controls), holder: lease?.holder ?? "", mode: state?.mode, gripped: this.desktop.deadman, offers, cameras: Boolean(this.measured.message) };
     const why = whyNothing(code, now), { mode } = now;
     if (why) this.warn(why, () => this.state?.mode !== mode || (Boolean(this.wire?.controls) !== now.controls) || this.desktop.deadman !== now.gripped);
@@ -508,10 +513,9 @@ class Page {
     if (picture) status.facts.Picture = ofDevice(picture, device);
     this.panel.show(status);
     document.body.toggleAttribute("data-touch", this.desktop.touches);
-    const controls = Boolean(wire?.controls), targets = state?.targets;
-    const offers = Boolean(targets?.rigid?.offer || targets?.tip?.offer || this.prediction?.offer), stopped = state?.mode === "stopped";
+    const controls = Boolean(wire?.controls), stopped = state?.mode === "stopped";
     setText(find("go").firstChild, stopped ? "Go on " : "Take the offer ");
-    find("go").hidden = !controls || !(stopped || (offers && !this.desktop.deadman));
+    find("go").hidden = !controls || !(stopped || (this.offers && !this.desktop.deadman));
     setText(find("which"), this.desktop.chosen === this.desktop.rigid ? "Mount" : "Tip");
     find("reach").setAttribute("aria-pressed", String(this.drawn.reachShown));
     for (const id of ["cameras", "correct"]) find(id).hidden = !this.measured.message;
