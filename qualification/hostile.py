@@ -27,6 +27,12 @@ PATIENCE = 60.0  # s for a plan and its preview
 SOON = 3.0  # s for an answer
 PAUSE = 1.5  # s after a preview, and after a refusal: the same is said once a second
 PROMISED = "a" * 64  # a digest of no plan
+LONG = 30.0  # s for a connection that does nothing to be shown out
+PING = b"\x89\x80\0\0\0\0"
+UPGRADE = "\r\n".join(
+    ["GET /ws HTTP/1.1", f"Host: {ADDRESS.url.removeprefix('http://')}", f"Origin: {ADDRESS.url}", "Upgrade: websocket",
+     "Connection: Upgrade", "Sec-WebSocket-Version: 13", f"Sec-WebSocket-Key: {'A' * 22}==", "", ""]
+)  # fmt: skip
 
 
 @dataclass
@@ -74,6 +80,22 @@ async def hello(visitors: Visitors, **message: object) -> str:
     guest = await knock(visitors.session, ADDRESS.url)
     await guest.say(type="hello", **message)
     return await refused(guest)
+
+
+async def speechless(line: str, pings: bool = False) -> str:
+    """A connection that sends this, then nothing but pings, and closes nothing."""
+    host, port = ADDRESS.url.removeprefix("http://").split(":")
+    reader, writer = await asyncio.open_connection(host, int(port))
+    writer.write(line.encode())
+    begun = time.monotonic()
+    with suppress(ConnectionError):
+        while time.monotonic() < begun + LONG:
+            with suppress(TimeoutError):
+                if await asyncio.wait_for(reader.read(4096), 0.2) == b"":
+                    return f"gone after {time.monotonic() - begun:.1f} s"
+            writer.write(PING * pings)
+        return "NOTHING"
+    return f"gone after {time.monotonic() - begun:.1f} s"
 
 
 async def sent(visitors: Visitors, message: bytes) -> str:
@@ -163,6 +185,9 @@ ATTEMPTS: dict[str, Attempt] = {
     "wrong token": lambda s: hello(s, version=1, token="x" * 22),
     "guessed pairing code": lambda s: hello(s, version=1, code="123456"),
     "another version": lambda s: hello(s, version=99, token=s.token),
+    "half a request": lambda s: speechless(UPGRADE[:30]),
+    "a connection that says nothing": lambda s: speechless(UPGRADE),
+    "… but pings": lambda s: speechless(UPGRADE, True),
     "message of 10 MB": lambda s: sent(s, bytes(10_000_000)),
     "message of no kind": lambda s: sent(s, b"\x63" + bytes(15)),
     "6000 messages at once": flood,
