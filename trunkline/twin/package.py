@@ -107,8 +107,8 @@ def spec_of(files: dict[str, bytes], path: str) -> mujoco.MjSpec:
         root = ElementTree.fromstring(text)
     except (UnicodeDecodeError, ElementTree.ParseError) as error:
         raise InputError(f"{path}: damaged: found no XML ({error}), expected MJCF") from None
-    for element in root.iter():
-        named = [value for name, value in element.attrib.items() if name.startswith("file")]  # of a cube's sides as well
+    for element in root.iter():  # a texture may name a file for each side
+        named = [value for name, value in element.attrib.items() if name.startswith("file")]
         if element.tag == "include" or named:
             other = "".join(named[:1])
             raise InputError(f"{path}: found <{element.tag}> of the file {other!r}, expected MJCF that reads no other")
