@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from tests.support.operator import Everywhere, Operator
@@ -141,12 +142,31 @@ def test_followed_targets_are_those_of_so_long_ago():
     assert operator.intents[-1].follow != operator.intents[-1].targets
 
 
-def test_what_is_out_of_reach_is_not_followed_and_said():
+class Offerless(Everywhere):
+    """That knows no nearest point."""
+
+    def rigid(self, mount, pointing):
+        return super().rigid(mount, pointing)._replace(offer=None)
+
+
+def test_out_of_reach_the_nearest_within_is_followed_and_said():
     operator = Operator(reach=Everywhere(1.4))
+    operator.to("follow")
+    before = np.array(operator.intents[-1].follow.rigid.position)
+    intent = operator.wait(1.5, left={"position": (0.0, 0.0, -1.0)})
+    assert intent.notice.endswith("mm out of reach; the robot goes to the nearest point within")
+    assert (intent.motion, intent.follow.rigid.reach, intent.targets.rigid.reach) == ("follow", "inside", "inside")
+    assert np.linalg.norm(intent.follow.rigid.position) == pytest.approx(1.4)
+    assert np.linalg.norm(intent.follow.rigid.position - before) > 0.1
+    assert operator.wait(0.5, left={"position": (0.0, 0.0, 0.0)}).notice == ""
+
+
+def test_out_of_reach_of_all_that_is_known_the_last_within_is_followed_and_said():
+    operator = Operator(reach=Offerless(1.4))
     operator.to("follow")
     inside = operator.intents[-1].follow
     intent = operator.wait(1.5, left={"position": (0.0, 0.0, -1.0)})
     assert intent.targets.rigid.reach == "outside"
-    assert "out of reach" in intent.notice
+    assert intent.notice.endswith("mm out of reach; the robot stays at the last within reach")
     assert (intent.motion, intent.follow.rigid.reach) == ("follow", "inside")
     assert inside.rigid.position != intent.targets.rigid.position

@@ -16,12 +16,14 @@ from trunkline.ar.teleop.messages import Input, Intent, Motion, Pose, Request, T
 from trunkline.ar.teleop.reach import Reach
 from trunkline.ar.teleop.settings import Teleop
 from trunkline.ar.teleop.state import Pinned, TeleoperationState
-from trunkline.ar.teleop.targets import bring, offered, place, tilted, why_not
+from trunkline.ar.teleop.targets import bring, offered, out_of_reach, place, tilted, why_not
 from trunkline.ar.teleop.tracked_controller import Hand, below, hear, missed, ray_end
 from trunkline.ar.teleop.transitions import TRANSITIONS, Event, first_event
+from trunkline.ar.teleop.vectors import Vector
 
 AIMING = ("aim", "follow")
 STAYS = "the robot stays at the last within reach"  # noticed while targets are not followed
+GOES = "the robot goes to the nearest point within"  # noticed while it follows what is offered in their place
 WATCHING = ("plan", "preview", "ready")  # nothing moves: a plan outlives that its user is not heard for a while
 PLANNED = ("plan", "preview", "ready", "delay", "execute", "follow")  # modes that a change of the world concerns
 
@@ -61,13 +63,15 @@ class Teleoperation:
             state = replace(state, world=message.world.digest, history=())
         ends = (ray_end(state.left, alignment), ray_end(state.right, alignment))
         state = self._parked(state, ends, alignment, dt)
-        targets = self._targets(state, message)
+        targets, beyond = self._targets(state, message), ""
+        if state.mode == "follow" and targets is not None:
+            targets, beyond = self._nearest(state, message, targets)
         if targets is not None:
             state = self._remembered(state, targets)
         events, notice = detect_events(state, message, targets, ends, self.settings)
         events["confirm"] = events["confirm"] and not unheard
         state, intent = self._after(state, message, events, notice, targets, dt, ends)
-        return state, replace(intent, notice=unheard or intent.notice)
+        return state, replace(intent, notice=unheard or (beyond if intent.mode == "follow" else "") or intent.notice)
 
     def _hands_after(self, state: TeleoperationState, message: Input, dt: float) -> tuple[TeleoperationState, str, str]:
         """Both hands after this input; why nothing of it can be trusted; and who is not heard. Either is "" where
@@ -132,12 +136,28 @@ class Teleoperation:
         )
         if rigid is None or (tip is None and held_object is None):
             return None
+        targets = self._placed(rigid, tip, state, message)
+        return targets if held_object is not None else offered(targets, message.offer)
+
+    def _placed(self, rigid: Vector, tip: Vector | None, state: TeleoperationState, message: Input) -> Targets:
+        """Targets there; `tip` may be None where the arm holds an object."""
         wrist, world, last = wrist_of(message.joints, self.mount_offset), message.world, state.aligned
-        if held_object is not None:
-            return bring(held_object, rigid, state.pointing, state.limited, wrist, last.half_plane, world, self.reach)
+        if world.held_object is not None:
+            held = world.held_object
+            return bring(held, rigid, state.pointing, state.limited, wrist, last.half_plane, world, self.reach)
         assert tip is not None
-        targets = place(rigid, tip, state.pointing, state.limited, wrist, last, world, self.reach, self.settings)
-        return offered(targets, message.offer)
+        return place(rigid, tip, state.pointing, state.limited, wrist, last, world, self.reach, self.settings)
+
+    def _nearest(self, state: TeleoperationState, message: Input, targets: Targets) -> tuple[Targets, str]:
+        """What is followed in place of `targets`, and a notice of it: these, "" where they are within reach; else what
+        is offered, the mount's place first, as it moves what the arm reaches; these where that is not within either."""
+        reason, nearest = out_of_reach(targets), targets
+        for _ in range(2 if reason else 0):
+            rigid, tip = (target.offer or target.position for target in (nearest.rigid, nearest.tip))
+            nearest = self._placed(rigid, tip, state, message)
+            if not why_not(nearest):
+                return nearest, f"{reason}; {GOES}"
+        return targets, ""
 
     def _remembered(self, state: TeleoperationState, targets: Targets) -> TeleoperationState:
         """The state with `targets` in its history, which keeps what may be looked back to."""
@@ -225,7 +245,7 @@ class Teleoperation:
             motion = "execute" if state.mode == "execute" else "follow"
         notice = state.notice
         if state.mode == "follow" and why_not(targets):
-            notice = f"{why_not(targets)}; {STAYS}"
+            notice = f"{out_of_reach(targets) or why_not(targets)}; {STAYS}"
         return Intent(
             state.mode,
             motion,

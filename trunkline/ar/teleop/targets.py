@@ -139,7 +139,17 @@ def why_not(targets: Targets | None) -> str:
             return f"{name} target is inside {target.obstacle}"
         if target.reach == "outside":
             offered = "; primary button takes the nearest point that is within" if target.offer else ""
-            return f"{name} target is {1e3 * target.outside_by:.0f} mm out of reach{offered}"
+            return f"{_by_how_much(name, target)}{offered}"
     if targets.turned is None:
         return "wrist cannot turn the arm's bending plane to the tip target"
     return ""
+
+
+def out_of_reach(targets: Targets | None) -> str:
+    """Which target is out of reach, in one line; "" where none is."""
+    both = () if targets is None else (("rigid", targets.rigid), ("tip", targets.tip))
+    return next((_by_how_much(name, target) for name, target in both if target.reach == "outside"), "")
+
+
+def _by_how_much(name: str, target: Target) -> str:
+    return f"{name} target is {1e3 * target.outside_by:.0f} mm out of reach"

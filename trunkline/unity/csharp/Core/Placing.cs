@@ -113,7 +113,16 @@ public static class Placing {
       return "";
     }
     string offered = target.Offer != null ? "; primary button takes the nearest point that is within" : "";
-    return $"{name} target is {Formats.Fixed(1e3 * target.OutsideBy, 0)} mm out of reach{offered}";
+    return ByHowMuch(name, target) + offered;
   }
+
+  // Which target is out of reach, in one line; "" where none is.
+  internal static string OutOfReach(Targets targets) =>
+      targets == null ? ""
+      : targets.Rigid.Reach == Where.Outside ? ByHowMuch("rigid", targets.Rigid)
+      : targets.Tip.Reach == Where.Outside ? ByHowMuch("tip", targets.Tip) : "";
+
+  private static string ByHowMuch(string name, Target target) =>
+      $"{name} target is {Formats.Fixed(1e3 * target.OutsideBy, 0)} mm out of reach";
 }
 }

@@ -65,13 +65,18 @@ public sealed class Teleoperation {
     Vector? leftEnd = Hands.RayEnd(next.Left, alignment), rightEnd = Hands.RayEnd(next.Right, alignment);
     Park(next, leftEnd, rightEnd, alignment, dt);
     var targets = TargetsOf(next, given);
+    string beyond = "";
+    if (next.Mode == Mode.Follow && targets != null) {
+      (targets, beyond) = Nearest(next, given, targets);
+    }
     if (targets != null) {
       Remember(next, targets);
     }
-    var (found, notice) = Events.Happened(next, given, targets, leftEnd, rightEnd, Settings);
+    var (found, word) = Events.Happened(next, given, targets, leftEnd, rightEnd, Settings);
     found[(int)Event.Confirm] &= unheard == "";
-    var (after, intent) = After(next, given, found, notice, targets, dt, leftEnd, rightEnd);
-    return (after, unheard == "" ? intent : intent.WithNotice(unheard));
+    var (after, intent) = After(next, given, found, word, targets, dt, leftEnd, rightEnd);
+    string notice = unheard != "" || intent.Mode != Mode.Follow ? unheard : beyond;
+    return (after, notice == "" ? intent : intent.WithNotice(notice));
   }
 
   // The functions below change `state`, which is the copy that `Step` has made and nobody else has seen.
@@ -164,14 +169,33 @@ public sealed class Teleoperation {
     if (rigid == null || (tip == null && held == null)) {
       return null;
     }
+    var placed = Placed(rigid.Value, tip, state, given);
+    return held != null ? placed : Placing.Offered(placed, given.Offer);
+  }
+
+  // Targets there; `tip` may be null where the arm holds an object.
+  private Targets Placed(Vector rigid, Vector? tip, State state, Input given) {
     var wrist = Alignment.WristOf(given.Joints, MountOffset);
-    if (held != null) {
-      return Placing.Bring(held, rigid.Value, state.Pointing, state.Limited, wrist, state.Aligned.HalfPlane,
-                           given.World, Reach);
+    var held = given.World.Held;
+    return held != null
+        ? Placing.Bring(held, rigid, state.Pointing, state.Limited, wrist, state.Aligned.HalfPlane, given.World, Reach)
+        : Placing.Place(rigid, tip.Value, state.Pointing, state.Limited, wrist, state.Aligned, given.World, Reach,
+                        Settings);
+  }
+
+  // What is followed in place of `targets`, and a notice of it: these, "" where they are within reach; else what is
+  // offered, the mount's place first, as it moves what the arm reaches; these where that is not within either.
+  private (Targets Followed, string Notice) Nearest(State state, Input given, Targets targets) {
+    string reason = Placing.OutOfReach(targets);
+    var nearest = targets;
+    for (int i = 0; i < 2 && reason != ""; i++) {
+      nearest = Placed(nearest.Rigid.Offer ?? nearest.Rigid.Position, nearest.Tip.Offer ?? nearest.Tip.Position, state,
+                       given);
+      if (Placing.WhyNot(nearest) == "") {
+        return (nearest, $"{reason}; the robot goes to the nearest point within");
+      }
     }
-    var found = Placing.Place(rigid.Value, tip.Value, state.Pointing, state.Limited, wrist, state.Aligned, given.World,
-                              Reach, Settings);
-    return Placing.Offered(found, given.Offer);
+    return (targets, "");
   }
 
   // `targets` in the history, which keeps what may be looked back to.
@@ -269,7 +293,8 @@ public sealed class Teleoperation {
         : mode == Mode.Follow && state.Following != null ? Motion.Follow : Motion.Hold;
     string notice = state.Notice;
     if (mode == Mode.Follow && Placing.WhyNot(targets) is string why && why != "") {
-      notice = $"{why}; the robot stays at the last within reach";
+      string reason = Placing.OutOfReach(targets);
+      notice = $"{(reason != "" ? reason : why)}; the robot stays at the last within reach";
     }
     bool shown = mode == Mode.Preview || mode == Mode.Ready || mode == Mode.Delay;
     return new Intent(
