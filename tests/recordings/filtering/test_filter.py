@@ -16,7 +16,7 @@ from tests.support.workbench import workbench
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base, rotation_from_wxyz
 from trunkline.pipeline.stage import run_stage
-from trunkline.recordings.filtering.filter import Filter, _check_within, _marker
+from trunkline.recordings.filtering.filter import Filter, _check_near, _marker
 from trunkline.recordings.trials.splits import SPLITS
 from trunkline.recordings.trials.trial import read_trials
 
@@ -115,16 +115,23 @@ def test_orientation_noise_is_reduced(results):
 
 
 @pytest.mark.parametrize(("beyond", "refused"), [(54.9, False), (55.1, True)])
-def test_filtered_positions_beyond_all_measured_ones_are_refused_from_half_their_way_on(beyond, refused):
+def test_filtered_positions_beside_the_measured_ones_are_refused_from_half_their_way_on(beyond, refused):
     """And 5 mm: here 55 mm."""
     time = np.arange(200) / 100
     samples = 0.05 * np.sin(2 * np.pi * time)[:, None] * [1.0, 0.0, 0.0]
     filtered = samples.copy()
     filtered[120, 2] = -1e-3 * beyond
-    far = f"filtered positions are {beyond} mm beyond all measured ones at 1.20 s, expected at most 55 mm"
+    far = f"filtered positions are {beyond} mm from the measured ones at 1.20 s, expected at most 55 mm"
     message = re.escape(f"trial swing: 'tip': {far}: are its times right?")
     with pytest.raises(InputError, match=message) if refused else contextlib.nullcontext():
-        _check_within(time, filtered, samples, "trial swing: 'tip'")
+        _check_near(time, filtered, time, samples, "trial swing: 'tip'")
+
+
+def test_a_curve_among_the_measured_positions_at_other_times_is_refused():
+    time = np.arange(200) / 100
+    samples = 0.05 * np.sin(2 * np.pi * time)[:, None] * [1.0, 0.0, 0.0]
+    with pytest.raises(InputError, match="filtered positions are 100 mm from the measured ones at 0.25 s"):
+        _check_near(time, -samples, time, samples, "trial swing: 'tip'")
 
 
 def test_a_curve_that_leaves_what_was_measured_is_refused_only_where_it_is_trusted():
@@ -133,7 +140,7 @@ def test_a_curve_that_leaves_what_was_measured_is_refused_only_where_it_is_trust
     swing = 0.02 * np.sin(6 * np.pi * time) * np.where(time < 1, 1, -1)
     samples, grid = swing[:, None] * [1.0, 0.0, 0.0], np.arange(300) / 100
     trusting = Filter(rate=100, cutoff=20, order=4, longest_bridge=2, outlier_deviations=1000, release="onset")
-    with pytest.raises(InputError, match=r"swing: filtered positions are [\d.]+ mm beyond .* expected at most 25 mm"):
+    with pytest.raises(InputError, match=r"swing: filtered positions are [\d.]+ mm from the measured ones .* expected at most 25 mm"):
         _marker(time, samples, grid, trusting, "trial swing")
     filtered = _marker(time, samples, grid, replace(trusting, longest_bridge=0.06), "trial swing")
     assert np.abs(filtered.columns[filtered.measured]).max() < 0.025

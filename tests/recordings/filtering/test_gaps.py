@@ -7,7 +7,7 @@ import pytest
 
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
-from trunkline.recordings.filtering.filter import Filter, _check_within, average_static, filter_raw_trial, start_of
+from trunkline.recordings.filtering.filter import Filter, _check_near, average_static, filter_raw_trial, start_of
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.recordings.trials.raw_trial import RawTrial
 from trunkline.recordings.trials.trial import Trial
@@ -119,10 +119,11 @@ def moving_while_hidden(count: int) -> tuple[RawTrial, slice]:
 
 def test_filtered_positions_that_leave_all_samples_are_refused():
     time = np.arange(10) * 0.1
-    samples = np.zeros((50, 3))
-    _check_within(time, np.full((10, 3), 4e-3), samples, "trial a: 'tip'")
-    with pytest.raises(InputError, match=r"trial a: 'tip': filtered positions are 3.4e\+03 mm beyond .* at 0.50 s"):
-        _check_within(time, np.where(np.arange(10) == 5, 3.4, 0.0)[:, None] * np.ones(3), samples, "trial a: 'tip'")
+    samples = np.zeros((10, 3))
+    _check_near(time, np.full((10, 3), 2.8e-3), time, samples, "trial a: 'tip'")
+    far = np.where(np.arange(10) == 5, 3.4, 0.0)[:, None] * np.ones(3)
+    with pytest.raises(InputError, match=r"trial a: 'tip': filtered positions are 5.89e\+03 mm from .* at 0.50 s"):
+        _check_near(time, far, time, samples, "trial a: 'tip'")
 
 
 def test_a_shape_at_rest_is_the_mean_of_the_frames_that_were_measured():

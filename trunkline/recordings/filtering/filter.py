@@ -19,7 +19,7 @@ from trunkline.recordings.trials.raw_trial import RawTrial
 from trunkline.recordings.trials.recording import PlannedTrial
 from trunkline.recordings.trials.trial import Trial
 
-BEYOND, BEYOND_LEAST = 0.5, 5e-3  # share of the way that samples go, and m, by which filtered ones may go beyond them
+ASIDE, ASIDE_LEAST = 0.5, 5e-3  # share of how far samples go, and m, by which filtered ones may be beside them
 
 
 @dataclass
@@ -176,7 +176,7 @@ def _marker(time: np.ndarray, samples: np.ndarray, grid: np.ndarray, settings: F
     # the low-pass carries what fills a gap some frames beyond its edges
     reach = round(settings.rate / settings.cutoff / 2)
     measured = ~binary_dilation(~bridged(time, grid, settings.longest_bridge), iterations=reach)
-    _check_within(grid[measured], smooth[measured, :3], samples[:, :3], where)
+    _check_near(grid[measured], smooth[measured, :3], time, samples[:, :3], where)
     return _Marker(
         columns=smooth,
         measured=measured,
@@ -186,13 +186,12 @@ def _marker(time: np.ndarray, samples: np.ndarray, grid: np.ndarray, settings: F
     )
 
 
-def _check_within(time: np.ndarray, filtered: np.ndarray, samples: np.ndarray, where: str) -> None:
-    """Refuse positions (G, 3) m at times (G,) s that went far from where any of the samples (T, 3) m was."""
-    low, high = samples.min(axis=0), samples.max(axis=0)
-    beyond = np.maximum(filtered - high, low - filtered).max(axis=1, initial=0)
-    allowed = BEYOND * float((high - low).max()) + BEYOND_LEAST
-    if beyond.max(initial=0) > allowed:
-        far = f"{1e3 * beyond.max():.3g} mm beyond all measured ones at {time[beyond.argmax()]:.2f} s"
+def _check_near(grid: np.ndarray, filtered: np.ndarray, time: np.ndarray, samples: np.ndarray, where: str) -> None:
+    """Refuse positions (G, 3) m at times (G,) s that are far from the line through the samples (T, 3) m at (T,) s."""
+    beside = np.linalg.norm(filtered - np.column_stack([np.interp(grid, time, axis) for axis in samples.T]), axis=1)
+    allowed = ASIDE * float(np.ptp(samples, axis=0).max()) + ASIDE_LEAST
+    if beside.max(initial=0) > allowed:
+        far = f"{1e3 * beside.max():.3g} mm from the measured ones at {grid[beside.argmax()]:.2f} s"
         raise InputError(
             f"{where}: filtered positions are {far}, expected at most {1e3 * allowed:.3g} mm: are its times right?"
         )
