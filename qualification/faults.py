@@ -28,7 +28,7 @@ from qualification.hushed import HUSH
 from qualification.operator import DRIFTS, JUMP, LATE, PATIENCE
 from qualification.scene import OperatedSession, staged
 from trunkline.ar.session.clock import FORWARD
-from trunkline.ar.session.controller import UNDRAWN
+from trunkline.ar.session.controller import MOST_UNDRAWN
 from trunkline.ar.session.follow import PLANNER_TIMEOUT
 from trunkline.ar.session.log_reader import read_session_log
 from trunkline.ar.session.log_writer import LATE as LOG_LATE
@@ -124,7 +124,8 @@ FAULTS = (
           allowed=FORWARD / DRIFTS["drift"]),
     Fault(f"client's clock runs {1e6 * DRIFTS['slew']:.0f} ppm fast", _tell("slew"), _tell("grip"), allowed=None),
     Fault(f"inputs are evenly {LATE:g} s late", _tell("late"), OperatedSession.renew),
-    Fault(f"nothing drawn, inputs go on ({UNDRAWN:g} s allowed)", _tell("blind"), _tell("grip"), allowed=UNDRAWN),
+    Fault(f"nothing drawn, inputs go on ({MOST_UNDRAWN:g} s allowed)", _tell("blind"), _tell("grip"),
+          allowed=MOST_UNDRAWN),
     Fault("poses are no numbers", _tell("nan"), _tell("grip")),
     Fault(f"server hangs for {HANG:g} s", _hang, _tell("grip")),
     Fault("process that plans hangs", _stop("planner"), _resume("planner"), allowed=None),

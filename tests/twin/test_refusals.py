@@ -13,6 +13,7 @@ from trunkline.twin.package import MANIFEST, MOST_BYTES, arm_of, package_digest,
 from trunkline.unity.upm_package import write_tarball
 
 CUBE = b"<mujoco><asset><texture type='cube' fileright='../../x.png'/></asset></mujoco>"
+HIDDEN = b"<!DOCTYPE mujoco [<!-- ><mujoco><include file='/etc/passwd'/></mujoco> --> ]><mujoco><nonsense/></mujoco>"
 SOUND = sealed({MODEL: MJCF, TABLES: b'{"stages": []}'})
 
 
@@ -50,6 +51,7 @@ CASES: dict[str, dict[str, bytes] | Callable[[Path], None]] = {
     "a file beside the package": SOUND | {"../outside": b"more"},
     "sealed anew: a model that reads other files": sealed({MODEL: b"<mujoco><include file='/etc/passwd'/></mujoco>"}),
     "… a texture from outside the package": sealed({MODEL: CUBE}),
+    "… a model in what only some call a comment": sealed({MODEL: HIDDEN}),
     "… a model cut in half": sealed({MODEL: MJCF[: len(MJCF) // 2]}),
     "… a model that is none": sealed({MODEL: b"<mujoco><worldbody><nonsense/></worldbody></mujoco>"}),
 }

@@ -113,7 +113,7 @@ def spec_of(files: dict[str, bytes], path: str) -> mujoco.MjSpec:
             other = "".join(named[:1])
             raise InputError(f"{path}: found <{element.tag}> of the file {other!r}, expected MJCF that reads no other")
     try:
-        return mujoco.MjSpec.from_string(text)
+        return mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))  # what was looked at, no more
     except ValueError as error:
         raise InputError(f"{path}: not a model that MuJoCo reads: {str(error).splitlines()[0]}") from None
 

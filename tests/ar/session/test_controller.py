@@ -17,7 +17,7 @@ from trunkline.ar.session import messages
 from trunkline.ar.session.arm_cameras import MeasuredArm
 from trunkline.ar.session.binary import HAND, Received
 from trunkline.ar.session.broadcast import Broadcast
-from trunkline.ar.session.controller import MOST_INPUTS, MOST_UNDRAWN, UNDRAWN, SessionController
+from trunkline.ar.session.controller import MOST_INPUTS, MOST_UNDRAWN, UNBEGUN, UNDRAWN, SessionController
 from trunkline.ar.session.controller_input import controllers
 from trunkline.ar.session.follow import PLANNER_TIMEOUT
 from trunkline.ar.session.log_writer import LogWriter
@@ -28,6 +28,7 @@ from trunkline.ar.teleop.executor import BRAKE, FOLLOWS, PlanFollower
 from trunkline.ar.teleop.messages import Controller, ExecutorReport, Intent, Obstacle, PlanReport, Pose
 from trunkline.ar.teleop.plan import CorrectionBounds, Plan
 
+WAITS = "the page draws too slowly, the robot waits for it"
 DT, IDENTITY = 1 / 72, (1.0, 0.0, 0.0, 0.0)
 BASE = Pose((0.0, 0.0, 0.0), IDENTITY)
 UP = np.array([0.0, 0.0, 0.6])  # from a ray's end to the hand
@@ -622,11 +623,13 @@ def test_a_plan_waits_for_the_page_that_draws_too_slowly_and_goes_on_with_its_ne
     session.readied()
     session.right = {"grip": 1.0, "trigger": 1.0}
     session.until(lambda intent: intent.mode == "execute")
-    session.right, session.flags = {"grip": 1.0}, UNSEEN
+    session.right = {"grip": 1.0}
+    session.tick()
+    session.flags = UNSEEN
     assert session.wait(UNDRAWN - DT).motion == "execute"
     assert session.controller.state_message("somebody").notice == ""
     assert session.wait(2 * DT).motion == "execute"
-    assert session.controller.state_message("somebody").notice == "waiting for the page, which draws too slowly"
+    assert session.controller.state_message("somebody").notice == WAITS
     session.wait(BRAKE)
     here = session.robot.joints
     session.wait(1.0)
@@ -634,9 +637,10 @@ def test_a_plan_waits_for_the_page_that_draws_too_slowly_and_goes_on_with_its_ne
     session.flags = TRACKED
     session.wait(BRAKE)
     assert np.abs(session.robot.joints - here).max() > 0
-    assert session.controller.state_message("somebody").notice == ""
+    assert session.controller.state_message("somebody").notice == WAITS  # it does not come and go with each picture
     session.wait(1.0)
     assert session.robot.state().mode == "done"
+    assert session.controller.state_message("somebody").notice == ""
 
 
 def test_who_draws_nothing_as_a_plan_waits_counts_as_silent_and_is_told_why(session, monkeypatch):
@@ -687,8 +691,23 @@ def test_what_is_confirmed_by_who_draws_nothing_does_not_begin(session):
     assert session.controller.intent.mode == "ready"  # nothing moves: the plan is kept
     session.right = {"grip": 1.0, "trigger": 1.0}
     before = session.robot.joints
-    session.until(lambda intent: intent.mode == "hold", MOST_UNDRAWN)
+    assert session.wait(UNBEGUN - UNDRAWN - 4 * DT).mode in ("delay", "execute")
+    session.until(lambda intent: intent.mode == "hold", 6 * DT)
     np.testing.assert_array_equal(session.robot.joints, before)
+
+
+@pytest.mark.parametrize(("undrawn", "mode"), [(UNBEGUN - 3 * DT, "execute"), (UNBEGUN + 3 * DT, "hold")])
+def test_a_picture_that_comes_late_as_the_delay_ends_starts_what_is_not_long_overdue(session, undrawn, mode):
+    session.readied()
+    session.right = {"grip": 1.0, "trigger": 1.0}
+    session.until(lambda intent: intent.mode == "delay")
+    before = session.robot.joints
+    session.right, session.flags = {"grip": 1.0}, UNSEEN
+    session.wait(undrawn)
+    np.testing.assert_array_equal(session.robot.joints, before)
+    session.flags = TRACKED
+    assert session.wait(0.2).mode == mode
+    assert np.array_equal(session.robot.joints, before) == (mode == "hold")
 
 
 def test_who_takes_over_has_time_to_draw(session):

@@ -323,6 +323,14 @@ def test_a_start_is_on_its_way_until_the_robot_tells_of_it(robot, clock):
     serial, digest, asked, stops = robot.channel.plans.get_nowait()
     assert (serial, digest, asked, stops) == (1, plan.digest(), plan, robot.channel.requests[STOPS])
     assert (robot.channel.requests[PERMITTED], robot.channel.requests[PERMIT]) == (1, clock.now)
+    robot.permit(waits=True)
+    robot._begin(plan, plan.digest())  # a step of a correction, say
+    assert robot.channel.requests[WAITS]
+    robot.stop()
+    assert not robot.channel.requests[WAITS]
+    robot._begin(plan, plan.digest())
+    assert not robot.channel.requests[WAITS]
+    robot._serial = 1
     tell(robot, clock, "done", serial=0)
     assert robot.state() == ExecutorReport("idle", "")
     tell(robot, clock, "running", serial=1)

@@ -252,7 +252,7 @@ def test_who_sends_inputs_and_draws_nothing_holds_the_robot_hears_why_and_still_
             for _ in range(160):
                 await guest.input(guest.left, guest.right, flags=0b0111)
                 await asyncio.sleep(1 / 72)
-            await watcher.hears("state", notice="waiting for the page, which draws too slowly")
+            await watcher.hears("state", notice="the page draws too slowly, the robot waits for it")
             state = await watcher.hears("state", mode="hold", motion="hold")
             assert state["notice"].startswith("the page has drawn nothing for 2.")
             assert (await watcher.hears("lease"))["holder"] == guest.id

@@ -7,6 +7,7 @@ import pytest
 
 from tests.support.operator import Everywhere, Operator
 from trunkline.ar.teleop.messages import Pose
+from trunkline.ar.teleop.reach import Reading
 from trunkline.ar.teleop.recorder import PLAN
 from trunkline.ar.teleop.transitions import EVENTS, MEANING, MODES, TRANSITIONS
 
@@ -170,3 +171,35 @@ def test_out_of_reach_of_all_that_is_known_the_last_within_is_followed_and_said(
     assert intent.notice.endswith("mm out of reach; the robot stays at the last within reach")
     assert (intent.motion, intent.follow.rigid.reach) == ("follow", "inside")
     assert inside.rigid.position != intent.targets.rigid.position
+
+
+class Short(Everywhere):
+    """Whose arm reaches all that is at most `deep` m below its mount."""
+
+    def __init__(self, most, deep):
+        super().__init__(most)
+        self.deep = deep
+
+    def soft(self, tip, gravity):
+        depth = float(np.dot(tip, gravity))
+        if depth <= self.deep:
+            return Reading("inside")
+        nearest = np.array(tip) - (depth - self.deep + 1e-9) * np.array(gravity)
+        return Reading("outside", depth - self.deep, tuple(map(float, nearest)))
+
+
+@pytest.mark.parametrize("deep", [0.5, 1.0])
+def test_the_mount_goes_to_its_nearest_point_first_and_then_the_tip_where_it_is_still_too_far(deep):
+    """From where the mount was wanted the tip would be out of reach; from where it goes it may be within."""
+    operator = Operator(reach=Short(1.4, deep))
+    operator.to("follow")
+    operator.wait(1.5, left={"position": (0.0, 3.0, 0.0)})
+    wanted = operator.core._targets(operator.state, operator.message)
+    assert (wanted.rigid.reach, wanted.tip.reach) == ("outside", "outside")
+    followed = operator.intents[-1].follow
+    mount, tip = np.array(followed.rigid.position), np.array(followed.tip.position)
+    assert np.linalg.norm(mount) == pytest.approx(1.4)
+    depth = mount[2] - np.array(wanted.tip.position)[2]
+    assert (depth <= deep) == (deep == 1.0)
+    assert mount[2] - tip[2] == pytest.approx(min(depth, deep))
+    np.testing.assert_allclose(tip[:2], wanted.tip.position[:2], atol=1e-9)

@@ -61,7 +61,8 @@ HERE = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))  # of poses that are in the b
 NUMBER = re.compile(r"[\d.]+")
 DIGITS = 4  # after the decimal point, of targets that are told
 UNDRAWN = 0.25  # s in which who moves the robot may have drawn no new pose of it
-MOST_UNDRAWN = 2.0  # s likewise, in which a plan that runs waits for the next one
+MOST_UNDRAWN, UNBEGUN = 2.0, 0.75  # s likewise, in which a plan waits, and one that was not yet seen to move
+SLOW = 1.0  # s since it waited last, in which that is noticed
 ACTING = ("delay", "execute", "follow")  # modes in which it moves, or is about to
 SWINGS, RARELY = 10.0, 0.25  # s after a motion in which all that cameras see is logged, and from one to the next later
 MOST_INPUTS = 8  # of a tick; older ones than these are left out, presses and all
@@ -134,7 +135,8 @@ class SessionController:
         self._last, self._fresh = self._nobody, True
         self._shift = 0.0  # s from a client's stamps to the core's
         self._drawn, self._undrawn = False, 0.0  # since the last tick; s in which who controls has drawn nothing
-        self._waits = False  # for a picture, on the way of a plan
+        self._waits, self._slow = False, 0.0  # for a picture, on the way of a plan; s for which that is still noticed
+        self._moves = False  # as a picture has shown
         self.notice = ""  # for all: the core's, or why who controls counts as silent
         self._instead = ("", "")  # a notice of the core's, and what is told instead
         self._stop, self._fault, self._shown_digest, self._since, self._believed = False, "", "", 0.0, ""
@@ -272,8 +274,8 @@ class SessionController:
         steps = list(self._inputs) or [self._last]
         self._undrawn, self._drawn = 0.0 if self._drawn else self._undrawn + dt, False
         mode = self.intent.mode if self.intent is not None else ""
-        self._waits = mode in ("delay", "execute") and self._undrawn > UNDRAWN
-        most = MOST_UNDRAWN if self._waits else UNDRAWN
+        self._wait(mode, dt)
+        most = UNDRAWN if mode == "follow" else MOST_UNDRAWN if self._moves else UNBEGUN
         blind = mode in ACTING and bool(self._inputs) and self._undrawn > most
         if blind:
             steps = [self._silence()]
@@ -330,6 +332,14 @@ class SessionController:
                 log_writer.alignment(self.alignment)
         if self.world is not world:
             log_writer.event("world", world=self.world)
+
+    def _wait(self, mode: str, dt: float) -> None:
+        """Whether what moves along a plan, or is about to, waits for a picture."""
+        before, self._waits = self._waits, mode in ("delay", "execute") and self._undrawn > UNDRAWN
+        self._moves = mode == "execute" and (self._moves or self._undrawn == 0.0)
+        self._slow = SLOW if self._waits else max(self._slow - dt, 0.0) if mode in ("delay", "execute") else 0.0
+        if self._waits and not before:
+            self.log_writer.event("waits", undrawn=self._undrawn)
 
     def _silence(self) -> HandInput:
         """For the core, an input after a gap in which nothing was drawn: it holds as for any that is silent. The
@@ -538,8 +548,8 @@ class SessionController:
         touched = hands[self._rigid].target is not None, hands[1 - self._rigid].target is not None
         words = next_action(intent.mode, intent.targets, holder, self.alignment is not None, touched)
         keys = next_key(intent.mode, intent.targets, holder, touched)
-        waits = "waiting for the page, which draws too slowly" if self._waits else ""
-        notice = self.notice or self.refused or waits if holder else ""
+        slow = "the page draws too slowly, the robot waits for it" if self._slow else ""
+        notice = self.refused or self.notice or slow if holder else ""
         return messages.StateMessage(
             intent.mode, intent.motion, _joined(notice, self.blocked), words, keys,
             round(intent.countdown, 2), intent.preview, intent.execute, _rounded(intent.targets),

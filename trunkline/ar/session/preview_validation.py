@@ -115,18 +115,20 @@ def _preview(before: list[dict], digest: str, rows: str, place) -> tuple[np.ndar
 
 
 def _end(later: list[dict], digest: str, last: float) -> tuple[str, float]:
-    """State of the robot at the end of a plan, and the time, s, until which that plan ran."""
+    """State of the robot at the end of a plan, and the time, s, until which that plan ran as it was previewed."""
     end, until = "the log ends", last
     for event in later:
+        if event["event"] == "waits" and end == "the log ends":  # for its page: it is later from then on
+            last = min(last, event["time"])
         if event["event"] in ("execute", "correction"):  # the tip's place is looked at before it is corrected
-            return end, min(until, event["time"])
+            return end, min(until, last, event["time"])
         robot = event.get("robot") if event["event"] == "robot" else None
         if robot is None or end != "the log ends":
             continue
         if robot["mode"] in ("done", "fault") or (robot["mode"] == "idle" and robot["digest"] == digest):
             end = str(robot["fault"] or ("held" if robot["mode"] == "idle" else robot["mode"]))
-            until = last if end == "done" else event["time"]
-    return end, until
+            until = last if end == "done" else min(last, event["time"])
+    return end, min(until, last)
 
 
 def _compared(

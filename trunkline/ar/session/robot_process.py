@@ -176,7 +176,7 @@ class RobotProcess:
 
     def _begin(self, motion: Plan | Following, digest: str) -> None:
         self._serial, self._digest, self._begun = self._serial + 1, digest, time.monotonic()
-        self.permit()
+        self.permit(bool(self.channel.requests[WAITS]))
         self.channel.plans.put((self._serial, digest, motion, self.channel.requests[STOPS]))
         self.channel.wake.release()
 
@@ -188,7 +188,7 @@ class RobotProcess:
 
     def stop(self) -> None:
         requests = self.channel.requests
-        requests[PERMITTED] = 0
+        requests[PERMITTED] = requests[WAITS] = 0
         requests[STOPS] += 1
         self.channel.wake.release()
 

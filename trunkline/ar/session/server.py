@@ -118,7 +118,11 @@ class Server:
             client = await self._welcome(socket)
         except InputError as error:
             self.composition.log(f"refused {request.remote}: {error}")
-            await end(socket, str(error))
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(CLOSING):  # it may read nothing of what it has asked for
+                    await end(socket, str(error))
+            if request.transport is not None:
+                request.transport.abort()
             return socket
         finally:
             self._waiting.pop(socket, None)

@@ -178,7 +178,8 @@ class Loop:
             self.robot.stop()
         if stopped or (holds and not self._holds):
             self.hold_time = now
-        self._holds, self.robot.waits = holds, bool(requests[WAITS])
+        self._holds = holds
+        self.robot.waits = bool(requests[WAITS])
         if woken:
             self._listens = now + LISTENS
         if now <= self._listens:

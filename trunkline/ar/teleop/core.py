@@ -151,13 +151,14 @@ class Teleoperation:
     def _nearest(self, state: TeleoperationState, message: Input, targets: Targets) -> tuple[Targets, str]:
         """What is followed in place of `targets`, and a notice of it: these, "" where they are within reach; else what
         is offered, the mount's place first, as it moves what the arm reaches; these where that is not within either."""
-        reason, nearest = out_of_reach(targets), targets
-        for _ in range(2 if reason else 0):
-            rigid, tip = (target.offer or target.position for target in (nearest.rigid, nearest.tip))
-            nearest = self._placed(rigid, tip, state, message)
-            if not why_not(nearest):
-                return nearest, f"{reason}; {GOES}"
-        return targets, ""
+        reason = out_of_reach(targets)
+        if not reason:
+            return targets, ""
+        rigid = targets.rigid.offer or targets.rigid.position
+        nearest = self._placed(rigid, targets.tip.position, state, message)
+        if nearest.tip.offer is not None:
+            nearest = self._placed(rigid, nearest.tip.offer, state, message)
+        return (targets, "") if why_not(nearest) else (nearest, f"{reason}; {GOES}")
 
     def _remembered(self, state: TeleoperationState, targets: Targets) -> TeleoperationState:
         """The state with `targets` in its history, which keeps what may be looked back to."""

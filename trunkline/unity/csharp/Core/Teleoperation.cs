@@ -187,15 +187,16 @@ public sealed class Teleoperation {
   // offered, the mount's place first, as it moves what the arm reaches; these where that is not within either.
   private (Targets Followed, string Notice) Nearest(State state, Input given, Targets targets) {
     string reason = Placing.OutOfReach(targets);
-    var nearest = targets;
-    for (int i = 0; i < 2 && reason != ""; i++) {
-      nearest = Placed(nearest.Rigid.Offer ?? nearest.Rigid.Position, nearest.Tip.Offer ?? nearest.Tip.Position, state,
-                       given);
-      if (Placing.WhyNot(nearest) == "") {
-        return (nearest, $"{reason}; the robot goes to the nearest point within");
-      }
+    if (reason == "") {
+      return (targets, "");
     }
-    return (targets, "");
+    var rigid = targets.Rigid.Offer ?? targets.Rigid.Position;
+    var nearest = Placed(rigid, targets.Tip.Position, state, given);
+    if (nearest.Tip.Offer != null) {
+      nearest = Placed(rigid, nearest.Tip.Offer, state, given);
+    }
+    return Placing.WhyNot(nearest) != ""
+        ? (targets, "") : (nearest, $"{reason}; the robot goes to the nearest point within");
   }
 
   // `targets` in the history, which keeps what may be looked back to.
