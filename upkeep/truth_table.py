@@ -132,17 +132,20 @@ def holds(row: dict, expected: float | None) -> bool | None:
 
 def _widths(rows: dict[str, dict], truth: dict) -> str:
     """How many intervals hold the truth, and whether they are as wide as errors ask for, in a sentence."""
-    ratios, verdicts = [], []
+    ratios, verdicts, plain = [], [], []
     for name, row in rows.items():
         expected = expectation(truth, name)
         if (verdict := holds(row, expected)) is not None:
             low, high, value, truly = parameter_named(name).coordinate([*stated_interval(row), row["value"], expected])
             ratios.append((value - truly) / (high - low) * 2)
             verdicts.append(verdict)
+            given_model = row.get("interval_95_given_model")
+            plain.append(given_model is not None and given_model[0] <= expected <= given_model[1])
     inside, rms = sum(verdicts), np.sqrt(np.mean(np.square(ratios or [np.nan])))
+    counts = f"{inside} of {len(ratios)}; given the model alone, {sum(plain)}"
     return (
-        f"Intervals that hold what is expected: {inside} of {len(ratios)}. Error over half width: {rms:.2f} (root\n"
-        f"mean square; {1 / ndtri(0.975):.2f} where they are as wide as they have to be, less where wider)."
+        f"Intervals that hold what is expected: {counts}. Error over half\nwidth: {rms:.2f} (root mean square; "
+        f"{1 / ndtri(0.975):.2f} where they are as wide as they have to be, less where wider)."
     )
 
 

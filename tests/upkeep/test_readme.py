@@ -140,7 +140,7 @@ def test_the_truth_is_held_against_the_intervals(judged):
     hardening = np.log(1.6 / 1.5) / np.log(1.8 / 1.4) * 2
     tendon_friction = np.log(0.6 / 0.5) / np.log(0.65 / 0.55) * 2
     rms = np.hypot(hardening, tendon_friction) / np.sqrt(2)
-    assert f"expected: 1 of 2. Error over half width: {rms:.2f} " in truth_table(judged)
+    assert f"expected: 1 of 2; given the model alone, 1. Error over half\nwidth: {rms:.2f} " in truth_table(judged)
 
 
 def test_the_truth_is_held_against_what_the_model_fixes_where_that_is_considered(judged):
@@ -152,6 +152,7 @@ def test_the_truth_is_held_against_what_the_model_fixes_where_that_is_considered
     path.write_text(json.dumps(table))
     assert "| 95 % interval, with the model's tolerances |" in truth_table(judged)
     assert "| 0.5 | 0.6 | 0.44 … 0.78 | yes |" in truth_table(judged)
+    assert "expected: 2 of 2; given the model alone, 1. " in truth_table(judged)
 
 
 def test_the_truth_table_says_what_the_model_lacks(judged):
