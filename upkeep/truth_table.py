@@ -139,12 +139,12 @@ def _widths(rows: dict[str, dict], truth: dict) -> str:
             low, high, value, truly = parameter_named(name).coordinate([*stated_interval(row), row["value"], expected])
             ratios.append((value - truly) / (high - low) * 2)
             verdicts.append(verdict)
-            alone = row.get("interval_95_given_model")
-            plain.append(alone is not None and alone[0] <= expected <= alone[1])
+            given_model = row.get("interval_95_given_model")
+            plain.append(given_model is not None and given_model[0] <= expected <= given_model[1])
     inside, rms = sum(verdicts), np.sqrt(np.mean(np.square(ratios or [np.nan])))
-    held = f"{inside} of {len(ratios)}; given the model alone, {sum(plain)}"
+    counts = f"{inside} of {len(ratios)}; given the model alone, {sum(plain)}"
     return (
-        f"Intervals that hold what is expected: {held}. Error over half\nwidth: {rms:.2f} (root mean square; "
+        f"Intervals that hold what is expected: {counts}. Error over half\nwidth: {rms:.2f} (root mean square; "
         f"{1 / ndtri(0.975):.2f} where they are as wide as they have to be, less where wider)."
     )
 

@@ -106,11 +106,11 @@ export const isDoubtful = (prediction) => (prediction?.probability ?? 1) < DOUBT
 /** The question at the first press that would confirm a doubtful grasp. */
 export const doubtQuestion = (prediction) => `Foreseen to hold in only ${Math.round(100 * prediction.probability)} % of cases. Pull the trigger again to confirm it all the same.`;
 
-/** The result of a motion that has arrived, by the `phases` of its plan and the `objects` as the server has them. */
-export function success(phases, objects) {
+/** The result of a motion that has arrived, by the `phases` of its plan, the `objects` as the server has them, and the s in which the arm `settles`. */
+export function success(phases, objects, settles) {
   const names = new Set(phases);
   const object = objects.find(({ support }) => support === "held");
   if (object && names.has("lift")) return `Held: lift of ${object.name} is done. Now point where it goes.`;
   if (names.has("release")) return "Put down: the arm has let go. Aim anew for the next motion.";
-  return "Arrived. Aim anew for the next motion.";
+  return settles > 0 ? "" : "Arrived. Aim anew for the next motion.";
 }

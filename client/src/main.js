@@ -67,7 +67,7 @@ class Page {
     this.confirming = new Confirming((prediction) => this.warn(doubtQuestion(prediction), () => this.state?.mode !== "ready", Infinity));
     this.immersive = new Immersive(this.renderer, (type, fields) => this.wire?.sendJson(type, fields), () => this.leftHeadset());
     Object.assign(this, { state: null, lease: null, reason: null, frame: null, playback: null, prediction: null, recording: null });
-    Object.assign(this, { lost: "", arrived: null, inputAt: null, worst: { gap: 0, at: -Infinity }, hiddenAt: -Infinity });
+    Object.assign(this, { lost: "", arrived: null, restsAt: 0, inputAt: null, worst: { gap: 0, at: -Infinity }, hiddenAt: -Infinity });
     this.reaches = { rigid: null, tip: null };
     this.ready = Promise.resolve(); // the scene, whose sizes a preview needs
     this.connect();
@@ -176,6 +176,11 @@ class Page {
     if (!this.wire.controls) this.inputAt = null;
   }
 
+  /** S until the arm rests after the last plan, as its preview had it. */
+  get settles() {
+    return Math.max(this.restsAt - clock(), 0);
+  }
+
   /** Whether anything is offered that may be taken. */
   get offers() {
     const { rigid, tip, better } = this.state?.targets ?? {};
@@ -221,6 +226,7 @@ class Page {
   changed(state) {
     if (["delay", "execute"].includes(this.state?.mode) && state.mode === "aim" && state.robot === "done") this.arrived = this.phases.map(([name]) => name);
     else if (!["aim", "hold"].includes(state.mode)) this.arrived = null;
+    if (state.mode === "execute" && this.state?.mode !== "execute") this.restsAt = clock() + (this.playback?.duration ?? 0);
     const wasBusy = BUSY.has(this.state?.mode) && !BUSY.has(state.mode);
     if (wasBusy && state.notice) this.warn(state.notice, () => BUSY.has(this.state?.mode)); // the state's notice ends once the core aims again
     this.state = state;
@@ -495,7 +501,7 @@ class Page {
     this.drawn.fade(stale);
     const device = immersed ? "controllers" : this.desktop.touches ? "touch" : "keys";
     const pressed = immersed ? HANDS.some((side) => this.hands[side].grip || this.hands[side].trigger) : this.desktop.isPressed;
-    const status = uiText({ state, lease, id: wire?.id ?? "", age: this.rounded(age), up: Boolean(wire?.up && wire.id), reason, ended: this.ended, stale, device, pressed, awaits: Boolean(this.playing?.shownToEnd && !this.prediction) });
+    const status = uiText({ state, lease, id: wire?.id ?? "", age: this.rounded(age), up: Boolean(wire?.up && wire.id), reason, ended: this.ended, stale, device, pressed, awaits: Boolean(this.playing?.shownToEnd && !this.prediction), settles: this.settles });
     this.addNotices(status, device);
     this.measured.update(clock());
     const cameras = camerasText(this.measured.message);
@@ -536,7 +542,8 @@ class Page {
     const current = warning && warning.until > clock() && !warning.ended() ? ofDevice(warning.text, device) : "";
     const added = current || (up ? lost : "");
     if (added && added !== status.notice) status.notice = status.notice ? `${status.notice}. ${added}` : added;
-    if (!status.notice && up && arrived && this.wire.controls) Object.assign(status, { notice: success(arrived, this.objects ?? []), kind: "good" });
+    const outcome = up && arrived && this.wire.controls ? success(arrived, this.objects ?? [], this.settles) : "";
+    if (!status.notice && outcome) Object.assign(status, { notice: outcome, kind: "good" });
   }
 
   /** The age of the live robot, so that its number does not dance: it is written four times a second. */

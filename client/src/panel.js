@@ -19,9 +19,9 @@ const REMEDIES = { "token: wrong": "This address is not of the session that runs
 /** What to do about the `reason` for which the server has ended a connection. */
 export const remedy = (reason) => (reason in REMEDIES ? `${REMEDIES[reason]} (${reason}).` : reason);
 
-/** The status of `page` in words: `mode`, `title`, `next`, `notice`, whether the robot has `arrived`, and facts by name. `ended`: it will not connect again by itself. `device`: as in `ofDevice`; `pressed`: whether a key, the mouse, a grip or a trigger is. `awaits`: its preview has been shown to its end, and what it foresees is not there. */
+/** The status of `page` in words: `mode`, `title`, `next`, `notice`, how far a robot has `arrived`, and facts by name. `settles`: s until the arm rests, as its preview had it. `ended`: it will not connect again by itself. `device`: as in `ofDevice`; `pressed`: whether a key, the mouse, a grip or a trigger is. `awaits`: its preview has been shown to its end, and what it foresees is not there. */
 export function uiText(page) {
-  const { state, lease, id, age, up, reason, ended, stale, device = "keys", pressed = false, awaits = false } = page;
+  const { state, lease, id, age, up, reason, ended, stale, device = "keys", pressed = false, awaits = false, settles = 0 } = page;
   const immersed = device === "controllers";
   const mode = !up ? (reason === null ? "connecting" : "lost") : (state?.mode ?? "connecting");
   const controls = lease?.holder === id && id !== "";
@@ -29,9 +29,9 @@ export function uiText(page) {
   const facts = {};
   if (up && lease) facts.Control = controls ? "you" : holder ? holder.name || "somebody else" : "nobody";
   if (up && lease?.asking?.length && controls) facts.Asked = `${lease.asking.length} would like to take over`;
-  const arrived = up && state?.robot === "done" && !PLANNED.has(mode);
+  const arrived = up && state?.robot === "done" && !PLANNED.has(mode) ? (settles > 0 ? `at its place, the arm rests in ${Math.ceil(settles)} s` : "arrived") : "";
   const poseAge = age === null ? "" : `seen ${age < 0.001 ? "now" : `${Math.round(1000 * age)} ms ago`}${stale || age > OLD ? ", OLD" : ""}`;
-  if (arrived || poseAge) facts.Robot = [arrived && "arrived", poseAge].filter(Boolean).join(", ");
+  if (arrived || poseAge) facts.Robot = [arrived, poseAge].filter(Boolean).join(", ");
   if (state?.fault) facts.Fault = state.fault;
   let title = TITLES[mode];
   if (mode === "delay" && Number.isFinite(state.countdown)) title = `Moves in ${state.countdown.toFixed(1)} s`;
@@ -120,7 +120,7 @@ export class RoomPanel {
   show({ mode, title, next, notice, arrived, facts: { Robot, ...facts } }, extra, eye, dt) {
     this.board.visible = true;
     this.comeAlong(eye, dt);
-    if (arrived) facts.Robot = "arrived"; // without its age, which changes all the time
+    if (arrived) facts.Robot = arrived; // without its age, which changes all the time
     const key = JSON.stringify([mode, title, next, notice, facts, extra]);
     if (key === this.drawn) return;
     this.drawn = key;

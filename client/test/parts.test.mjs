@@ -90,8 +90,9 @@ test("a recording is replayed at its own times, without a last message that is n
 
 test("a robot that has arrived is shown as arrived, until the next plan is asked for", () => {
   const page = { lease: null, id: "", age: 0.02, up: true, reason: null, stale: false, immersed: false };
-  const robot = (mode, does) => uiText({ ...page, state: { mode, robot: does } }).facts.Robot;
+  const robot = (mode, does, settles) => uiText({ ...page, settles, state: { mode, robot: does } }).facts.Robot;
   assert.equal(robot("aim", "done"), "arrived, seen 20 ms ago");
+  assert.equal(robot("aim", "done", 2.1), "at its place, the arm rests in 3 s, seen 20 ms ago");
   for (const [mode, does] of [["aim", "idle"], ["execute", "running"], ["plan", "done"], ["ready", "done"]]) assert.equal(robot(mode, does), "seen 20 ms ago");
 });
 
@@ -266,7 +267,8 @@ test("the notice after a motion: lifted, put down, arrived", () => {
   const cup = { name: "the cup", support: "held" };
   assert.equal(success(["reach", "curl", "lift"], [cup]), "Held: lift of the cup is done. Now point where it goes.");
   assert.match(success(["carry", "release"], [{ ...cup, support: "standing" }]), /^Put down/);
-  assert.match(success(["reach"], [{ ...cup, support: "standing" }]), /^Arrived/);
+  assert.match(success(["reach"], [{ ...cup, support: "standing" }], 0), /^Arrived/);
+  assert.equal(success(["reach"], [], 1.2), "");
 });
 
 test("a handle moves along its own axis, and a ray meets the object that it points at", () => {

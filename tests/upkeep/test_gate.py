@@ -479,9 +479,9 @@ def test_no_row_rewards_a_smaller_radius_alone():
     for file, stage, key, limit in own_rows():
         if "radius" in key:
             assert limit.better == "lower"
-            beside = own_limits(file)[stage].get(key.rpartition("radius")[0] + "coverage.share")
-            assert beside is not None, f"{stage}: {key}"
-            assert beside.reaches is not None, f"{stage}: {key}"
+            rows, start = own_limits(file)[stage], key.rpartition("radius")[0] + "coverage."
+            shares = [row for name, row in rows.items() if name.startswith(start) and name.endswith("share")]
+            assert any(row.reaches is not None or row.goal is not None for row in shares), f"{stage}: {key}"
 
 
 def test_a_bound_is_an_input_error(tmp_path):

@@ -1,9 +1,10 @@
 """A picture of each state of a live session's page, for docs/live-sessions.md: docs/live-hold.png, ...
 
-    python -m tests.ar.session.pictures [PACKAGE] [--folder docs] [--cameras]
+    python -m tests.ar.session.pictures [PACKAGE] [--folder docs] [--size 760x640] [--cameras]
 
-With --cameras: of the measured arm once a plan has arrived, of a plan that may correct itself, and of cameras that have
-the last body elsewhere.
+With --cameras: of the measured arm once a plan has arrived, the same as if something pushed it beside and far beside
+its preview's end, of a plan that may correct itself, and of cameras that have the last body elsewhere. --size: of the
+window, pixels; half of a screen's shows the page as at 200 %.
 
 The true server and its processes on the simulated robot; the committed page in a headless Chromium, by its buttons, its
 slider and its keys. Drawing is by software, and all share a processor. So page and robot may be silent for longer, the
@@ -18,7 +19,9 @@ import io
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import get_args
 
@@ -38,7 +41,7 @@ from trunkline.ar.tracking import tracking_process
 from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.config import PROJECT, load_folder
 
-ADDRESS, SIZE, YIELDS = Address(18452), (760, 640), 3  # of the page: pixels, and how nice its browser is
+ADDRESS, YIELDS = Address(18452), 3  # of the page, and how nice its browser is
 COLOURS = 128  # of a picture's palette
 PATIENCE = 180.0  # s for a state to come
 SILENCE, STALE = 10.0, 1.0  # s for which the page, its inputs and pictures, and the robot's process may be late
@@ -51,6 +54,7 @@ AIMED = (
 LED = (("Digit1", {"ArrowLeft": 15}), ("Digit2", {"ArrowLeft": 15}))
 WATCHED, MOVED = 0.55, 0.5  # shares of the preview and of the mount's way, at which their pictures are taken
 ASTRAY = 0.5  # m, of the last body, where cameras have it elsewhere
+PUSHED = {"beyond": 1.5, "far-beyond": 2.5}  # times the radius, of the tip beside its preview's end
 BACK = 0.05  # share by which the preview is taken back, as its slider reports only changes
 
 MODE = "document.querySelector('#mode').dataset.mode"
@@ -105,10 +109,11 @@ class Kept:
 
 
 class Camera:
-    """At a page. pictures: PNGs by name; they are made small later, as the server shares this thread."""
+    """At a page of this size, pixels. pictures: PNGs by name; they are made small later, as the server shares this
+    thread."""
 
-    def __init__(self, page: Page) -> None:
-        self.page = page
+    def __init__(self, page: Page, size: tuple[int, int]) -> None:
+        self.page, self.size = page, size
         self.pictures: dict[str, bytes] = {}
 
     async def until(self, expression: str, what: str) -> None:
@@ -145,7 +150,7 @@ class Camera:
 
 async def arrive(camera: Camera) -> None:
     page = camera.page
-    wide, high = SIZE
+    wide, high = camera.size
     await page.ask("Emulation.setDeviceMetricsOverride", width=wide, height=high, deviceScaleFactor=1, mobile=False)
     there = "Boolean(globalThis.trunkline?.loaded && trunkline.frame && trunkline.state)"
     await camera.until(there, "the page's robot")
@@ -215,6 +220,26 @@ async def taken_of_cameras(camera: Camera, cameras: ArmCameras) -> None:
     await camera.until(there, "a tip that has arrived")
     await camera.page.key("KeyG", "keyUp")
     await camera.take("aim", there, "measured")
+    show, far = cameras.show, 1e-3 * float(await camera.page.value(f"1000 * {message}.radius"))
+
+    def elsewhere(place: Callable[[np.ndarray], None]) -> Callable[[np.ndarray], None]:
+        """As `cameras.show`, of bodies that `place` moves."""
+
+        def moved(bodies: np.ndarray) -> None:
+            bodies = bodies.copy()
+            place(bodies)
+            show(bodies)
+
+        return moved
+
+    def push(by: float, bodies: np.ndarray) -> None:
+        bodies[cameras._rows, 1] += by * np.linspace(0.0, 1.0, len(cameras._rows)) ** 2
+
+    for name, radii in PUSHED.items():
+        cameras.show = elsewhere(partial(push, radii * far))
+        off = f"{sound} && {message}.from_preview > {radii - 0.3} * {message}.radius"
+        await camera.take("aim", off, name)
+    cameras.show = show
     await camera.page.key("KeyC")
     await camera.until("document.querySelector('#correct').ariaPressed === 'true'", "a correction that is asked for")
     await camera.move(LED)
@@ -224,18 +249,15 @@ async def taken_of_cameras(camera: Camera, cameras: ArmCameras) -> None:
     if not await camera.page.value("Boolean(trunkline.planned.correction)"):
         raise InputError(f"correction: {await camera.page.value('trunkline.planned.uncorrected')}")
     await camera.take("ready", f"trunkline.measured.bounds.visible && {sound}", "correcting")
-    show = cameras.show
 
     def astray(bodies: np.ndarray) -> None:
-        moved = bodies.copy()
-        moved[cameras._rows[-1], 0] += ASTRAY
-        show(moved)
+        bodies[cameras._rows[-1], 0] += ASTRAY
 
-    cameras.show = astray
+    cameras.show = elsewhere(astray)
     await camera.take("ready", f"{message}?.fault", "astray")
 
 
-async def session(package: Path, cameras: str) -> dict[str, bytes]:
+async def session(package: Path, size: tuple[int, int], cameras: str) -> dict[str, bytes]:
     """PNGs by name."""
     config, teleop = load_folder(SessionConfig, PROJECT / "conf/live"), load_folder(Teleop, PROJECT / "conf/teleop")
     safety = replace(teleop.core.safety, silence=SILENCE, plan_wait=PATIENCE)
@@ -250,8 +272,8 @@ async def session(package: Path, cameras: str) -> dict[str, bytes]:
             package, ADDRESS, lambda line: None, config=config, teleop=teleop, cameras=cameras
         ) as opening:
             server, made = opening
-            async with browsing(f"{ADDRESS.url}/#token={server.composition.token}", SIZE, YIELDS) as page:
-                camera = Camera(page)
+            async with browsing(f"{ADDRESS.url}/#token={server.composition.token}", size, YIELDS) as page:
+                camera = Camera(page, size)
                 if made.cameras is not None:
                     await taken_of_cameras(camera, made.cameras)
                 else:
@@ -265,9 +287,11 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("package", nargs="?", type=Path)
     parser.add_argument("--folder", type=Path, default=PROJECT / "docs")
+    parser.add_argument("--size", default="760x640")
     parser.add_argument("--cameras", action="store_const", const="simulated", default="")
     args = parser.parse_args(arguments)
-    pictures = asyncio.run(session(args.package or only_package(), args.cameras))
+    wide, high = map(int, args.size.split("x"))
+    pictures = asyncio.run(session(args.package or only_package(), (wide, high), args.cameras))
     missing = [] if args.cameras else [mode for mode in get_args(Mode) if mode not in pictures]
     if missing:
         raise InputError(f"states: found no picture of {', '.join(missing)}, expected one of each")
