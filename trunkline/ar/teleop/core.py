@@ -142,9 +142,8 @@ class Teleoperation:
     def _placed(self, rigid: Vector, tip: Vector | None, state: TeleoperationState, message: Input) -> Targets:
         """Targets there; `tip` may be None where the arm holds an object."""
         wrist, world, last = wrist_of(message.joints, self.mount_offset), message.world, state.aligned
-        if world.held_object is not None:
-            held = world.held_object
-            return bring(held, rigid, state.pointing, state.limited, wrist, last.half_plane, world, self.reach)
+        if (object := world.held_object) is not None:
+            return bring(object, rigid, state.pointing, state.limited, wrist, last.half_plane, world, self.reach)
         assert tip is not None
         return place(rigid, tip, state.pointing, state.limited, wrist, last, world, self.reach, self.settings)
 
