@@ -276,7 +276,7 @@ def test_whatever_holds_a_robot_that_executes_holds_one_that_corrects_itself_for
     most = done * session.planning.change * (1 + 1e-9) if phase == "moves" else 0.0
     assert np.abs(session.robot.commands - before).max() <= most
     ended = happens is undrawn and phase == "moves"
-    words = ("corrected from 5.1 to 3.1 mm in 1 step: ",) if ended else ("not corrected, 5.1 mm off: ", "not corrected: ")
+    words = "corrected from 5.1 to 3.1 mm in 1 step: " if ended else ("not corrected, 5.1 mm off: ", "not corrected: ")
     assert session.words.startswith(words)
 
 
