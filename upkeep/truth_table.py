@@ -139,8 +139,7 @@ def _widths(rows: dict[str, dict], truth: dict) -> str:
             low, high, value, truly = parameter_named(name).coordinate([*stated_interval(row), row["value"], expected])
             ratios.append((value - truly) / (high - low) * 2)
             verdicts.append(verdict)
-            given_model = row.get("interval_95_given_model")
-            plain.append(given_model is not None and given_model[0] <= expected <= given_model[1])
+            plain.append(bool(holds(row | {"interval_95": row.get("interval_95_given_model", [])}, expected)))
     inside, rms = sum(verdicts), np.sqrt(np.mean(np.square(ratios or [np.nan])))
     counts = f"{inside} of {len(ratios)}; given the model alone, {sum(plain)}"
     return (
