@@ -328,3 +328,17 @@ def test_no_step_leads_far_away_where_a_loose_cable_pulls_sooner_than_the_twin_s
                 loop.measured(tip_of(chain, loop.commands - earlier))
             away.append(max([after - before for before, after in pairwise(loop.errors)], default=0.0))
     assert max(away) < at_most
+
+
+def test_a_step_whose_cables_together_have_no_known_way_is_not_taken(chain, monkeypatch):
+    commands = pulled(chain, 0.02, 0.0, 0.0, slack=2e-3)
+    tip, way = tip_of(chain, commands), correction.tip_by_pulls
+
+    def unknown(chain, rest, gravity, taut=False):
+        return way(chain, rest, gravity) * (np.nan if np.any(taut) else 1.0)
+
+    monkeypatch.setattr(correction, "tip_by_pulls", unknown)
+    loop = TipCorrection(chain, DOWN, tip + np.array([-4e-3, 0.0, -2e-3]), commands, SETTINGS)
+    loop.measured(tip)
+    assert loop.ended == "the twin is near snapping through once its loose cables pull"
+    np.testing.assert_array_equal(loop.commands, commands)

@@ -135,7 +135,10 @@ class TipCorrection:
         wanted = np.where(moving, np.minimum(self.commands, rest.lengths[0]) - change, self.commands)
         way = shortened(wanted - self.commands, self._settings.longest)
         began = moving & (rest.tensions[0] == 0)  # at which command a loose cable really pulls, the twin says about
-        commands = self.commands + self._not_farther(missing, way, began & (way < 0)) * way
+        share = self._not_farther(missing, way, began & (way < 0))
+        if not np.isfinite(share):
+            return self._end("the twin is near snapping through once its loose cables pull")
+        commands = self.commands + share * way
         foreseen = actuated(chain, commands[None], self._gravity)
         if not foreseen.converged[0] or (foreseen.tensions[0] > STRONGEST * chain.max_tension).any():
             return self._end("a motor would be at its largest force")
@@ -143,7 +146,7 @@ class TipCorrection:
         self.commands, self._rest = commands, foreseen
 
     def _not_farther(self, missing: np.ndarray, way: np.ndarray, wound: np.ndarray) -> float:
-        """The share of a step `way`, m, (K,), after which the tip is farther off by AWAY at most, if the loose cables
+        """The share, NaN where it is not known, of a step `way`, m, (K,), after which the tip is farther off by AWAY at most, if the loose cables
         that it winds, `wound`, (K,), pull from its beginning on, each alone or all of them: in trials some did, where
         the twin's were loose by mm."""
         taut = tip_by_pulls(self._chain, self._rest, self._gravity, wound) if wound.sum() > 1 else self._jacobian
@@ -151,8 +154,8 @@ class TipCorrection:
         room = (distance + AWAY) ** 2 - distance**2
         share = 1.0
         for tip in (-self._jacobian @ way, -taut @ way):
-            along, square = missing @ tip, max(float(tip @ tip), NEGLIGIBLE**2)
-            share = min(share, float((along + np.sqrt(along**2 + square * room)) / square))
+            along, square = missing @ tip, np.maximum(tip @ tip, NEGLIGIBLE**2)
+            share = float(np.minimum(share, (along + np.sqrt(along**2 + square * room)) / square))
         return share
 
     def _change(self, missing: np.ndarray) -> np.ndarray:
