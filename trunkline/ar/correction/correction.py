@@ -146,9 +146,9 @@ class TipCorrection:
         self.commands, self._rest = commands, foreseen
 
     def _not_farther(self, missing: np.ndarray, way: np.ndarray, wound: np.ndarray) -> float:
-        """The share, NaN where it is not known, of a step `way`, m, (K,), after which the tip is farther off by AWAY at most, if the loose cables
+        """The share of a step `way`, m, (K,), after which the tip is farther off by AWAY at most, if the loose cables
         that it winds, `wound`, (K,), pull from its beginning on, each alone or all of them: in trials some did, where
-        the twin's were loose by mm."""
+        the twin's were loose by mm. NaN where that is not known."""
         taut = tip_by_pulls(self._chain, self._rest, self._gravity, wound) if wound.sum() > 1 else self._jacobian
         distance = np.linalg.norm(missing)
         room = (distance + AWAY) ** 2 - distance**2
