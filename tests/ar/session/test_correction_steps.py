@@ -24,7 +24,7 @@ from trunkline.ar.session.correction_steps import (
 from trunkline.ar.session.previewer import PlanAnswer, PreviewBegun, PreviewPlanner
 from trunkline.ar.teleop.alignment import base_quaternion
 from trunkline.ar.teleop.base_frames import base_frames
-from trunkline.ar.teleop.messages import Obstacle
+from trunkline.ar.teleop.messages import Obstacle, WorldObject
 from trunkline.ar.teleop.plan import CorrectionBounds
 from trunkline.frames import rotation_from_wxyz
 from trunkline.model.statics.chain import read_chain
@@ -161,7 +161,7 @@ def test_a_step_beyond_what_trials_went_up_to_is_not_sent(bounds, reason):
     assert answer.plan is None
     assert re.fullmatch(reason, answer.ended), answer.ended
     unsaid = CorrectionSteps(PLANNER, None).answer(further)
-    assert (unsaid.plan, unsaid.ended) == (None, MAY[6][-1])
+    assert (unsaid.plan, unsaid.ended) == (None, UNTRIED)
 
 
 def test_before_a_later_step_that_would_go_beyond_the_best_commands_come_back():
@@ -220,6 +220,12 @@ def near(distance):
 
 
 BOUNDS = CorrectionBounds((0.5, 0.1, 0.2), 5, 5e-3, 30e-3)
+def cup(aside):
+    x, y, z = BOUNDS.target
+    return WorldObject("the cup", "box", 0.06, 0.1, 0.1, (x + 0.03 + aside, y, z))
+
+
+UNTRIED = "no trial at rest was held out, or the package is of an earlier release"
 MAY = [
     ("", (), PLANNER, BEYOND, ""),
     ("the cup", (), PLANNER, BEYOND, "the arm would touch the cup"),
@@ -227,18 +233,21 @@ MAY = [
     ("", (near(0.031),), PLANNER, BEYOND, ""),
     ("", (near(0.029),), PLANNER, BEYOND, "the table is 29 mm from the tip's target, expected 30 mm"),
     ("", (near(-0.1),), PLANNER, BEYOND, "the table is 0 mm from the tip's target, expected 30 mm"),
-    ("", (), PLANNER, None, "no trial at rest was held out, or the package is of an earlier release"),
+    ("", (cup(0.031),), PLANNER, BEYOND, ""),
+    ("", (cup(0.029),), PLANNER, BEYOND, "the cup is 29 mm from the tip's target, expected 30 mm"),
+    ("", (), PLANNER, None, UNTRIED),
     ("", (), PLANNER, replace(BEYOND, pull=0.019), "a motor pulls 20.0 mm, in trials up to 19.0 mm"),
     ("", (), PLANNER, replace(BEYOND, pull=0.021), ""),
 ]
 
 
-@pytest.mark.parametrize(("object", "obstacles", "planner", "lacking", "reason"), MAY)
-def test_which_plans_may_correct_themselves(object, obstacles, planner, lacking, reason):
+@pytest.mark.parametrize(("object", "beside", "planner", "lacking", "reason"), MAY)
+def test_which_plans_may_correct_themselves(object, beside, planner, lacking, reason):
     plan = replace(some_plan(), commands=np.tile(pulled(0.02, 0, 0), (2, 1)))
     planner = replace(planner, straight=CHAIN.straight_lengths)
     targets = replace(request((0, 0, 0), BOUNDS.target).targets, object=object)
-    assert why_uncorrected(plan, targets, make_world(obstacles), BOUNDS, planner, lacking) == reason
+    things, solids = (tuple(b for b in beside if isinstance(b, kind)) for kind in (WorldObject, Obstacle))
+    assert why_uncorrected(plan, targets, make_world(solids, things), BOUNDS, planner, lacking) == reason
 
 
 @pytest.mark.parametrize(("lacking", "unasked"), [(BEYOND, ""), (None, ""), (BEYOND, "cameras: silent")])
@@ -258,6 +267,6 @@ def test_the_digest_that_is_previewed_has_the_bounds_or_the_reason_why_there_are
     corrected = lacking is not None and not unasked
     assert planned.plan.correction == begun.preview.correction == (bounds if corrected else None)
     assert planned.report.digest == planned.plan.digest() == begun.preview.digest
-    assert begun.preview.uncorrected == (unasked or ("" if corrected else MAY[6][-1]))
+    assert begun.preview.uncorrected == (unasked or ("" if corrected else UNTRIED))
     plainly = next(planning.answers(asked))
     assert (plainly.report.digest == planned.report.digest) == (not corrected)

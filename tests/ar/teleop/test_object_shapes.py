@@ -7,7 +7,7 @@ import pytest
 
 from trunkline.ar.hybrid.objects import ObjectShape
 from trunkline.ar.teleop.messages import Obstacle, Quaternion, World, WorldObject
-from trunkline.ar.teleop.object_shapes import below_grip, beneath, grip_of, way_of_grasping
+from trunkline.ar.teleop.object_shapes import below_grip, beneath, distance_to, grip_of, way_of_grasping
 
 BASKET = WorldObject("basket", "basket", 0.03, 0.06, 0.2, (0.5, 0.1, 0.2))
 LEVEL: Quaternion = (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0)
@@ -54,3 +54,26 @@ def test_the_highest_solid_beneath_a_place():
     assert beneath((0.5, 0.5, -0.05), world) == floor
     assert beneath((-0.5, 0.5, 0.1), world) == floor
     assert beneath((9.0, 0.5, 0.1), world) is None
+
+TURNED: Quaternion = (np.cos(np.pi / 8), 0.0, 0.0, np.sin(np.pi / 8))  # by 45 deg about z
+BOX = WorldObject("box", "box", 0.1, 0.2, 0.1, (0.5, 0.1, 0.2), TURNED)
+BAR = np.subtract(grip_of(BASKET), BASKET.position)[2]
+
+
+@pytest.mark.parametrize(
+    ("object", "aside", "expected"),
+    [
+        (replace(BASKET, shape="sphere"), (0.04, 0.0, 0.0), 0.025),
+        (replace(BASKET, shape="sphere"), (0.01, 0.0, 0.0), 0.0),
+        (BOX, (0.1, 0.0, 0.0), 0.1 - 0.05 * np.sqrt(2)),  # an edge faces it
+        (BOX, (0.1, 0.1, 0.0), 0.1 * np.sqrt(2) - 0.05),
+        (BOX, (0.0, 0.0, 0.13), 0.03),
+        (BOX, (0.0, 0.03, 0.05), 0.0),
+        (BASKET, (0.0, 0.0, BAR + 0.02), 0.005),  # above the bar, which is 30 mm thick
+        (BASKET, (0.0, 0.1, BAR), 0.02),  # beside its end
+        (BASKET, (0.05, 0.0, BAR), 0.035),
+        (replace(BASKET, quaternion=OVER), (0.0, 0.0, -BAR - 0.02), 0.005),
+    ],
+)
+def test_how_far_a_point_is_from_an_object(object, aside, expected):
+    assert distance_to(object, tuple(np.add(object.position, aside))) == pytest.approx(expected)

@@ -11,6 +11,7 @@ import numpy as np
 from trunkline.ar.correction.correction import CorrectionSettings, TipCorrection, shortened
 from trunkline.ar.teleop.base_frames import base_frames
 from trunkline.ar.teleop.messages import Obstacle, Targets, Vector, World
+from trunkline.ar.teleop.object_shapes import distance_to
 from trunkline.ar.teleop.plan import CorrectionBounds, Plan
 from trunkline.ar.teleop.plan_checks import check_plan
 from trunkline.ar.teleop.planner import Planner
@@ -111,12 +112,11 @@ def why_uncorrected(plan: Plan, targets: Targets, world: World, bounds: Correcti
         return f"the arm would touch {targets.object}"
     if planner.chain is None:
         return "the package has no statics of the arm"
-    for obstacle in world.obstacles:
-        away = _away(bounds.target, obstacle)
+    beside = [(obstacle.name, _away(bounds.target, obstacle)) for obstacle in world.obstacles]
+    beside += [(object.name, distance_to(object, bounds.target)) for object in world.objects]
+    for name, away in beside:
         if away < bounds.astray:
-            return (
-                f"{obstacle.name} is {1e3 * away:.0f} mm from the tip's target, expected {1e3 * bounds.astray:.0f} mm"
-            )
+            return f"{name} is {1e3 * away:.0f} mm from the tip's target, expected {1e3 * bounds.astray:.0f} mm"
     return beyond_trials(lacking, plan.joints[-1], plan.commands[-1], planner)
 
 
