@@ -6,6 +6,7 @@ from trunkline.model.arm.cad import CadArm
 from trunkline.model.arm.kinds import Description, described_arm
 from trunkline.model.arm_model import ArmModel
 from trunkline.model.statics.chain import read_chain
+from trunkline.model.statics.supported import require_supported
 from trunkline.pipeline.config import own_or_project
 from trunkline.pipeline.stage import output_folder, run_stage, write_metrics
 from trunkline.report.figures.arm import arm_figure
@@ -25,6 +26,8 @@ def main(config: Config) -> None:
     model = arm.spec.compile()
     if model.nu or len(ArmModel(model).cables):  # refused here, and not hours later by what first needs the statics
         read_chain(model)
+    else:
+        require_supported(model)
     with output_folder(ARTIFACTS) as folder:
         (folder / "arm.xml").write_text(arm.spec.to_xml())
         save_figure(arm_figure(model), folder / "arm.png")

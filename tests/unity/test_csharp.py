@@ -153,7 +153,8 @@ NO_MANIFESTS = {
     "a grid without a shape": lambda text: text.replace(b'"shape"', b'"size"'),
 }
 BAD = ["another byte", "a file that is not listed", "no grid", "no manifest", "a short grid", "origin [0.1,0.1,0.1]",
-       "spacing [0.2,0.2,0.2]", "shape [5,9,8]", *NO_MANIFESTS]  # fmt: skip
+       "spacing [0.2,0.2,0.2]", "shape [5,9,8]", "shape [5,9]", "shape 5", "spacing null", "origin [1,2,{}]",
+       "file 3", *NO_MANIFESTS]  # fmt: skip
 
 
 SHEETS = "Runtime/Reachability/sheets.bytes"

@@ -1,5 +1,7 @@
 """A package read back: maps as they were written, and another digest for another file."""
 
+import contextlib
+import functools
 import hashlib
 import json
 
@@ -59,6 +61,30 @@ def test_maps_come_back_as_they_were_in_their_own_frames(files, arrays):
         expected = arrays[name].astype(np.float16) if np.ndim(arrays[name]) > 3 else arrays[name]
         expected = rounded(expected) if np.ndim(expected) == 3 else expected
         np.testing.assert_allclose(maps[name], expected, atol=1e-12)
+
+
+def keys_in(block, *before):
+    """The ways to all values of a JSON file."""
+    for key in block if isinstance(block, dict) else range(len(block)) if isinstance(block, list) else ():
+        yield (*before, key)
+        yield from keys_in(block[key], *before, key)
+
+
+def test_whatever_the_manifest_has_in_place_of_a_value_is_one_line(files):
+    """Or the value is read no more than as it stands."""
+    manifest, refused = json.loads(files[MANIFEST]), 0
+    for *way, last in keys_in({name: manifest[name] for name in ("grids", "reach")}):
+        if isinstance(last, int) and last > 3:
+            continue  # of long lists
+        for value in (None, "x", -1, 0.5, 10**12, [], {}, [1, 2], ["x"], float("nan")):
+            changed = json.loads(files[MANIFEST])
+            block = functools.reduce(lambda inner, key: inner[key], way, changed)
+            block[last] = value
+            with contextlib.suppress(InputError):
+                maps_of(files | {MANIFEST: json.dumps(changed).encode()})
+                refused -= 1
+            refused += 1
+    assert refused > 100
 
 
 def test_reach_by_the_package_is_that_by_the_stage(files, arrays):

@@ -5,6 +5,7 @@ import gzip
 import hashlib
 import io
 import json
+import math
 import tarfile
 import zlib
 from pathlib import Path
@@ -18,6 +19,7 @@ from trunkline.kinematics.panda.mounts import Robot
 
 ROOT = "package/"  # folder that npm's and Unity's tarballs hold everything in
 MANIFEST = "Runtime/manifest.json"
+MOST_COUNTED = 1 << 30  # of a whole number in a manifest
 MOST_BYTES = 256 << 20  # unpacked; the demo's package has 27 MiB
 
 
@@ -160,10 +162,50 @@ class _CheckedBlock(dict):
         return block
 
     def text(self, name: str) -> str:
-        """Raises: InputError: it is missing, or no text."""
+        """Raises: InputError: it is missing, or something else; so do those below."""
         if not isinstance(text := self[name], str):
-            raise InputError(f"{self._source}: {name}: found {text!r}, expected a text")
+            raise self._other(name, "a text")
         return text
+
+    def texts(self, name: str) -> list[str]:
+        """A list of them, one at least."""
+        texts = self[name]
+        if not isinstance(texts, list) or not texts or not all(isinstance(text, str) for text in texts):
+            raise self._other(name, "texts")
+        return texts
+
+    def number(self, name: str) -> float:
+        if not _is_number(value := self[name]):
+            raise self._other(name, "a number")
+        return value
+
+    def numbers(self, name: str, count: int = 0) -> list[float]:
+        """So many of them, where `count` says."""
+        numbers = self[name]
+        if not isinstance(numbers, list) or not all(map(_is_number, numbers)) or (count and len(numbers) != count):
+            raise self._other(name, f"{count} numbers" if count else "numbers")
+        return numbers
+
+    def counts(self, name: str, count: int) -> list[int]:
+        """So many whole numbers of 1 or more."""
+        counts = self.numbers(name, count)
+        if not all(number == int(number) and 1 <= number <= MOST_COUNTED for number in counts):
+            raise self._other(name, f"{count} whole numbers from 1")
+        return [int(number) for number in counts]
+
+    def count(self, name: str) -> int:
+        """A whole number of 1 or more."""
+        number = self.number(name)
+        if not (number == int(number) and 1 <= number <= MOST_COUNTED):
+            raise self._other(name, "a whole number from 1")
+        return int(number)
+
+    def _other(self, name: str, expected: str) -> InputError:
+        return InputError(f"{self._source}: {name}: found something else, expected {expected}")
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def _hybrid(files: dict[str, bytes]) -> _CheckedBlock:

@@ -17,29 +17,34 @@ def maps_of(files: dict[str, bytes]) -> dict[str, np.ndarray]:
     and the sheets where gravity comes from any side.
 
     Raises:
-        InputError: a file is missing or of another size, or soft maps do not share a lattice.
+        InputError: the manifest has another form, a file is missing or of another size, or soft maps do not share a
+            lattice.
     """
     manifest = manifest_of(files)
-    arrays: dict[str, np.ndarray] = {"soft_angles": np.array(manifest["reach"]["angles"])}
-    soft = manifest["reach"]["grids"]
+    reach, grids = manifest.block("reach"), manifest.block("grids")
+    soft = reach.texts("grids")
+    arrays: dict[str, np.ndarray] = {"soft_angles": np.array(reach.numbers("angles"))}
     for name in soft:
         for key in ("shape", "origin", "spacing"):
-            if manifest["grids"][name][key] != manifest["grids"][soft[0]][key]:
+            if grids.block(name).numbers(key) != grids.block(soft[0]).numbers(key):
                 complaint = f"found another {key} than that of {soft[0]}"
                 raise InputError(f"{name}: {complaint}, expected one lattice for all soft maps")
     for name in (*soft, "rigid"):
-        block = manifest["grids"][name]
-        nx, ny, nz = block["shape"]  # along Unity's axes, x fastest
-        arrays[name] = _numbers(files, block["file"], "<f2", (nz, ny, nx)).transpose(2, 0, 1)
+        block = grids.block(name)
+        nx, ny, nz = block.counts("shape", 3)  # along Unity's axes, x fastest
+        origin, spacing = block.numbers("origin", 3), block.numbers("spacing", 3)
+        arrays[name] = _numbers(files, block.text("file"), "<f2", (nz, ny, nx)).transpose(2, 0, 1)
         group = name.split("_")[0]
-        arrays[f"{group}_origin"] = unity_position(block["origin"])  # the change of axes is its own inverse
-        arrays[f"{group}_spacing"] = np.array(block["spacing"][0])
-    arrays["soft_tolerance"] = np.array(manifest["reach"]["tolerance"])
-    if sheets := manifest["reach"].get("sheets"):
-        downs = unity_position(np.array(sheets["directions"]).reshape(-1, 3))
-        shape = (len(downs), sheets["around"], sheets["along"], 3)
-        arrays["sheets_points"] = unity_position(_numbers(files, sheets["file"], "<f2", shape))
-        matrix = _numbers(files, sheets["weights"], "<f8", (len(downs), len(downs) + 4))
+        arrays[f"{group}_origin"] = unity_position(origin)  # the change of axes is its own inverse
+        arrays[f"{group}_spacing"] = np.array(spacing[0])
+    arrays["soft_tolerance"] = np.array(reach.number("tolerance"))
+    if reach.get("sheets") is not None:
+        sheets = reach.block("sheets")
+        count = max(len(sheets.numbers("directions")) // 3, 1)
+        downs = unity_position(np.array(sheets.numbers("directions", 3 * count)).reshape(-1, 3))
+        shape = (len(downs), sheets.count("around"), sheets.count("along"), 3)
+        arrays["sheets_points"] = unity_position(_numbers(files, sheets.text("file"), "<f2", shape))
+        matrix = _numbers(files, sheets.text("weights"), "<f8", (len(downs), len(downs) + 4))
         arrays["sheets_downs"] = downs
         arrays["sheets_matrix"] = np.column_stack([matrix[:, :-3], unity_position(matrix[:, -3:])])  # of g itself
     return arrays

@@ -454,17 +454,21 @@ def test_of_too_many_idle_connections_the_oldest_go(monkeypatch):
 
     idle, each = connections.IdleConnections(), [Transport() for _ in range(5)]
     idle.busy.add(each[0])
-    each[1].left = 3  # still being answered
-    assert idle.close(each[:3], 0.0) == 0
-    assert idle.close(each, 1.0) == 1
-    assert [transport.closed for transport in each] == [False, False, True, False, False]
-    assert idle.close([each[0], each[1], each[3], each[4]], 1.0 + connections.LONGEST) == 2
+    assert idle.close(each[:2], 0.0) == 0
+    assert idle.close(each[:4], 1.0) == 1
+    assert [transport.closed for transport in each] == [False, True, False, False, False]
+    assert idle.close([each[0], each[2], each[3]], 1.0 + connections.LONGEST) == 2
     lone, flood = Transport(), [Transport() for _ in range(3)]
     lone.address = "10.0.0.2"  # came first, and is from elsewhere
     idle = connections.IdleConnections()
     idle.close([lone], 0.0)
     assert idle.close([lone, *flood], 1.0) == 2
     assert [transport.closed for transport in (lone, *flood)] == [False, True, True, False]
+    idle, reads, waits = connections.IdleConnections(), Transport(), Transport()
+    for step, left in enumerate((0, 900, 600, 300, 200, 100)):  # an answer that begins after 2 s
+        reads.left, waits.left = left, 500 if left else 0
+        assert idle.close([reads] if waits.closed else [reads, waits], 2.0 * step) == (step == 3)
+    assert (reads.closed, waits.closed) == (False, True), "who reads is answered, who does not is gone"
 
 
 @pytest.mark.realtime

@@ -1,5 +1,6 @@
 """Tendons in the logs: whose they are, by which clock, and that a curl is refused without them."""
 
+import json
 import re
 from dataclasses import replace
 from types import SimpleNamespace
@@ -7,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from mcap.writer import Writer
 from mcap_ros2.decoder import DecoderFactory
 from mcap_ros2.writer import Writer as RosWriter
 
@@ -21,6 +23,7 @@ from trunkline.recordings.logs.bag2 import read_recording
 from trunkline.recordings.logs.definitions import JOINT_STATE, KNOWN, RIGID_BODIES
 from trunkline.recordings.logs.joint_stream import joint_stream
 from trunkline.recordings.logs.messages import JOINTS, joint_state
+from trunkline.recordings.session.source import motor_stream
 from trunkline.recordings.trials.inventory import recorded_lines
 
 
@@ -379,3 +382,32 @@ def test_a_joint_state_without_efforts_is_read():
     header = SimpleNamespace(stamp=SimpleNamespace(sec=1, nanosec=0))
     joints = joint_state(SimpleNamespace(header=header, name=["a"], position=[0.1]))
     assert (joints.positions.tolist(), joints.efforts) == ([0.1], None)
+
+
+def commands_in(path, messages):
+    """A log of commands, JSON in the schema JointState; bytes as they are."""
+    with open(path, "wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("sensor_msgs/msg/JointState", "jsonschema", b"")
+        channel = writer.register_channel("/sent", "json", schema)
+        for number, message in enumerate(messages):
+            data = message if isinstance(message, bytes) else json.dumps(message).encode()
+            writer.add_message(channel, 10**9 + number * 10**7, data, 10**9)
+        writer.finish()
+    return read_recording(path, JOINTS.keys())
+
+
+SENT = {"header": {"stamp": {"sec": 1, "nanosec": 0}}, "name": ["a"], "position": [0.1]}
+UNNAMED = {"header": {"stamp": {"sec": 1, "nanosec": 0}}, "names": ["a"], "position": [0.1]}
+
+
+@pytest.mark.parametrize(("wrong", "reason"), [(b"{", ""), (UNNAMED, ": it has no name")])
+def test_commands_that_cannot_be_read_are_refused_by_their_topic_and_some_of_them_named(tmp_path, wrong, reason):
+    stream, _ = motor_stream(commands_in(tmp_path / "some.mcap", [SENT, wrong, wrong]), "/sent", "command", (), None)
+    assert stream is not None
+    assert (len(stream.stamps), stream.undecodable) == (1, 2)
+    assert stream.notes == ["/sent: 2 messages that do not fit their schema dropped"]
+    expected = f"none.mcap: /sent: none of its 2 messages fits their schema sensor_msgs/msg/JointState{reason}"
+    with pytest.raises(InputError, match=f"{expected}$"):
+        motor_stream(commands_in(tmp_path / "none.mcap", [wrong, wrong]), "/sent", "command", (), None)

@@ -1,5 +1,7 @@
 """Inspecting logs: what it says is what the log holds, and what it proposes can be ingested."""
 
+import re
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -173,16 +175,38 @@ def test_what_holds_nothing_is_an_error(tmp_path, capsys):
     assert "found no log, nor one folder down" in capsys.readouterr().err
     (tmp_path / "tilt.bag").write_bytes(b"")
     assert main([str(tmp_path)]) == 1
-    assert "found 1 files such as tilt.bag: `rosbags-convert` of the package rosbags" in capsys.readouterr().err
+    assert "found tilt.bag: `rosbags-convert` of the package rosbags" in capsys.readouterr().err
     (tmp_path / "tilt.mcap.lz4").write_bytes(b"")
     assert main([str(tmp_path)]) == 1
-    assert "found 1 files such as tilt.mcap.lz4: decompress them, as by `lz4 -d`" in capsys.readouterr().err
+    assert "found tilt.mcap.lz4: decompress them, as by `lz4 -d`" in capsys.readouterr().err
     with open(tmp_path / "empty.mcap", "wb") as file:
         writer = Writer(file)
         writer.start()
         writer.finish()
     assert main([str(tmp_path)]) == 1
     assert "No log holds poses" in capsys.readouterr().err
+
+
+def test_nothing_in_a_folder_is_left_out_without_a_word(tmp_path, capsys):
+    record(tmp_path, [static_truth(0.0)], instruments())
+    (log,) = tmp_path.glob("*.mcap")
+    (tmp_path / "monday/morning").mkdir(parents=True)
+    shutil.copy(log, tmp_path / "monday/morning/deep.mcap")
+    for name in ("tilt.bag", "curl.mcap.lz4", "sizes.csv"):
+        (tmp_path / name).write_bytes(b"1,2\n")
+    with open(tmp_path / "empty.mcap", "wb") as file:
+        writer = Writer(file)
+        writer.start()
+        writer.finish()
+    lines, proposed = inspect(capsys, tmp_path)
+    for file, reason in {
+        "tilt.bag": "`rosbags-convert`", "curl.mcap.lz4": "decompress them", "monday/morning/deep.mcap": "move them up",
+        "sizes.csv": "`trunkline inspect`", f"{tmp_path}/empty.mcap": "no poses that can be read",
+    }.items():  # fmt: skip
+        assert re.search(rf"left out: {re.escape(file)}.*{re.escape(reason)}", lines), file
+        assert file not in proposed
+    left = ["curl.mcap.lz4", "empty.mcap", "monday/morning/deep.mcap", "tilt.bag"]
+    assert read_session(tmp_path).unlisted == left
 
 
 def test_a_unit_that_is_a_guess_is_said_to_be(tmp_path, capsys):

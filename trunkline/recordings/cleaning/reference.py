@@ -8,7 +8,8 @@ from trunkline.recordings.cleaning.checks import deciding
 from trunkline.recordings.cleaning.described_arm import Places, fits, size_ratio, unit_that_fits
 from trunkline.recordings.cleaning.trial_window import Stretch
 from trunkline.recordings.cleaning.usual_distances import usual_distances
-from trunkline.recordings.session.session import FixedBase, Session, TrialEntry
+from trunkline.recordings.logs.messages import UNLABELLED
+from trunkline.recordings.session.session import FixedBase, Session, TrialEntry, some_of
 from trunkline.recordings.session.source import LogSource
 from trunkline.recordings.signals.units import METRES_PER, extent, likely_unit, other_units
 
@@ -52,9 +53,12 @@ def reference_of(
     if markers is None:
         mount = session.base.body if isinstance(session.base, FixedBase) else session.base
         names = {name for source in sources for name in source.poses.names if name != mount}
-        markers = {name: name for name in sorted(names)}
+        unlabelled = {name for name in names if UNLABELLED.fullmatch(name)}
+        markers = {name: name for name in sorted(names - unlabelled or names)}
     joint_topics = tuple(sorted({name for source in sources for name in source.joint_topics}))
     reference = Reference(markers, base, METRES_PER[session.frame.unit], None, joint_topics)
+    if session.markers is None and (lost := sorted(names - set(markers))):
+        reference.repairs.append(f"{some_of(lost)} left out: they are markers without a label")
     bodies = reference.bodies
     complete = [some for some in trials if set(bodies) <= set(some[1].poses.names)]
     chosen, fallback = deciding(complete, lambda some: some[0].split)

@@ -11,7 +11,7 @@ from trunkline.recordings.cleaning.described_arm import Places
 from trunkline.recordings.cleaning.pulls import late_commands
 from trunkline.recordings.cleaning.resting_shapes import check_resting_shapes
 from trunkline.recordings.cleaning.sanity_checks import SanityLimits, check_sanity
-from trunkline.recordings.session.session import FixedBase, Session, TrialEntry
+from trunkline.recordings.session.session import FixedBase, Session, TrialEntry, some_of
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_stepwise
 from trunkline.recordings.trials.raw_trial import RawTrial
 from trunkline.recordings.trials.splits import IDENTIFY, SPLITS, TEST, VALIDATE
@@ -119,8 +119,7 @@ def _unlisted(session: Session) -> list[str]:
     logs = session.unlisted
     if not logs:
         return []
-    names = ", ".join(logs[:3]) + (f" and {len(logs) - 3} more" if len(logs) > 3 else "")
-    return [f"logs: {names} in the folder, but in no trial of session.yaml: left out"]
+    return [f"logs: {some_of(logs)} in the folder, but in no trial of session.yaml: left out"]
 
 
 def _missing(raw_trials: list[RawTrial]) -> list[str]:

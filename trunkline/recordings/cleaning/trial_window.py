@@ -141,7 +141,8 @@ def check_seen(positions: np.ndarray, names: list[str], least: float, where: str
             dropped = [repair for repair in findings.repairs if " samples " in repair and name in repair]
             why = f" ({'; '.join(dropped)})" if dropped else ""
             problem = f"{name!r} is seen in {100 * share:.1f} % of {len(positions)} frames{why}"
-            raise InputError(f"{where}: {problem}, expected at least {100 * least:g} %")
+            remedy = "or `markers` in session.yaml that leaves it out"
+            raise InputError(f"{where}: {problem}, expected at least {100 * least:g} %, {remedy}")
         if not enough:
             problem = f"{name!r} is seen in {100 * share:.1f} % of {len(positions)} frames, but never in four in a row"
             raise InputError(f"{where}: {problem}, expected messages that hold all bodies, one after the other")

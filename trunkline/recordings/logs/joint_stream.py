@@ -7,7 +7,7 @@ import numpy as np
 from trunkline.recordings.logs.cdr import short_name
 from trunkline.recordings.logs.encodings import decode, readable_topic
 from trunkline.recordings.logs.mcap_log import Topic
-from trunkline.recordings.logs.messages import JOINTS, READING
+from trunkline.recordings.logs.messages import JOINTS, READING, misfit
 from trunkline.recordings.logs.samples import union
 
 
@@ -16,7 +16,8 @@ class JointStream:
     """T messages, K joints. stamps, log_times: (T,) ns. positions: (T, K) m, or efforts, NaN where absent.
 
     sent: (T, K), which of them a message holds, as a finite number. topic: for people to read, of several.
-    timed: whether the messages have stamps; without, stamps are the log times. unnamed, notes: as for poses.
+    timed: whether the messages have stamps; without, stamps are the log times. undecodable, misfit, unnamed, notes: as
+    for poses.
     """
 
     topic: str
@@ -26,6 +27,7 @@ class JointStream:
     positions: np.ndarray
     sent: np.ndarray
     undecodable: int
+    misfit: str = ""
     timed: bool = True
     unnamed: int | None = None
     notes: list[str] = field(default_factory=list)
@@ -48,13 +50,14 @@ def joint_stream(topic: Topic, name: str | None = None, forces: bool = False) ->
         ValueError: the messages cannot be read at all.
     """
     topic, notes = readable_topic(topic)
-    reader, batches, unnamed, timed = JOINTS[short_name(topic.schema)], [], None, True
+    reader, batches, unnamed, timed, reason = JOINTS[short_name(topic.schema)], [], None, True, ""
     for rows, message in decode(topic):
         try:
             joints = reader(message)
             numbers = joints.efforts if forces and joints.efforts is not None else joints.positions
             positions = numbers.reshape(rows.size, numbers.shape[-1])
-        except READING:
+        except READING as error:
+            reason = reason or misfit(error)
             continue
         names = joints.names
         if names is None and name is not None and positions.shape[1] == 1:
@@ -78,6 +81,9 @@ def joint_stream(topic: Topic, name: str | None = None, forces: bool = False) ->
             stamps[rows] = time
     if lacking:
         notes.append(f"{topic.name}: {lacking} messages hold numbers that are not finite: taken for motors not told")
+    undecodable = len(topic.messages) - int(readable.sum())
+    if undecodable:
+        notes.append(f"{topic.name}: {undecodable} messages that do not fit their schema dropped")
     return JointStream(
         topic=topic.name,
         stamps=stamps[readable],
@@ -85,7 +91,8 @@ def joint_stream(topic: Topic, name: str | None = None, forces: bool = False) ->
         names=names,
         positions=positions[readable],
         sent=sent[readable],
-        undecodable=len(topic.messages) - int(readable.sum()),
+        undecodable=undecodable,
+        misfit=reason,
         timed=timed,
         unnamed=unnamed,
         notes=notes,
@@ -113,6 +120,7 @@ def joined(streams: list[JointStream]) -> JointStream:
         positions=positions[order],
         sent=sent[order],
         undecodable=sum(stream.undecodable for stream in streams),
+        misfit=next((stream.misfit for stream in streams if stream.misfit), ""),
         timed=all(stream.timed for stream in streams),
         unnamed=max((stream.unnamed for stream in streams if stream.unnamed is not None), default=None),
         notes=list(dict.fromkeys(note for stream in streams for note in stream.notes)),

@@ -5,6 +5,7 @@ A function here takes one decoded message, or a batch of one layout (see `encodi
 holds several of them, the one that is registered first is read.
 """
 
+import re
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -38,11 +39,17 @@ class DecodedJoints(NamedTuple):
     efforts: np.ndarray | None = None
 
 
+UNLABELLED = re.compile(r"(.*[:_ ])?unlabell?ed([:_ ]*\d+)?", re.IGNORECASE)  # what Motive calls a marker of no asset
 POSES: dict[str, Callable[..., DecodedPoses]] = {}
 JOINTS: dict[str, Callable[..., DecodedJoints]] = {}
 TOPIC_PER_BODY: set[str] = set()  # schemas of one pose, which the topic names
 # what a reader raises where a message is not as expected
 READING = (AttributeError, TypeError, ValueError, IndexError, OverflowError)
+
+
+def misfit(error: Exception) -> str:
+    """Why a message is not as a reader expects it, in words, by what the reader raised (`READING`)."""
+    return f"it has no {error.name or error}" if isinstance(error, AttributeError) else str(error)
 
 
 def poses(

@@ -9,7 +9,7 @@ import numpy as np
 from trunkline.recordings.logs.cdr import short_name
 from trunkline.recordings.logs.encodings import decode, readable_topic
 from trunkline.recordings.logs.mcap_log import Topic
-from trunkline.recordings.logs.messages import POSES, READING, DecodedPoses
+from trunkline.recordings.logs.messages import POSES, READING, DecodedPoses, misfit
 from trunkline.recordings.logs.samples import PoseSamples, union
 from trunkline.recordings.logs.transforms import in_one_frame
 
@@ -38,7 +38,8 @@ class PoseStream:
 
     present: (T, B) whether a body is in a frame. positions: (T, B, 3) in the log's unit, quaternions:
     (T, B, 4) wxyz or None; NaN where absent. undecodable: messages that do not fit their schema, or that hold
-    another number of poses than there are names. unnamed: poses in a message that nobody names, else None.
+    another number of poses than there are names. misfit: why the first of them does not, "" where only its bytes are
+    torn. unnamed: poses in a message that nobody names, else None.
     parents: names of the frames that the poses are in, where messages say it for each; several, where nothing
     connects them. header_frames: those that headers name, by topic, in which all poses of a message are. twice: a name
     that several poses of one message have, else None; such messages do not fit either. notes: what reading them took,
@@ -53,6 +54,7 @@ class PoseStream:
     positions: np.ndarray
     quaternions: np.ndarray | None
     undecodable: int = 0
+    misfit: str = ""
     unnamed: int | None = None
     parents: tuple[str, ...] = ()
     twice: str | None = None
@@ -92,11 +94,12 @@ def pose_stream(
     """
     unnamed, twice, read, header_frames = None, None, [], {}
     notes: list[str] = []
+    reasons: list[str] = []
     for name, topic in topics.items():
         topic, some = readable_topic(topic)
         notes += some
         header_frames[topic.name] = frames = {}
-        batches = list(_read_poses(topic, frames))
+        batches = list(_read_poses(topic, frames, reasons))
         declared = bodies if name is None else [name]
         if declared is None and any(poses.names is None for _, poses in batches):
             unnamed = max(poses.positions.shape[-2] for _, poses in batches)
@@ -118,6 +121,7 @@ def pose_stream(
             samples, parents = in_one_frame(samples, _samples(fixed), list(parents), frame)
         stream = _gather(samples)
     stream.undecodable = sum(len(topic.messages) for topic in topics.values()) - readable
+    stream.misfit = reasons[0] if reasons else ""
     stream.unnamed, stream.parents, stream.twice, stream.notes = unnamed, tuple(parents), twice, notes
     stream.header_frames = {name: tuple(frames) for name, frames in header_frames.items() if frames}
     return without_repeats(stream)
@@ -131,15 +135,20 @@ def _repeated(names: list[str] | np.ndarray | None) -> str | None:
     return None
 
 
-def _read_poses(topic: Topic, frames: dict[str, None] | None = None) -> Iterator[tuple[np.ndarray, DecodedPoses]]:
-    """Batches, or single messages, as `decode` gives them; the frames that their headers name are added to `frames`."""
+def _read_poses(
+    topic: Topic, frames: dict[str, None] | None = None, reasons: list[str] | None = None
+) -> Iterator[tuple[np.ndarray, DecodedPoses]]:
+    """Batches, or single messages, as `decode` gives them; the frames that their headers name are added to `frames`,
+    and to `reasons` why a message does not fit."""
     reader = POSES[short_name(topic.schema)]
     for rows, message in decode(topic):
         try:
             poses = reader(message)
             names = poses.names
             named = names if names is None or isinstance(names, np.ndarray) else [str(name) for name in names]
-        except READING:
+        except READING as error:
+            if reasons is not None:
+                reasons.append(misfit(error))
             continue
         if frames is not None and poses.parents is None and (frame := _header_frame(message)):
             frames[frame] = None

@@ -6,7 +6,6 @@ semicolons where numbers have decimal commas. Quaternions are x, y, z, w; an occ
 
 import codecs
 import csv
-import re
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
@@ -14,13 +13,13 @@ from typing import NamedTuple
 import numpy as np
 
 from trunkline.errors import InputError
+from trunkline.recordings.logs.messages import UNLABELLED
 from trunkline.recordings.logs.pose_stream import PoseStream
 from trunkline.recordings.signals.units import METRES_PER
 
 METRES = {unit: METRES_PER[short] for unit, short in
           {"meters": "m", "millimeters": "mm", "centimeters": "cm", "inches": "inch"}.items()}  # fmt: skip
 POSITION, ROTATION = ("Position", "XYZ"), ("Rotation", "WXYZ")
-UNLABELLED = re.compile(r"(.*[:_ ])?unlabell?ed([:_ ]*\d+)?", re.IGNORECASE)  # what Motive calls a marker of no asset
 
 
 class Export(NamedTuple):

@@ -11,10 +11,10 @@ from trunkline.errors import InputError, in_one_line
 from trunkline.program import command_parser
 from trunkline.recordings.logs.bag2 import bag_folder
 from trunkline.recordings.preparation.proposal import propose
-from trunkline.recordings.preparation.survey import describe, survey
+from trunkline.recordings.preparation.survey import LogSurvey, describe, survey
 from trunkline.recordings.preparation.table_survey import survey_table
 from trunkline.recordings.session.layout import TABLES
-from trunkline.recordings.session.session import logs_in, tables_in, unreadable_in
+from trunkline.recordings.session.session import TABLE_REMEDY, logs_in, some_of, tables_in, unread_in, unreadable_in
 
 
 @in_one_line
@@ -32,6 +32,8 @@ def main(arguments: list[str] | None = None) -> int:
             continue
         surveys += new
         print("\n".join(describe(new[0])))
+    for line in _left_out(surveys, places):
+        print(line)
     folder = places[0] if len(places) == 1 and places[0].is_dir() and bag_folder(places[0]) is None else None
     if text := propose(surveys, folder=folder):
         print(f"\nProposed session.yaml:\n\n{text}")
@@ -39,6 +41,19 @@ def main(arguments: list[str] | None = None) -> int:
     if surveys:
         print("\nNo log holds poses: no session.yaml to propose.", file=sys.stderr)
     return 1
+
+
+def _left_out(surveys: list[LogSurvey], places: list[Path]) -> list[str]:
+    """What is in no proposal, and why, a line each."""
+    empty = [str(survey.log.path) for survey in surveys if survey.poses is None or not len(survey.poses.stamps)]
+    lines = [f"left out: {some_of(empty)}: no poses that can be read"] if empty else []
+    for place in places:
+        if place.is_dir() and bag_folder(place) is None:
+            unread = unread_in(place)
+            if not logs_in(place):
+                unread.pop(TABLE_REMEDY, None)  # these are what was looked at
+            lines += [f"left out: {some_of(files)} in {place}: {remedy}" for remedy, files in unread.items()]
+    return lines
 
 
 def _logs(paths: list[Path]) -> list[Path]:

@@ -268,8 +268,8 @@ class Session(Entry):
     tendon's pull, or move several.
     commands: whether they hold until the next, or go on in a straight line to it; by default they hold, but for ramps
     whose samples come evenly.
-    shared: what is to be said of trials that share data, by trial; see `check_shared`. unlisted: the folder's logs that
-    no trial is of.
+    shared: what is to be said of trials that share data, by trial; see `check_shared`. unlisted: the folder's logs, and
+    what logs can be made of, that no trial is of.
     """
 
     frame: MocapFrame
@@ -450,16 +450,31 @@ def tables_in(folder: Path) -> list[str]:
     return [file.relative_to(folder).as_posix() for file in files if file.suffix.lower() in TABLES]
 
 
+TABLE_REMEDY = "`trunkline inspect` proposes a session.yaml that reads such tables"
+
+
+def unread_in(folder: Path) -> dict[str, list[str]]:
+    """Recordings of a folder, and of folders in it, that are none of `logs_in`, by what to do with them."""
+    remedies = {
+        "[!.]*.mcap.lz4": "decompress them, as by `lz4 -d`",
+        "[!.]*.bag": "`rosbags-convert` of the package rosbags makes bags of ROS 2 of them",
+    }
+    found = {remedy: [*folder.glob(f"[!.]*/{of}"), *folder.glob(of)] for of, remedy in remedies.items()}
+    inner = [sub for sub in folder.glob("[!.]*/[!.]*/") if not (sub.parent / "session.yaml").is_file()]
+    found["they lie two folders down or deeper: move them up"] = [log for sub in inner for log in recordings_in(sub)]
+    found[TABLE_REMEDY] = [folder / table for table in tables_in(folder)]
+    names = {remedy: sorted(file.relative_to(folder).as_posix() for file in files) for remedy, files in found.items()}
+    return {remedy: files for remedy, files in names.items() if files}
+
+
 def unreadable_in(folder: Path) -> str:
     """What else is there of which logs can be made, and how, as the end of a sentence; empty where nothing is."""
-    remedies = {
-        "*.mcap.lz4": "decompress them, as by `lz4 -d`",
-        "*.bag": "`rosbags-convert` of the package rosbags makes bags of ROS 2 of them",
-    } | {f"*{suffix}": "`trunkline inspect` proposes a session.yaml that reads such tables" for suffix in TABLES}
-    for pattern, remedy in remedies.items():
-        if files := [file for level in ("", "[!.]*/") for file in folder.glob(level + pattern)]:
-            return f"; found {len(files)} files such as {files[0].relative_to(folder)}: {remedy}"
-    return ""
+    return "".join(f"; found {some_of(files)}: {remedy}" for remedy, files in unread_in(folder).items())
+
+
+def some_of(files: list[str]) -> str:
+    """Some of the files, and how many there are, in words."""
+    return ", ".join(files[:3]) + (f" and {len(files) - 3} more" if len(files) > 3 else "")
 
 
 def named_logs(path: Path) -> set[str]:
@@ -517,7 +532,8 @@ def read_session(folder: Path, files: set[str] | None = None) -> Session:
     session._shared = check_shared(folder, session.trials)
     of_bags = {bag.relative_to(folder).as_posix() for bag in bags.values() if bag is not None}
     listed = {trial.file for trial in session.trials} | of_bags | session.motors_files()
-    session._unlisted = sorted(set(logs) - listed)
+    others = [file for remedy, files in unread_in(folder).items() if remedy != TABLE_REMEDY for file in files]
+    session._unlisted = sorted({*logs, *others} - listed)
     return session
 
 

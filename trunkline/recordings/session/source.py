@@ -64,7 +64,7 @@ def open_log(path: Path, session: Session) -> LogSource:
     if not len(poses.stamps):
         schema = next(iter(topics.values())).schema
         names = f" with {len(session.bodies)} `bodies`, as in session.yaml" if session.bodies else ""
-        problem = f"no message fits its schema {schema}{names}"
+        problem = f"no message fits its schema {schema}{names}{poses.misfit and f': {poses.misfit}'}"
         if poses.twice is not None:
             problem = f"found {poses.twice!r} twice in a message, expected each body once"
         raise InputError(f"{where}: {problem}")
@@ -158,7 +158,11 @@ def motor_stream(
         if topic is None:
             continue
         only = motor if len(topics) > 1 else None
-        stream = _understood(f"{log.path}: {topic.name}", joint_stream, topic, only, forces)
+        where, count = f"{log.path}: {topic.name}", len(topic.messages)
+        stream = _understood(where, joint_stream, topic, only, forces)
+        if count and stream.undecodable == count:
+            reason = f": {stream.misfit}" if stream.misfit else ""
+            raise InputError(f"{where}: none of its {count} messages fits their schema {topic.schema}{reason}")
         if wanted is None and names and stream.unnamed is None and stream.names and not names & set(stream.names):
             others = ", ".join(stream.names[:3]) + (", …" if len(stream.names) > 3 else "")
             notes.append(f"{topic.name} left out as {role} topic: found {others}, none of {', '.join(sorted(names))}")

@@ -11,6 +11,7 @@ from pathlib import Path
 from trunkline.errors import in_one_line
 from trunkline.model.arm_model import ArmModel
 from trunkline.model.statics.chain import read_chain
+from trunkline.model.statics.supported import require_supported
 from trunkline.program import command_parser
 from trunkline.recordings.session.session import read_session
 from trunkline.report.figures.arm import arm_figure
@@ -32,6 +33,8 @@ def main(arguments: list[str] | None = None) -> int:
     model = read_drawing(args.arm, Path("."))
     if model.nu or len(ArmModel(model).cables):
         read_chain(model)  # what the statics cannot solve is told here
+    else:
+        require_supported(model)
     session = None if args.session is None else read_session(args.session)
     for lines in (unit_lines(model), tendon_lines(model), marker_lines(model)):
         print("\n".join(lines))

@@ -182,31 +182,49 @@ public readonly struct JsonBlock {
   /// <summary>A number in it.</summary>
   public double Number(string name) => Raw(name) is double value ? value : throw Missing(name, "a number");
 
-  /// <summary>A number without what is behind its point.</summary>
-  public int Integer(string name) => (int)Number(name);
+  /// <summary>A whole number of 1 or more.</summary>
+  public int Count(string name) {
+    double value = Number(name);
+    return IsCount(value) ? (int)value : throw Missing(name, "a whole number from 1");
+  }
+
+  /// <summary>So many whole numbers of 1 or more.</summary>
+  public int[] Counts(string name, int count) {
+    var values = Numbers(name, count);
+    foreach (double value in values) {
+      if (!IsCount(value)) {
+        throw Missing(name, $"{count} whole numbers from 1");
+      }
+    }
+    return System.Array.ConvertAll(values, value => (int)value);
+  }
+
+  private static bool IsCount(double value) => value >= 1 && value <= 1 << 30 && value == System.Math.Floor(value);
 
   /// <summary>A text in it.</summary>
   public string Text(string name) => Raw(name) as string ?? throw Missing(name, "a text");
 
-  /// <summary>A list of numbers in it.</summary>
-  public double[] Numbers(string name) {
+  /// <summary>A list of numbers in it; so many, where <paramref name="count"/> says.</summary>
+  public double[] Numbers(string name, int count = 0) {
+    string expected = count > 0 ? $"{count} numbers" : "numbers";
     var found = new List<double>();
-    foreach (object value in List(name)) {
-      found.Add(value is double number ? number : throw Missing(name, "numbers"));
+    foreach (object value in List(name, expected)) {
+      found.Add(value is double number ? number : throw Missing(name, expected));
     }
-    return found.ToArray();
+    return count > 0 && found.Count != count ? throw Missing(name, expected) : found.ToArray();
   }
 
-  /// <summary>A list of texts in it.</summary>
+  /// <summary>A list of texts in it, one at least.</summary>
   public string[] Texts(string name) {
     var found = new List<string>();
-    foreach (object value in List(name)) {
+    foreach (object value in List(name, "texts")) {
       found.Add(value as string ?? throw Missing(name, "texts"));
     }
-    return found.ToArray();
+    return found.Count == 0 ? throw Missing(name, "texts") : found.ToArray();
   }
 
-  private List<object> List(string name) => Raw(name) as List<object> ?? throw Missing(name, "a list");
+  private List<object> List(string name, string expected) =>
+      Raw(name) as List<object> ?? throw Missing(name, expected);
 
   private object Raw(string name) =>
       _values.TryGetValue(name, out object value) ? value

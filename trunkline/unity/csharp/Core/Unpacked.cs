@@ -116,20 +116,22 @@ public static class Unpacked {
 
   private static SignedMap Grid(IReadOnlyDictionary<string, byte[]> files, JsonBlock grids, string name) {
     var block = grids.Block(name);
-    double[] shape = block.Numbers("shape"), origin = block.Numbers("origin");  // along Unity's axes, x fastest
-    int nx = (int)shape[0], ny = (int)shape[1], nz = (int)shape[2];
-    var values = Halves(files, block.Text("file"), nx * ny * nz);
-    return new SignedMap(values, nx, nz, ny, new Vector(origin[0], origin[2], origin[1]), block.Numbers("spacing")[0]);
+    var shape = block.Counts("shape", 3);  // along Unity's axes, x fastest
+    double[] origin = block.Numbers("origin", 3), spacing = block.Numbers("spacing", 3);
+    int nx = shape[0], ny = shape[1], nz = shape[2];
+    var values = Halves(files, block.Text("file"), (decimal)nx * ny * nz);
+    return new SignedMap(values, nx, nz, ny, new Vector(origin[0], origin[2], origin[1]), spacing[0]);
   }
 
   private static SheetReach Sheets(IReadOnlyDictionary<string, byte[]> files, JsonBlock block, double tolerance) {
-    var directions = block.Numbers("directions");
-    int count = directions.Length / 3, around = block.Integer("around"), along = block.Integer("along");
+    int count = Math.Max(block.Numbers("directions").Length / 3, 1);
+    var directions = block.Numbers("directions", 3 * count);
+    int around = block.Count("around"), along = block.Count("along");
     var downs = new Vector[count];
     for (int j = 0; j < count; j++) {
       downs[j] = new Vector(directions[3 * j], directions[3 * j + 2], directions[3 * j + 1]);
     }
-    var points = Halves(files, block.Text("file"), count * around * along * 3);
+    var points = Halves(files, block.Text("file"), (decimal)count * around * along * 3);
     for (int i = 0; i < points.Length; i += 3) {
       Exchange(ref points[i + 1], ref points[i + 2]);
     }
@@ -146,10 +148,10 @@ public static class Unpacked {
     b = kept;
   }
 
-  private static float[] Halves(IReadOnlyDictionary<string, byte[]> files, string path, int count) {
+  private static float[] Halves(IReadOnlyDictionary<string, byte[]> files, string path, decimal count) {
     var data = Contents(files, path, 2 * count);
-    var found = new float[count];
-    for (int i = 0; i < count; i++) {
+    var found = new float[data.Length / 2];
+    for (int i = 0; i < found.Length; i++) {
       found[i] = Half(data[2 * i] | data[2 * i + 1] << 8);
     }
     return found;
@@ -178,7 +180,7 @@ public static class Unpacked {
     return found;
   }
 
-  private static byte[] Contents(IReadOnlyDictionary<string, byte[]> files, string path, int size) {
+  private static byte[] Contents(IReadOnlyDictionary<string, byte[]> files, string path, decimal size) {
     if (!files.TryGetValue(path, out var data) || data.Length != size) {
       string found = data == null ? "no such file" : $"found {data.Length} bytes";
       throw new InputError($"{path}: {found}, expected {size} as the manifest's lattice says");
