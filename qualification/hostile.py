@@ -98,6 +98,32 @@ async def speechless(line: str, pings: bool = False) -> str:
     return f"gone after {time.monotonic() - begun:.1f} s"
 
 
+async def unread() -> str:
+    """A connection that asks for the page's code again and again, and reads none of it."""
+    host, port = ADDRESS.url.removeprefix("http://").split(":")
+    _, writer = await asyncio.open_connection(host, int(port), limit=1024)
+    writer.write(8 * f"GET /app.js HTTP/1.1\r\nHost: {host}:{port}\r\n\r\n".encode())
+    begun = time.monotonic()
+    with suppress(ConnectionError):
+        while time.monotonic() < begun + LONG:
+            await asyncio.sleep(0.2)
+            writer.write(b"\r\n")
+            await writer.drain()
+        return "NOTHING"
+    return f"gone after {time.monotonic() - begun:.1f} s"
+
+
+async def worded(token: bytes) -> str:
+    """A request with this as its token."""
+    host, port = ADDRESS.url.removeprefix("http://").split(":")
+    reader, writer = await asyncio.open_connection(host, int(port))
+    lines = f"GET /certificate HTTP/1.1\r\nHost: {host}:{port}\r\nAuthorization: Bearer ".encode()
+    writer.write(lines + token + b"\r\n\r\n")
+    answer = await asyncio.wait_for(reader.readline(), SOON)
+    writer.close()
+    return answer.decode().partition(" ")[2].strip()
+
+
 async def sent(visitors: Visitors, message: bytes) -> str:
     guest = await visitors.come()
     with suppress(ConnectionError):
@@ -188,6 +214,8 @@ ATTEMPTS: dict[str, Attempt] = {
     "half a request": lambda s: speechless(UPGRADE[:30]),
     "a connection that says nothing": lambda s: speechless(UPGRADE),
     "… but pings": lambda s: speechless(UPGRADE, True),
+    "answers that are not read": lambda s: unread(),
+    "a token that is no ASCII": lambda s: worded("é".encode()),
     "message of 10 MB": lambda s: sent(s, bytes(10_000_000)),
     "message of no kind": lambda s: sent(s, b"\x63" + bytes(15)),
     "6000 messages at once": flood,

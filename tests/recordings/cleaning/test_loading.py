@@ -129,6 +129,16 @@ def test_bad_quaternions_and_positions_are_dropped_and_counted(tmp_path):
     assert np.isfinite(raw.positions).all(axis=-1).sum() == raw.positions[..., 0].size - 18
 
 
+def test_markers_without_a_label_are_left_out_and_all_are_taken_where_none_has_one(tmp_path):
+    record(tmp_path, [replace(release_truth(), markers=(*MARKERS[:3], "Unlabeled 1007"))], instruments())
+    ((raw, findings),) = taken(tmp_path)
+    assert raw.markers == MARKERS[:3]
+    assert "Unlabeled 1007 left out: they are markers without a label" in findings.repairs
+    unlabelled = tuple(f"Unlabeled {number}" for number in range(4))
+    record(tmp_path / "none", [replace(release_truth(), markers=unlabelled)], instruments())
+    assert taken(tmp_path / "none")[0][0].markers == unlabelled
+
+
 @pytest.mark.parametrize(("key", "value"), [("quaternions", 0.0), ("positions", 0.0), ("positions", 1e300)])
 def test_a_body_nowhere_is_not_taken_for_seen(tmp_path, key, value):
     def spoil(m):
