@@ -183,7 +183,14 @@ test("a notice is in the words of the device at hand", () => {
     assert.doesNotMatch(ofDevice(core, "keys"), /controller|grip|trigger|primary/);
     assert.doesNotMatch(ofDevice(core, "touch"), /controller|grip|trigger|primary|\bG\b/);
   }
-  for (const key of ["stopped", "ready", "plan", "hold", "aim"]) assert.doesNotMatch(ofDevice(whyNothing("Enter", { up: true, controls: true, mode: key, gripped: false }), "touch"), /\bEnter\b.*press|\bpress R\b|\bG\b/);
+  for (const code of ["Enter", "KeyG", "KeyR", "KeyF", "ArrowUp"]) {
+    for (const mode of ["hold", "aim", "plan", "preview", "ready", "delay", "execute", "follow", "stopped"]) {
+      for (const gripped of [true, false]) {
+        const reason = ofDevice(whyNothing(code, { up: true, controls: true, mode, gripped, offers: gripped }), "touch");
+        assert.doesNotMatch(reason, /\bEnter\b|\b[GFR]\b|[Aa]rrows/);
+      }
+    }
+  }
 });
 
 test("a notice lasts while aiming only as long as its cause", () => {
