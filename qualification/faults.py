@@ -39,7 +39,7 @@ from trunkline.errors import InputError
 GOAL = 0.15  # s
 MOVING = 0.4  # s for which the robot has moved before anything is done
 HANG = 0.5  # s
-STALL = 0.6  # s
+STALL = 0.8 * LOG_LATE  # s; it may begin just before the log is written
 AWAY = 0.6  # s after which who controls comes back, of the 1 s after which it controls no more
 STILL = 0.15  # s without motion: it rests
 NEVER = 3.0  # s without a hold: it was told none
