@@ -1,5 +1,6 @@
 """`trunkline check`: what a session can identify, before any fit."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
@@ -242,6 +243,10 @@ def test_the_command_reads_logs_and_writes_nothing(tmp_path, monkeypatch, capsys
     assert "identify_stiffness, from 1 trials:\n  no static_pull of the split identify" in output
     assert "identify_damping, from" in output
     assert sorted(path.name for path in tmp_path.iterdir()) == ["conf", "data", "params.yaml"]
+    assert "note: " not in output
+    monkeypatch.setattr("trunkline.tools.check.__main__.slips", lambda model: [f"{model.nbody} bodies"])
+    assert main(["data/raw/demo"]) == 0
+    assert re.search(r"^note: \d+ bodies$", capsys.readouterr().out, re.MULTILINE)
     assert main(["data/raw/nowhere"]) == 1
     assert "no such folder" in capsys.readouterr().err
     params = tmp_path / "params.yaml"

@@ -28,6 +28,7 @@ from trunkline.recordings.trials.splits import DECIDING, IDENTIFY
 from trunkline.settings import read_yaml
 from trunkline.tools.check.sides import side_lines
 from trunkline.tools.check.up_axis import other_ups, up_lines
+from trunkline.tools.describe.words import slips
 from trunkline.tools.evaluate.session import read_trials_of
 
 
@@ -47,6 +48,8 @@ def main(arguments: list[str] | None = None) -> int:
     configs = {stage: settings_of(stage, args.settings) for stage in STAGES if stage in params}
     if arm := (params.get("build_mjcf") or {}).get("arm"):
         print(f"arm: {arm}, as {args.settings / 'params.yaml'} has it", flush=True)
+    for line in slips(model):
+        print(f"note: {line}", flush=True)
     trials, raw_trials = read_trials_of(args.session, args.settings, "check", marker_places(model))
     check_trials([trial for trial in trials if trial.split in DECIDING], model)
     print("\n".join(["recorded:", *(f"  {line}" for line in recorded_of_each(trials))]))

@@ -121,10 +121,15 @@ def marker_lines(model: mujoco.MjModel) -> list[str]:
     return ["tracked points, beside the units' centres:", *lines] if lines else ["tracked points: the units' centres"]
 
 
+def slips(model: mujoco.MjModel) -> list[str]:
+    """What of the description looks like another unit or a slip."""
+    return [*_other_angles(model), *_hardly_meant(model)]
+
+
 def doubt_lines(model: mujoco.MjModel, session: Session | None) -> list[str]:
     """What to know before any log is recorded, or of a session."""
     arm = ArmModel(model)
-    lines = [*_other_angles(model), *_hardly_meant(model)]
+    lines = slips(model)
     lines.append("masses are as described: no log without a load tells them; weigh the arm")
     angles = np.sort([_angle(model, cable) for cable in arm.cables])
     if len(angles):
