@@ -481,9 +481,10 @@ def test_a_missing_input_is_one_line_and_leaves_nothing(project, missing, monkey
 
 
 def sheets_of_a_ball() -> WorkspaceSurfaces:
-    """A hanging ball's lower half, swinging with gravity: linear in its direction."""
+    """A hanging ball's lower half, swinging with gravity: linear in its direction. Turned a little, so that of no point
+    in an arm's plane two others are the nearest."""
     downs = spread(20, 2.0, crowd=True)
-    way, place = np.meshgrid(2 * np.pi * np.arange(12) / 12, np.linspace(0, np.pi / 2, 8), indexing="ij")
+    way, place = np.meshgrid(0.1 + 2 * np.pi * np.arange(12) / 12, np.linspace(0, np.pi / 2, 8), indexing="ij")
     half = 0.2 * np.stack([np.sin(place) * np.cos(way), np.sin(place) * np.sin(way), -np.cos(place)], axis=-1)
     return WorkspaceSurfaces(downs, (half + 0.3 * downs[:, None, None]).astype(np.float16), 0.02)
 
