@@ -48,14 +48,20 @@ def arms(code: str, open_arms: int, sealed: int) -> dict[str, tuple[str, int]]:
 
 
 def set_up(folder: Path, family: str, seed: int, finer: int = 1) -> None:
-    """Write the settings of an arm's lab and of the stages into `folder`: the project's, but the last model is scored
-    on every kind of trial. finer: times as many steps of the simulated arm as its family has."""
+    """Write the settings of an arm's lab and of the stages into `folder`. finer: times as many steps of the simulated
+    arm as its family has."""
     lab_seed, plant = draw_arm(family, seed)
     plant["substeps"] *= finer
-    shutil.copytree(PROJECT / "demo/conf", folder / "demo/conf", dirs_exist_ok=True)
+    write_settings(folder, {"seed": lab_seed, "plant": family})
     OmegaConf.save(OmegaConf.create(plant), folder / f"demo/conf/record/plant/{family}.yaml")
-    record = {"record": {"seed": lab_seed, "plant": family}}
-    OmegaConf.save(OmegaConf.merge(OmegaConf.load(PROJECT / "demo/params.yaml"), record), folder / "demo/params.yaml")
+
+
+def write_settings(folder: Path, lab: dict[str, int | str]) -> None:
+    """The project's into `folder`, but the last model is scored on every kind of trial. lab: what of the simulated
+    lab's is another."""
+    shutil.copytree(PROJECT / "demo/conf", folder / "demo/conf", dirs_exist_ok=True)
+    record = OmegaConf.merge(OmegaConf.load(PROJECT / "demo/params.yaml"), {"record": lab})
+    OmegaConf.save(record, folder / "demo/params.yaml")
     settings = OmegaConf.masked_copy(read_yaml(PROJECT / "params.yaml"), list(PIPELINE))
     settings.ingest.session = "demo"
     settings[STAGES[-1]].reported = list(EXPERIMENTS)
@@ -98,16 +104,17 @@ def measure(family: str, seed: int) -> dict[str, float | str]:
     begun = time.perf_counter()
     with tempfile.TemporaryDirectory() as name:
         record(Path(name), family, seed)
-        row: dict[str, float | str] = {"held": 0, "intervals": 0}
-        for stage in PIPELINE:
-            try:
-                run(f"stages.{stage}", Path(name))
-            except InputError:
-                row["refused"] = stage
-                break
-        else:
-            row = cells(Path(name))
-        return row | {"seconds": time.perf_counter() - begun}
+        return identified_cells(Path(name)) | {"seconds": time.perf_counter() - begun}
+
+
+def identified_cells(folder: Path) -> dict[str, float | str]:
+    """Identify and score the session in `folder`: as `cells`, or what stage refuses it."""
+    for stage in PIPELINE:
+        try:
+            run(f"stages.{stage}", folder)
+        except InputError:
+            return {"held": 0, "intervals": 0, "refused": stage}
+    return cells(folder)
 
 
 def family_table(rows: list[dict]) -> str:
