@@ -41,6 +41,7 @@ MAY_NAME = {
     "examples/ftdcr/session.py": {"TEST"},  # likewise
     "examples/pairs/session.py": {"TEST"},  # likewise
     "studies/families.py": {"TEST"},  # shows it, of arms by which nothing is chosen
+    "studies/trial_worth.py": {"TEST"},  # likewise
     "trunkline/ar/session/measured_session.py": {"TEST"},  # deals a measured session's plans to the splits
     "trunkline/tools/batch/results.py": {"TEST"},  # shows its errors, as `score` wrote them
     "upkeep/limits.py": {"TEST"},  # refuses rows of it
@@ -160,7 +161,7 @@ def test_poison_in_the_split_test_moves_no_bit_of_the_other_filtered_trials(tmp_
     results = []
     for shift in (0.0, 1e3):
         moved = [
-            replace(raw, positions=raw.positions * (1 + shift) + shift) if raw.split == TEST else raw
+            replace(raw, positions=raw.positions + shift) if raw.split == TEST else raw
             for raw in raw_trials
         ]
         filter_stage.INGEST.mkdir(parents=True, exist_ok=True)

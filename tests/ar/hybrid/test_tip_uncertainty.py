@@ -1,5 +1,7 @@
 """By how far a tip may be elsewhere: each source by itself, of which the radius is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -36,6 +38,18 @@ def test_what_the_model_lacks_is_across_the_arm():
     drawn = offsets(Discrepancy(np.array([[0.003, 0.0, 0.1]]), 16), ways=(0.0, 0.04))
     assert rms(drawn) == pytest.approx(0.005, rel=0.02)
     np.testing.assert_allclose(drawn @ (TIP - MOUNT), 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("unknown", [0.0, 0.3, 1.0])
+def test_of_what_poses_tell_only_what_they_leave_is_lacking(unknown):
+    """Of the variance a share is the twin's, friction's with it, and the rest what is left where poses tell all."""
+    twin, left = (Discrepancy(np.array([[scale, 0.0, 0.0]]), 16) for scale in (0.005, 0.012))
+    made = TipUncertainty(twin, np.zeros(2), np.zeros(3), ALIGNED, np.eye(3), unknown=unknown, left=left)
+    expected = np.sqrt(unknown * 0.005**2 + (1 - unknown) * 0.012**2)
+    assert rms(made.offsets(MOUNT, TIP, DRAWS, np.random.default_rng(0))) == pytest.approx(expected, rel=0.02)
+    rubs = replace(made, discrepancy=NONE, left=NONE, friction=np.array([0.006, 0.0, 0.0]))
+    drawn = rubs.offsets(MOUNT, TIP, DRAWS, np.random.default_rng(0))
+    assert np.abs(drawn[:, 0]).max() == pytest.approx(0.006 * np.sqrt(unknown), rel=0.01)
 
 
 @pytest.mark.parametrize(("shift", "turn_deg", "expected"), [

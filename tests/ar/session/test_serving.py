@@ -248,12 +248,14 @@ def test_who_sends_inputs_and_draws_nothing_holds_the_robot_hears_why_and_still_
         async with laid() as here:
             guest, watcher = await controlling(here), await here.come()
             await executing(here, guest)
+            await asyncio.sleep(0.2)  # it is seen to move
             guest.sending.cancel()
             for _ in range(160):
                 await guest.input(guest.left, guest.right, flags=0b0111)
                 await asyncio.sleep(1 / 72)
-            await watcher.hears("state", notice="the page draws too slowly, the robot waits for it")
             state = await watcher.hears("state", mode="hold", motion="hold")
+            before = {message["notice"] for message in watcher.messages if message["type"] == "state"}
+            assert "the page draws too slowly, the robot waits for it" in before
             assert state["notice"].startswith("the page has drawn nothing for 2.")
             assert (await watcher.hears("lease"))["holder"] == guest.id
 
