@@ -459,11 +459,11 @@ def unread_in(folder: Path) -> dict[str, list[str]]:
         "[!.]*.mcap.lz4": "decompress them, as by `lz4 -d`",
         "[!.]*.bag": "`rosbags-convert` of the package rosbags makes bags of ROS 2 of them",
     }
-    found = {remedy: [*folder.glob(f"[!.]*/{of}"), *folder.glob(of)] for of, remedy in remedies.items()}
+    by_remedy = {remedy: [*folder.glob(f"[!.]*/{of}"), *folder.glob(of)] for of, remedy in remedies.items()}
     inner = [sub for sub in folder.glob("[!.]*/[!.]*/") if not (sub.parent / "session.yaml").is_file()]
-    found["they lie two folders down or deeper: move them up"] = [log for sub in inner for log in recordings_in(sub)]
-    found[TABLE_REMEDY] = [folder / table for table in tables_in(folder)]
-    names = {remedy: sorted(file.relative_to(folder).as_posix() for file in files) for remedy, files in found.items()}
+    by_remedy["they lie two folders down or deeper: move them up"] = [log for sub in inner for log in recordings_in(sub)]
+    by_remedy[TABLE_REMEDY] = [folder / table for table in tables_in(folder)]
+    names = {remedy: sorted(file.relative_to(folder).as_posix() for file in files) for remedy, files in by_remedy.items()}
     return {remedy: files for remedy, files in names.items() if files}
 
 
