@@ -117,7 +117,7 @@ async def worded(token: bytes) -> str:
     """A request with this as its token."""
     host, port = ADDRESS.url.removeprefix("http://").split(":")
     reader, writer = await asyncio.open_connection(host, int(port))
-    lines = f"GET /certificate HTTP/1.1\r\nHost: {host}:{port}\r\nAuthorization: Bearer ".encode()
+    lines = f"GET /scene.json HTTP/1.1\r\nHost: {host}:{port}\r\nAuthorization: Bearer ".encode()
     writer.write(lines + token + b"\r\n\r\n")
     answer = await asyncio.wait_for(reader.readline(), SOON)
     writer.close()

@@ -461,10 +461,15 @@ def unread_in(folder: Path) -> dict[str, list[str]]:
     }
     by_remedy = {remedy: [*folder.glob(f"[!.]*/{of}"), *folder.glob(of)] for of, remedy in remedies.items()}
     inner = [sub for sub in folder.glob("[!.]*/[!.]*/") if not (sub.parent / "session.yaml").is_file()]
-    by_remedy["they lie two folders down or deeper: move them up"] = [log for sub in inner for log in recordings_in(sub)]
+    by_remedy["they lie two folders down, or deeper: move them up"] = [
+        log for sub in inner for log in recordings_in(sub)
+    ]
     by_remedy[TABLE_REMEDY] = [folder / table for table in tables_in(folder)]
-    names = {remedy: sorted(file.relative_to(folder).as_posix() for file in files) for remedy, files in by_remedy.items()}
-    return {remedy: files for remedy, files in names.items() if files}
+    return {
+        remedy: sorted(file.relative_to(folder).as_posix() for file in files)
+        for remedy, files in by_remedy.items()
+        if files
+    }
 
 
 def unreadable_in(folder: Path) -> str:
