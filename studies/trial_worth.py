@@ -13,12 +13,12 @@ from there. Progress goes to stderr.
 
 import argparse
 import shutil
+import statistics
 import sys
 import tempfile
 import time
 from pathlib import Path
 
-import pandas as pd
 from omegaconf import OmegaConf
 
 from studies.families import EVERY, identified_cells, record, write_settings
@@ -26,7 +26,7 @@ from studies.recovery import run
 from studies.rows import Rows, digest
 from trunkline.errors import in_one_line
 from trunkline.identification.stages import STAGES
-from trunkline.pipeline.config import settings_of
+from trunkline.pipeline.config import PROJECT, settings_of
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.recordings.trials.splits import TEST
 from trunkline.settings import read_yaml
@@ -48,10 +48,12 @@ KINDS = ("static_tilt", "release", "curl", "static_pull", "motion")  # columns
 
 
 def record_arm(folder: Path, plant: str, seed: int) -> None:
-    """Record an arm's whole session in `folder`."""
-    if (folder / f"demo/conf/record/plant/{plant}.yaml").is_file():
-        return run("demo.record", folder)
-    return record(folder, plant, seed)
+    """Set up an arm's lab and the stages in `folder`, and record the whole session."""
+    if (PROJECT / f"demo/conf/record/plant/{plant}.yaml").is_file():
+        write_settings(folder, {"plant": plant, "seed": seed})
+        run("demo.record", folder)
+    else:
+        record(folder, plant, seed)
 
 
 def leave_out(folder: Path, kinds: tuple[str, ...]) -> None:
@@ -87,7 +89,7 @@ def worth_table(rows: dict[str, dict]) -> str:
         cells = [f"{float(row[f'{of}_position']):.3g} / {float(row[f'{of}_tip']):.3g}" for of in (EVERY, *KINDS)]
         holding = f"{int(row['held'])} of {int(row['intervals'])}"
         lines.append(f"| {arm} | {left} | {' | '.join(cells)} | {holding} |")
-    minutes = pd.DataFrame(rows.values())["seconds"].mean() / 60
+    minutes = statistics.mean(float(row["seconds"]) for row in rows.values()) / 60
     return "\n".join([*lines, f"Position / tip, % of length, mean over trials of `test`; {minutes:.0f} min a row."])
 
 
@@ -104,7 +106,6 @@ def main() -> int:
             of_arm = [name for name in missing if name.startswith(f"{arm}: ")]
             with tempfile.TemporaryDirectory() as recorded:
                 if of_arm:
-                    write_settings(Path(recorded), {"plant": plant, "seed": seed})
                     record_arm(Path(recorded), plant, seed)
                 for name in of_arm:
                     begun = time.perf_counter()

@@ -59,9 +59,9 @@ def test_a_plant_of_the_lab_is_recorded_as_it_is_and_another_is_drawn(tmp_path, 
     calls = []
     monkeypatch.setattr("studies.trial_worth.run", lambda *args: calls.append("run"))
     monkeypatch.setattr("studies.trial_worth.record", lambda *args: calls.append("record"))
-    write_settings(tmp_path, {"plant": plant})
     record_arm(tmp_path, plant, 7)
     assert calls == [by]
+    assert (tmp_path / "params.yaml").is_file() == (by == "run"), "`record` writes its settings itself"
     assert plant in dict(ARMS.values())
 
 

@@ -55,6 +55,7 @@ def test_the_highest_solid_beneath_a_place():
     assert beneath((-0.5, 0.5, 0.1), world) == floor
     assert beneath((9.0, 0.5, 0.1), world) is None
 
+
 TURNED: Quaternion = (np.cos(np.pi / 8), 0.0, 0.0, np.sin(np.pi / 8))  # by 45 deg about z
 BOX = WorldObject("box", "box", 0.1, 0.2, 0.1, (0.5, 0.1, 0.2), TURNED)
 BAR = np.subtract(grip_of(BASKET), BASKET.position)[2]
