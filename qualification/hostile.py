@@ -88,13 +88,14 @@ async def speechless(line: str, pings: bool = False) -> str:
     reader, writer = await asyncio.open_connection(host, int(port))
     writer.write(line.encode())
     begun = time.monotonic()
+    answer = b"none yet"
     with suppress(ConnectionError):
-        while time.monotonic() < begun + LONG:
+        while answer and time.monotonic() < begun + LONG:
             with suppress(TimeoutError):
-                if await asyncio.wait_for(reader.read(4096), 0.2) == b"":
-                    return f"gone after {time.monotonic() - begun:.1f} s"
+                answer = await asyncio.wait_for(reader.read(4096), 0.2)
             writer.write(PING * pings)
-        return "NOTHING"
+        if answer:
+            return "NOTHING"
     return f"gone after {time.monotonic() - begun:.1f} s"
 
 

@@ -446,6 +446,42 @@ test("a finger needs no key: what is offered has a button, and words name it", a
   await until(page, () => !document.querySelector("#go").hidden && /take the offer/i.test(document.querySelector("#go").textContent));
 });
 
+test("a cycle by fingers: aim by taps, plan, preview, the grip held by one finger and confirmed by another", async (t) => {
+  const fresh = await anew(t);
+  const { page, wrongs } = await open(t, browser, fresh, { drawn: false, touch: true });
+  const screen = await page.context().newCDPSession(page);
+  const on = async (selector, id) => {
+    const { x, y, width, height } = await page.locator(selector).boundingBox();
+    return { id, x: x + width / 2, y: y + height / 2 };
+  };
+  const fingers = (type, ...points) => screen.send("Input.dispatchTouchEvent", { type, touchPoints: points });
+  await loaded(page);
+  await until(page, () => !document.querySelector("#control").disabled);
+  await page.tap("#control");
+  await inMode(page, "aim");
+  await page.tap("#pad summary");
+  for (let target = 0; target < 2; target++) {
+    await page.tap('[data-step="ArrowUp"]');
+    await page.waitForTimeout(1500);
+    await page.tap("#which");
+  }
+  await until(page, () => globalThis.trunkline.state.targets && true);
+  await page.tap("#plan");
+  await inMode(page, "ready");
+  const grip = await on("#grip", 0);
+  await fingers("touchStart", grip);
+  await until(page, () => globalThis.trunkline.desktop.deadman);
+  await page.waitForTimeout(300);
+  const plan = await on("#plan", 1);
+  await fingers("touchStart", grip, plan);
+  await fingers("touchEnd", plan);
+  await inMode(page, "execute");
+  await passed(page, fresh, ["preview", "ready", "delay", "execute", "aim"]);
+  await fingers("touchEnd", grip);
+  await until(page, () => !globalThis.trunkline.desktop.deadman);
+  assert.deepEqual(wrongs, []);
+});
+
 test("a recording is played by the ghost, and a file that is none is refused", async (t) => {
   const { page, wrongs } = await open(t, browser, server);
   await loaded(page);

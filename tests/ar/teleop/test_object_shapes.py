@@ -78,3 +78,11 @@ BAR = np.subtract(grip_of(BASKET), BASKET.position)[2]
 )
 def test_how_far_a_point_is_from_an_object(object, aside, expected):
     assert distance_to(object, tuple(np.add(object.position, aside))) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("point", "expected"),
+    [((0.1, 0.1, 0.5), 0.0), ((0.3, 0.1, 0.5), 0.1), ((-0.03, 0.1, -0.04), 0.05), ((0.1, 0.2, 1.0), 0.0)],
+)
+def test_how_far_a_point_is_from_an_obstacle(point, expected):
+    assert distance_to(Obstacle("table", (0.0, 0.0, 0.0), (0.2, 0.2, 1.0)), point) == pytest.approx(expected)

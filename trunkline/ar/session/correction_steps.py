@@ -10,7 +10,7 @@ import numpy as np
 
 from trunkline.ar.correction.correction import CorrectionSettings, TipCorrection, shortened
 from trunkline.ar.teleop.base_frames import base_frames
-from trunkline.ar.teleop.messages import Obstacle, Targets, Vector, World
+from trunkline.ar.teleop.messages import Targets, World
 from trunkline.ar.teleop.object_shapes import distance_to
 from trunkline.ar.teleop.plan import CorrectionBounds, Plan
 from trunkline.ar.teleop.plan_checks import check_plan
@@ -112,11 +112,10 @@ def why_uncorrected(plan: Plan, targets: Targets, world: World, bounds: Correcti
         return f"the arm would touch {targets.object}"
     if planner.chain is None:
         return "the package has no statics of the arm"
-    beside = [(obstacle.name, _away(bounds.target, obstacle)) for obstacle in world.obstacles]
-    beside += [(object.name, distance_to(object, bounds.target)) for object in world.objects]
-    for name, away in beside:
+    for solid in (*world.obstacles, *world.objects):
+        away = distance_to(solid, bounds.target)
         if away < bounds.astray:
-            return f"{name} is {1e3 * away:.0f} mm from the tip's target, expected {1e3 * bounds.astray:.0f} mm"
+            return f"{solid.name} is {1e3 * away:.0f} mm from the tip's target, expected {1e3 * bounds.astray:.0f} mm"
     return beyond_trials(lacking, plan.joints[-1], plan.commands[-1], planner)
 
 
@@ -128,9 +127,3 @@ def beyond_trials(lacking: Lacking | None, joints: np.ndarray, commands: np.ndar
     gravity = DOWN @ base_frames(joints, planner.mount_offset)[1]
     pulls = np.maximum(planner.straight - commands, 0.0)
     return lacking.beyond(pulls, float(np.degrees(tilt_of_gravity(gravity))))
-
-
-def _away(point: Vector, obstacle: Obstacle) -> float:
-    """m from a point to an obstacle, 0 within."""
-    low, high, at = np.array(obstacle.low), np.array(obstacle.high), np.array(point)
-    return float(np.linalg.norm(np.maximum(np.maximum(low - at, at - high), 0.0)))

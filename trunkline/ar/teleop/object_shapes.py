@@ -45,13 +45,16 @@ def beneath(place: Vector, world: World) -> Obstacle | None:
     return max(lower, key=lambda obstacle: obstacle.high[2], default=None)
 
 
-def distance_to(object: WorldObject, point: Vector) -> float:
-    """m from a point in the base frame to an object, 0 within it; a cylinder counts as the box about it."""
-    aside = np.subtract(point, object.position)
-    if object.shape == "sphere":
-        return max(float(np.linalg.norm(aside)) - object.diameter / 2, 0.0)
-    aside = aside @ rotation_from_wxyz(np.array(object.quaternion)).as_matrix()
-    beyond = [np.abs((aside - part.place) @ part.turn) - part.half for part in _parts(object)]
+def distance_to(solid: WorldObject | Obstacle, point: Vector) -> float:
+    """m from a point in the base frame to an object or obstacle, 0 within it; a cylinder counts as the box about it."""
+    if isinstance(solid, Obstacle):
+        beyond = np.maximum(np.subtract(solid.low, point), np.subtract(point, solid.high))
+        return float(np.linalg.norm(np.maximum(beyond, 0.0)))
+    aside = np.subtract(point, solid.position)
+    if solid.shape == "sphere":
+        return max(float(np.linalg.norm(aside)) - solid.diameter / 2, 0.0)
+    aside = aside @ rotation_from_wxyz(np.array(solid.quaternion)).as_matrix()
+    beyond = [np.abs((aside - part.place) @ part.turn) - part.half for part in _parts(solid)]
     return min(float(np.linalg.norm(np.maximum(sides, 0.0))) for sides in beyond)
 
 

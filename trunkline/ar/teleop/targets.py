@@ -134,7 +134,7 @@ def why_not(targets: Targets | None) -> str:
     """Why no plan can be asked for, in one line; "" where one can."""
     if targets is None:
         return "both targets are needed: hold a grip to set each"
-    for name, target in (("rigid", targets.rigid), ("tip", targets.tip)):
+    for name, target in _by_name(targets):
         if target.reach == "blocked":
             return f"{name} target is inside {target.obstacle}"
         if target.reach == "outside":
@@ -147,8 +147,12 @@ def why_not(targets: Targets | None) -> str:
 
 def out_of_reach(targets: Targets | None) -> str:
     """Which target is out of reach, in one line; "" where none is."""
-    both = () if targets is None else (("rigid", targets.rigid), ("tip", targets.tip))
+    both = () if targets is None else _by_name(targets)
     return next((_by_how_much(name, target) for name, target in both if target.reach == "outside"), "")
+
+
+def _by_name(targets: Targets) -> tuple[tuple[str, Target], ...]:
+    return ("rigid", targets.rigid), ("tip", targets.tip)
 
 
 def _by_how_much(name: str, target: Target) -> str:
