@@ -21,6 +21,8 @@ from aiohttp import ClientSession, WSServerHandshakeError
 from qualification.command import qualify
 from qualification.guests import ADDRESS, HZ, RIGID, SEEN, TIP, Guest, Hands, hands_at, knock, until
 from qualification.scene import running
+from trunkline.ar.session.binary import VERSION
+from trunkline.ar.session.server import MOST_CLIENTS
 from trunkline.errors import InputError
 
 PATIENCE = 60.0  # s for a plan and its preview
@@ -193,6 +195,29 @@ async def replayed(visitors: Visitors) -> str:
     return said
 
 
+async def impersonated(visitors: Visitors) -> str:
+    """The id of whom controls, which all see, as the key of another."""
+    holder = await visitors.control()
+    guest = await knock(visitors.session, ADDRESS.url)
+    await guest.say(type="hello", version=VERSION, token=visitors.token, key=holder.told["welcome"]["id"])
+    await until(lambda: "welcome" in guest.told, SOON)
+    await asyncio.sleep(PAUSE)
+    is_safe = holder.controls and not holder.socket.closed and not guest.controls
+    await asyncio.gather(guest.leave(), holder.leave())
+    return "is another client; who controls still does" if is_safe else "CONTROL WAS TAKEN"
+
+
+async def crowded(visitors: Visitors) -> str:
+    """Clients in every place, and a stop from whom comes after them."""
+    guests = [await visitors.come() for _ in range(MOST_CLIENTS)]
+    last = await visitors.come()
+    reason = await refused(last)
+    await last.send("stop")
+    await until(lambda: last.told["state"]["mode"] == "stopped", SOON)
+    await asyncio.gather(*(guest.leave() for guest in (*guests, last)))
+    return f"{reason}; its stop is heard"
+
+
 async def another(visitors: Visitors) -> str:
     """A plan that was never previewed is said to have been shown."""
     guest = await visitors.control()
@@ -224,6 +249,8 @@ ATTEMPTS: dict[str, Attempt] = {
     "poses that are no numbers": numberless,
     "a confirmation that was heard before": replayed,
     "another plan's digest": another,
+    "another's id": impersonated,
+    "every place taken": crowded,  # the last: the robot is stopped
 }
 
 
