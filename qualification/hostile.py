@@ -201,7 +201,9 @@ async def impersonated(visitors: Visitors) -> str:
     guest = await knock(visitors.session, ADDRESS.url)
     await guest.say(type="hello", version=VERSION, token=visitors.token, key=holder.told["welcome"]["id"])
     await until(lambda: "welcome" in guest.told, SOON)
-    await asyncio.sleep(PAUSE)
+    for _ in range(int(PAUSE * HZ)):
+        await holder.send("input", hands_at(RIGID, TIP, {}), SEEN, 2)
+        await asyncio.sleep(1 / HZ)
     is_safe = holder.controls and not holder.socket.closed and not guest.controls
     await asyncio.gather(guest.leave(), holder.leave())
     return "is another client; who controls still does" if is_safe else "CONTROL WAS TAKEN"
