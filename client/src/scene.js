@@ -162,6 +162,7 @@ export class RobotScene {
   showWorld(world) {
     this.world = world;
     this.worldMesh?.removeFromParent();
+    this.worldMesh?.geometry.dispose();
     const objects = this.bodies?.includes(OBJECT) ? [] : world.things;
     const wide = ({ low, high }) => high[0] - low[0] > WIDEST;
     this.floor.position.z = Math.min(0, ...world.boxes.map((obstacle) => (wide(obstacle) ? obstacle.high[2] : obstacle.low[2])));

@@ -6,13 +6,14 @@ import { Playback } from "../src/playback.js";
 import { Recording } from "../src/recording.js";
 import { decode, encode, noHand } from "../src/wire.js";
 import { FROM_CLIENT, FROM_SERVER, HAND, HEAD_BYTES, INPUT_BYTES } from "../src/wire_table.js";
-import { Group, Ray, Vector3 } from "three";
+import { Box3, Group, Ray, Vector3 } from "three";
 import { axisOf, onAxis, objectAt } from "../src/handles.js";
 import { doubtQuestion, isDoubtful, lasts, ofDevice, success, whyLost, whyNothing } from "../src/hints.js";
 import { LEVELS, Quality } from "../src/quality.js";
 import { clustered, matrixOf } from "../src/geoms.js";
 import { Confirming } from "../src/confirming.js";
 import { freeArea } from "../src/views.js";
+import { RobotScene } from "../src/scene.js";
 import { predictionText, remedy, uiText } from "../src/panel.js";
 import { MeasuredArm, camerasText, colourOf, correctionText } from "../src/measured.js";
 import { OFFER, TIP, WRONG, css } from "../src/colours.js";
@@ -288,6 +289,28 @@ test("a handle moves along its own axis, and a ray meets the object that it poin
   const inverse = ({ position, quaternion }) => matrixOf(position, quaternion).invert();
   for (const objects of [[behind, lying], [lying, behind]]) assert.equal(objectAt(ray, objects, inverse, 0.01).name, "lying");
   assert.equal(objectAt(new Ray(new Vector3(0.3, -2, 0.5), new Vector3(0, 1, 0)), [behind, lying], inverse, 0.01), null);
+});
+
+test("the floor is drawn where it is, a base that stands above it has a stand, and what hangs a string", () => {
+  const drawn = new RobotScene();
+  const wide = { low: [-5, -5, -1], high: [5, 5, -0.7] }, table = { low: [0.3, -0.2, -0.7], high: [0.8, 0.2, -0.1] };
+  const ball = { name: "ball", shape: "sphere", diameter: 0.05, height: 0.05, position: [0.5, 0.5, 0.3], quaternion: [1, 0, 0, 0], support: "hanging" };
+  const box = () => (drawn.worldMesh ? new Box3().setFromObject(drawn.worldMesh) : null);
+  const near = (actual, expected) => assert.ok(Math.abs(actual - expected) < 1e-6, `${actual}, expected ${expected}`);
+  drawn.showWorld({ boxes: [], things: [] });
+  near(drawn.floor.position.z, 0);
+  assert.equal(box(), null, "a base on the floor needs no stand");
+  drawn.showWorld({ boxes: [wide], things: [] });
+  near(drawn.floor.position.z, -0.7); // its top, of what is the floor
+  assert.deepEqual([box().min.z, box().max.z].map((z) => Math.round(1e6 * z) / 1e6 + 0), [-0.7, 0]); // from the floor to the base
+  drawn.ground("light");
+  near(drawn.floor.position.z, -0.7);
+  drawn.showWorld({ boxes: [{ ...table, low: [0.3, -0.2, -0.8] }], things: [] });
+  near(drawn.floor.position.z, -0.8); // what a table stands on, where no floor is known
+  drawn.showWorld({ boxes: [wide], things: [{ ...ball, support: "standing" }] });
+  near(box().max.z, 0.325);
+  drawn.showWorld({ boxes: [wide], things: [ball] });
+  near(box().max.z, 0.325 + 0.15 + 0.006); // string and hook
 });
 
 test("in a small window the robot is viewed in what the panels leave free", () => {
