@@ -12,9 +12,12 @@ import numpy as np
 import yaml
 import zstandard
 from mcap.writer import Writer
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from trunkline.recordings.logs.mcap_log import Log, read_log
 
+HEADER1 = "std_msgs/msg/Header"
 QOS = "- history: 3\n  depth: 0\n  reliability: 1\n  durability: 1\n  avoid_ros_namespace_conventions: false"
 TOPICS = "id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, serialization_format TEXT NOT NULL"
 MESSAGES = """CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL,
@@ -83,6 +86,33 @@ def as_bag(log: Path, target: Path, kind: Kind) -> Path:
     for name, some in parts.items():
         _write_file(target / name, source, some, kind)
     (target / "metadata.yaml").write_text(yaml.safe_dump(_metadata(target.name, source, parts, kind), sort_keys=False))
+    return target
+
+
+def as_bag1(
+    log: Path, target: Path, packed: Writer1.CompressionFormat | None = None, chunk: int = 2**20, spoil: str = ""
+) -> Path:
+    """The messages of an MCAP log as a bag of ROS 1, in chunks of some `chunk` bytes. spoil: a topic with a definition
+    that is none."""
+    source, writer = read_log(log), Writer1(target)
+    writer.chunk_threshold = chunk
+    if packed is not None:
+        writer.set_compression(packed)
+    with writer:
+        rows = []
+        for topic in source.topics.values():
+            store = get_typestore(Stores.EMPTY)
+            store.register(get_types_from_msg(topic.definition.decode(), topic.schema))
+            header = {HEADER1: get_typestore(Stores.ROS1_NOETIC).fielddefs[HEADER1]}
+            ros1 = get_typestore(Stores.EMPTY)
+            ros1.register(dict(store.fielddefs) | header)
+            text, digest = ros1.generate_msgdef(topic.schema)
+            text = "float64 1x\n" if topic.name == spoil else text
+            connection = writer.add_connection(topic.name, topic.schema, msgdef=text, md5sum=digest)
+            rows += [(time, connection, store.cdr_to_ros1(data, topic.schema))
+                     for time, data in zip(topic.log_times.tolist(), topic.messages, strict=True)]  # fmt: skip
+        for time, connection, data in sorted(rows, key=lambda row: row[0]):
+            writer.write(connection, time, data)
     return target
 
 

@@ -173,9 +173,9 @@ def test_logs_one_folder_down_are_found(tmp_path, capsys):
 def test_what_holds_nothing_is_an_error(tmp_path, capsys):
     assert main([str(tmp_path)]) == 1
     assert "found no log, nor one folder down" in capsys.readouterr().err
-    (tmp_path / "tilt.bag").write_bytes(b"")
+    (tmp_path / "tilt.bag.active").write_bytes(b"")
     assert main([str(tmp_path)]) == 1
-    assert "found tilt.bag: `rosbags-convert` of the package rosbags" in capsys.readouterr().err
+    assert "found tilt.bag.active: `rosbag reindex` makes bags of them" in capsys.readouterr().err
     (tmp_path / "tilt.mcap.lz4").write_bytes(b"")
     assert main([str(tmp_path)]) == 1
     assert "found tilt.mcap.lz4: decompress them, as by `lz4 -d`" in capsys.readouterr().err
@@ -192,7 +192,7 @@ def test_nothing_in_a_folder_is_left_out_without_a_word(tmp_path, capsys):
     (log,) = tmp_path.glob("*.mcap")
     (tmp_path / "monday/morning").mkdir(parents=True)
     shutil.copy(log, tmp_path / "monday/morning/deep.mcap")
-    for name in ("tilt.bag", "curl.mcap.lz4", "sizes.csv"):
+    for name in ("tilt.bag.active", "curl.mcap.lz4", "sizes.csv"):
         (tmp_path / name).write_bytes(b"1,2\n")
     with open(tmp_path / "empty.mcap", "wb") as file:
         writer = Writer(file)
@@ -200,12 +200,12 @@ def test_nothing_in_a_folder_is_left_out_without_a_word(tmp_path, capsys):
         writer.finish()
     lines, proposed = inspect(capsys, tmp_path)
     for file, reason in {
-        "tilt.bag": "`rosbags-convert`", "curl.mcap.lz4": "decompress them", "monday/morning/deep.mcap": "move them up",
-        "sizes.csv": "`trunkline inspect`", f"{tmp_path}/empty.mcap": "no poses that can be read",
+        "tilt.bag.active": "`rosbag reindex`", "curl.mcap.lz4": "decompress them",
+        "monday/morning/deep.mcap": "move them up", "sizes.csv": "`trunkline inspect`", f"{tmp_path}/empty.mcap": "no poses that can be read",
     }.items():  # fmt: skip
         assert re.search(rf"left out: {re.escape(file)}.*{re.escape(reason)}", lines), file
         assert file not in proposed
-    left = ["curl.mcap.lz4", "empty.mcap", "monday/morning/deep.mcap", "tilt.bag"]
+    left = ["curl.mcap.lz4", "empty.mcap", "monday/morning/deep.mcap", "tilt.bag.active"]
     assert read_session(tmp_path).unlisted == left
 
 

@@ -50,14 +50,16 @@ def reference_of(
     """
     base = None if isinstance(session.base, FixedBase) else session.base
     markers, sources = session.markers, [source for _, source, _ in trials]
+    lost: list[str] = []
     if markers is None:
         mount = session.base.body if isinstance(session.base, FixedBase) else session.base
         names = {name for source in sources for name in source.poses.names if name != mount}
         unlabelled = {name for name in names if UNLABELLED.fullmatch(name)}
         markers = {name: name for name in sorted(names - unlabelled or names)}
+        lost = sorted(names - set(markers))
     joint_topics = tuple(sorted({name for source in sources for name in source.joint_topics}))
     reference = Reference(markers, base, METRES_PER[session.frame.unit], None, joint_topics)
-    if session.markers is None and (lost := sorted(names - set(markers))):
+    if lost:
         reference.repairs.append(f"{some_of(lost)} left out: they are markers without a label")
     bodies = reference.bodies
     complete = [some for some in trials if set(bodies) <= set(some[1].poses.names)]

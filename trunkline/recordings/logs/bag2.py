@@ -23,6 +23,7 @@ from omegaconf import OmegaConf
 from pydantic import BaseModel, Field, ValidationError
 
 from trunkline.errors import InputError
+from trunkline.recordings.logs.bag1 import read_bag1
 from trunkline.recordings.logs.mcap_log import Log, by_topic, read_contents, read_log
 from trunkline.recordings.logs.records import BLOCK, LARGEST_EXPANSION, Contents
 from trunkline.settings import read_yaml
@@ -31,7 +32,8 @@ METADATA = "metadata.yaml"
 KEY = "rosbag2_bagfile_information"  # under which metadata.yaml has all
 STORAGES = {".mcap": "mcap", ".db3": "sqlite3"}
 PACKED = (".zstd", ".zst")  # endings of compressed files: of rosbag2, and of the command `zstd`
-PATTERNS = tuple(f"*{ending}{packed}" for ending in STORAGES for packed in ("", *PACKED))
+ROS1 = ".bag"  # the ending of a bag of ROS 1
+PATTERNS = (f"*{ROS1}", *(f"*{ending}{packed}" for ending in STORAGES for packed in ("", *PACKED)))
 UNCLOSED = ("-wal", "-journal")  # files that SQLite has beside one that is being written
 SIZES = struct.Struct(">16xH10xI60xI")  # of an SQLite file's head: bytes a page, pages, whether that number is valid
 LISTED = 4  # names of files in a line
@@ -90,7 +92,7 @@ def recording_name(file: str) -> str:
 
 
 def read_recording(path: Path, wanted: Collection[str] | None = None) -> Log:
-    """Read a log of any kind: an MCAP file, a bag's folder or one of its files by itself.
+    """Read a log of any kind: an MCAP file, a bag's folder or one of its files by itself, a bag of ROS 1.
 
     Args: wanted: as for `read_log`.
 
@@ -98,6 +100,10 @@ def read_recording(path: Path, wanted: Collection[str] | None = None) -> Log:
         InputError: it is missing, is no recording, is named wrongly in its metadata.yaml, or nothing of it is readable.
     """
     folder = bag_folder(path)
+    if path.suffix == ROS1 and not path.is_dir():
+        bag = Contents(wanted)
+        damage = read_bag1(path, bag)
+        return Log(path, by_topic(bag, damage), damage, len(bag.messages), bag.unchecked, "a bag of ROS 1")
     if folder is None and path.suffix not in (".db3", *PACKED):
         return read_log(path, wanted)
     if folder is None:

@@ -102,6 +102,13 @@ string child_frame_id
 geometry_msgs/Vector3 translation
 geometry_msgs/Quaternion rotation
 {VECTOR3}{QUATERNION}"""
+TRANSFORM_STAMPED = f"""std_msgs/Header header
+string child_frame_id
+geometry_msgs/Transform transform
+{HEADER}{SEPARATOR}MSG: geometry_msgs/Transform
+geometry_msgs/Vector3 translation
+geometry_msgs/Quaternion rotation
+{VECTOR3}{QUATERNION}"""
 LAYOUT = f"""std_msgs/MultiArrayLayout layout
 {{kind}}[] data
 {SEPARATOR}MSG: std_msgs/MultiArrayLayout
@@ -150,15 +157,10 @@ geometry_msgs/Pose pose
     "geometry_msgs/PoseArray": f"""std_msgs/Header header
 geometry_msgs/Pose[] poses
 {HEADER}{POSE}""",
+    "geometry_msgs/TransformStamped": TRANSFORM_STAMPED,
     "tf2_msgs/TFMessage": f"""geometry_msgs/TransformStamped[] transforms
 {SEPARATOR}MSG: geometry_msgs/TransformStamped
-std_msgs/Header header
-string child_frame_id
-geometry_msgs/Transform transform
-{HEADER}{SEPARATOR}MSG: geometry_msgs/Transform
-geometry_msgs/Vector3 translation
-geometry_msgs/Quaternion rotation
-{VECTOR3}{QUATERNION}""",
+{TRANSFORM_STAMPED}""",
     "std_msgs/Float64MultiArray": LAYOUT.format(kind="float64"),
     "std_msgs/Float32MultiArray": LAYOUT.format(kind="float32"),
     "std_msgs/Float64": "float64 data\n",

@@ -118,6 +118,13 @@ def vicon_position(message) -> DecodedPoses:
     return DecodedPoses(time, None, place.astype(float), turn.astype(float), np.asarray(message.frame_number))
 
 
+@poses("geometry_msgs/TransformStamped", topic_per_body=True)
+def transform_stamped(message) -> DecodedPoses:
+    """A segment of vicon_bridge."""
+    place, turn = vectors([message.transform.translation]), quaternions([message.transform.rotation])
+    return DecodedPoses(moment(message.header.stamp)[..., None], None, place, turn)
+
+
 @poses("geometry_msgs/PoseArray")
 def pose_array(message) -> DecodedPoses:
     return _unnamed(moment(message.header.stamp), message.poses)

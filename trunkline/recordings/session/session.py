@@ -457,7 +457,7 @@ def unread_in(folder: Path) -> dict[str, list[str]]:
     """Recordings of a folder, and of folders in it, that are none of `logs_in`, by what to do with them."""
     remedies = {
         "[!.]*.mcap.lz4": "decompress them, as by `lz4 -d`",
-        "[!.]*.bag": "`rosbags-convert` of the package rosbags makes bags of ROS 2 of them",
+        "[!.]*.bag.active": "`rosbag reindex` makes bags of them that are closed",
     }
     by_remedy = {remedy: [*folder.glob(f"[!.]*/{of}"), *folder.glob(of)] for of, remedy in remedies.items()}
     inner = [sub for sub in folder.glob("[!.]*/[!.]*/") if not (sub.parent / "session.yaml").is_file()]
