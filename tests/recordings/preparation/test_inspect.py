@@ -201,7 +201,8 @@ def test_nothing_in_a_folder_is_left_out_without_a_word(tmp_path, capsys):
     lines, proposed = inspect(capsys, tmp_path)
     for file, reason in {
         "tilt.bag.active": "`rosbag reindex`", "curl.mcap.lz4": "decompress them",
-        "monday/morning/deep.mcap": "move them up", "sizes.csv": "`trunkline inspect`", f"{tmp_path}/empty.mcap": "no poses that can be read",
+        "monday/morning/deep.mcap": "move them up", "sizes.csv": "`trunkline inspect`",
+        f"{tmp_path}/empty.mcap": "no poses that can be read",
     }.items():  # fmt: skip
         assert re.search(rf"left out: {re.escape(file)}.*{re.escape(reason)}", lines), file
         assert file not in proposed
