@@ -136,7 +136,7 @@ def test_the_rehearsal_lists_its_settings(stages):
 
 
 # Live sessions take the names of tracked bodies from where logs are read; a rehearsal reads no log.
-NO_LOGS = {REHEARSE: {"lz4", "mcap-protobuf-support", "zstandard"}}
+NO_LOGS = {REHEARSE: {"lz4", "mcap-protobuf-support", "rosbags", "zstandard"}}
 
 
 @pytest.mark.parametrize("address", [*STAGES, *EXAMPLES, "demo/dvc.yaml:record", REHEARSE])
