@@ -164,8 +164,16 @@ def refusal(folder) -> str:
     try:
         ((_, raw),) = raw_trials(folder).items()
     except InputError as error:
-        return str(error)
-    return str(raw) if isinstance(raw, InputError) else ""
+        raw = error
+    if not isinstance(raw, InputError):
+        return ""
+    problem, _, line = str(raw).removesuffix(")").partition(" (line ")
+    if problem.startswith(f"{folder}/session.yaml: "):
+        key = problem.removeprefix(f"{folder}/session.yaml: ").partition(":")[0].split(".")
+        written = (folder / "session.yaml").read_text().splitlines()[int(line) - 1]
+        assert any(f"{part}:" in written for part in key) or "- 0" in written, f"{key}: line {line}: {written}"
+        return problem
+    return str(raw)
 
 
 def test_bytes_of_another_encoding(tmp_path):

@@ -23,6 +23,7 @@ from trunkline.errors import InputError, nearest
 from trunkline.recordings.logs.bag2 import bag_with, recording_name, recordings_in
 from trunkline.recordings.session.layout import TABLES, Entry, TableLayout, keys_of_blocks
 from trunkline.recordings.session.shared_recordings import check_shared
+from trunkline.recordings.session.yaml_lines import with_line
 from trunkline.recordings.signals.held import Between
 from trunkline.recordings.trials.experiments import EXPERIMENTS, LOAD, PULL, ExperimentName, Level
 from trunkline.recordings.trials.recording import FORCE, LENGTH
@@ -519,21 +520,23 @@ def read_session(folder: Path, files: set[str] | None = None) -> Session:
     try:
         session = Session.model_validate(content)
     except ValidationError as error:
-        raise InputError(f"{path}: {_describe(error)}") from error
+        raise InputError(with_line(path, _describe(error))) from error
     logs += tables if session.tables is not None else []
     bags = {trial.file: bag_with(folder / trial.file) for trial in session.trials if trial.file not in logs}
     for index, trial in enumerate(session.trials):
         if trial.file in tables and session.tables is None:
             expected = "expected `tables`, which says what its columns are (`trunkline inspect` proposes it)"
-            raise InputError(f"{path}: trials.{index}.file: found the table {trial.file!r}, {expected}")
+            problem = f"trials.{index}.file: found the table {trial.file!r}, {expected}"
+            raise InputError(with_line(path, problem))
         if trial.file not in logs and bags[trial.file] is None:
             close = difflib.get_close_matches(trial.file, logs, n=1) or logs[:1]
             expected = f"one of the folder's {len(logs)} logs" + (f", such as {close[0]}" if close else "")
-            raise InputError(f"{path}: trials.{index}.file: found {trial.file!r}, expected {expected}")
+            raise InputError(with_line(path, f"trials.{index}.file: found {trial.file!r}, expected {expected}"))
     names = [trial.name for trial in session.trials]
     for index, name in enumerate(names):
         if name in names[:index]:
-            raise InputError(f"{path}: trials.{index}.name: found {name!r} again, expected each name once")
+            problem = f"trials.{index}.name: found {name!r} again, expected each name once"
+            raise InputError(with_line(path, problem))
     session._shared = check_shared(folder, session.trials)
     of_bags = {bag.relative_to(folder).as_posix() for bag in bags.values() if bag is not None}
     listed = {trial.file for trial in session.trials} | of_bags | session.motors_files()
