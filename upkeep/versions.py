@@ -20,8 +20,8 @@ LOCKS = ("requirements.lock", "requirements-torch.txt")
 # rich) or runs them (dvc, threadpoolctl).
 LIBRARIES = (
     "fast-simplification", "lz4", "mcap", "mcap-protobuf-support", "mcap-ros2-support", "mujoco", "numba",
-    "numpy", "onnx", "onnxruntime", "pandas", "point-cloud-utils", "protobuf", "pyarrow", "pytorch-optimizer", "rosbags",
-    "scikit-image", "scipy", "torch", "tract", "trimesh", "zstandard",
+    "numpy", "onnx", "onnxruntime", "pandas", "point-cloud-utils", "protobuf", "pyarrow", "pytorch-optimizer",
+    "rosbags", "scikit-image", "scipy", "torch", "tract", "trimesh", "zstandard",
 )  # fmt: skip
 HEADER = "# Versions that results depend on, from requirements.lock by `make requirements`; dvc.yaml names them.\n"
 
