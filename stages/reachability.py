@@ -1,6 +1,8 @@
 """Map the reach of the rigid arm, of the soft arm per gravity angle, and of both together."""
 
+from io import BytesIO
 from pathlib import Path
+from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 import numpy as np
 
@@ -41,7 +43,7 @@ def main(config: Config) -> None:
         maps, check = survey(tips_at, config, lambda part: bar.update(1, done=part))
 
     with output_folder(ARTIFACTS) as folder:
-        np.savez_compressed(folder / "grids.npz", allow_pickle=False, **maps.arrays())
+        write_arrays(folder / "grids.npz", maps.arrays())
         (folder / "meshes").mkdir()
         for name, mesh in maps.meshes().items():
             write_obj(folder / "meshes" / f"{name}.obj", mesh, f"Reachable set: {name}")
@@ -52,6 +54,15 @@ def main(config: Config) -> None:
         save_figure(slices_figure(maps, tips, check), folder / "slices.png")
         save_figure(heldout_figure(heldout, config.spot_check.outside), folder / "heldout.png")
         write_metrics(folder, summary(maps, check))
+
+
+def write_arrays(path: Path, arrays: dict[str, np.ndarray]) -> None:
+    """An `.npz` whose bytes are the same by every Python: of those of NumPy the headers changed within 3.11."""
+    with ZipFile(path, "w", ZIP_DEFLATED) as packed:
+        for name, array in arrays.items():
+            content = BytesIO()
+            np.save(content, array, allow_pickle=False)
+            packed.writestr(ZipInfo(f"{name}.npy"), content.getvalue(), ZIP_DEFLATED)
 
 
 if __name__ == "__main__":
