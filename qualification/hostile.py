@@ -84,10 +84,16 @@ async def hello(visitors: Visitors, **message: object) -> str:
     return await refused(guest)
 
 
+async def dialled(limit: int = 2**16) -> tuple[asyncio.StreamReader, asyncio.StreamWriter, str]:
+    """A connection below HTTP, and the server's name and port; `limit`: bytes that its reader takes in unread."""
+    where = ADDRESS.url.removeprefix("http://")
+    host, port = where.split(":")
+    return *await asyncio.open_connection(host, int(port), limit=limit), where
+
+
 async def speechless(line: str, pings: bool = False) -> str:
     """A connection that sends this, then nothing but pings, and closes nothing."""
-    host, port = ADDRESS.url.removeprefix("http://").split(":")
-    reader, writer = await asyncio.open_connection(host, int(port))
+    reader, writer, _ = await dialled()
     writer.write(line.encode())
     begun = time.monotonic()
     answer = b"none yet"
@@ -103,9 +109,8 @@ async def speechless(line: str, pings: bool = False) -> str:
 
 async def unread() -> str:
     """A connection that asks for the page's code again and again, and reads none of it."""
-    host, port = ADDRESS.url.removeprefix("http://").split(":")
-    _, writer = await asyncio.open_connection(host, int(port), limit=1024)
-    writer.write(8 * f"GET /app.js HTTP/1.1\r\nHost: {host}:{port}\r\n\r\n".encode())
+    _, writer, where = await dialled(limit=1024)
+    writer.write(8 * f"GET /app.js HTTP/1.1\r\nHost: {where}\r\n\r\n".encode())
     begun = time.monotonic()
     with suppress(ConnectionError):
         while time.monotonic() < begun + LONG:
@@ -118,9 +123,8 @@ async def unread() -> str:
 
 async def worded(token: bytes) -> str:
     """A request with this as its token."""
-    host, port = ADDRESS.url.removeprefix("http://").split(":")
-    reader, writer = await asyncio.open_connection(host, int(port))
-    lines = f"GET /scene.json HTTP/1.1\r\nHost: {host}:{port}\r\nAuthorization: Bearer ".encode()
+    reader, writer, where = await dialled()
+    lines = f"GET /scene.json HTTP/1.1\r\nHost: {where}\r\nAuthorization: Bearer ".encode()
     writer.write(lines + token + b"\r\n\r\n")
     answer = await asyncio.wait_for(reader.readline(), SOON)
     writer.close()

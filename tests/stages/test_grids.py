@@ -6,7 +6,7 @@ import numpy as np
 
 from stages.reachability import write_arrays
 
-EXTRA = 28  # byte of a member's head that has the length of what Python 3.11.3 and 3.11.4 write otherwise
+EXTRA = 28  # byte of a member's head that has the length of what Python 3.11.2 and 3.11.7 write otherwise
 
 
 def test_grids_come_back_and_their_file_has_nothing_that_depends_on_python(tmp_path):

@@ -90,10 +90,11 @@ def as_bag(log: Path, target: Path, kind: Kind) -> Path:
 
 
 def as_bag1(
-    log: Path, target: Path, packed: Writer1.CompressionFormat | None = None, chunk: int = 2**20, spoil: str = ""
-) -> Path:
+    log: Path, target: Path, packed: Writer1.CompressionFormat | None = None, chunk: int = 2**20, spoil: str = "",
+    renamed: str = "",
+) -> Path:  # fmt: skip
     """The messages of an MCAP log as a bag of ROS 1, in chunks of some `chunk` bytes. spoil: a topic with a definition
-    that is none."""
+    that is none. renamed: another name of their type."""
     source, writer = read_log(log), Writer1(target)
     writer.chunk_threshold = chunk
     if packed is not None:
@@ -108,7 +109,7 @@ def as_bag1(
             ros1.register(dict(store.fielddefs) | header)
             text, digest = ros1.generate_msgdef(topic.schema)
             text = "float64 1x\n" if topic.name == spoil else text
-            connection = writer.add_connection(topic.name, topic.schema, msgdef=text, md5sum=digest)
+            connection = writer.add_connection(topic.name, renamed or topic.schema, msgdef=text, md5sum=digest)
             rows += [(time, connection, store.cdr_to_ros1(data, topic.schema))
                      for time, data in zip(topic.log_times.tolist(), topic.messages, strict=True)]  # fmt: skip
         for time, connection, data in sorted(rows, key=lambda row: row[0]):

@@ -146,6 +146,22 @@ def test_a_topic_whose_definition_cannot_be_read_is_named_and_the_others_are_rea
     assert read.topics == {}
     (line,) = read.damage
     assert line.startswith("/poses: the definition of motion_capture_tracking_interfaces/msg/NamedPoseArray cannot be")
+    log = in_ros(tmp_path / "three.mcap", *SOURCES["vicon_bridge"][:2], at_stamps(transforms))
+    spoilt, *others = (f"/vicon/{name}" for name in BODIES)
+    read, whole = read_recording(as_bag1(log, tmp_path / "three.bag", spoil=spoilt)), read_recording(log)
+    assert [line.partition(":")[0] for line in read.damage] == [spoilt]
+    assert {name: len(topic.messages) for name, topic in read.topics.items()} == {
+        name: len(whole.topics[name].messages) for name in others
+    }
+
+
+def test_transforms_by_their_name_of_old_are_those_of_tf2(tmp_path):
+    schema, definition, messages = SOURCES["tf"]
+    log = in_ros(tmp_path / "log.mcap", schema, definition, at_stamps(messages))
+    old = as_bag1(log, tmp_path / "old.bag", renamed="tf/msg/tfMessage")
+    bag, plain = (open_log(path, a_session()).poses for path in (old, log))
+    assert bag.names == plain.names
+    np.testing.assert_array_equal(bag.positions, plain.positions)
 
 
 @pytest.mark.parametrize(
